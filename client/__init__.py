@@ -1,0 +1,1 @@
+"""What a controller's author imports: connect, robots with their channels, lockstep, players."""

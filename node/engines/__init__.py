@@ -1,0 +1,1 @@
+"""Physics engines behind one interface: Bullet, and a pure twin in Python."""

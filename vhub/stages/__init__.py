@@ -1,0 +1,1 @@
+"""The stages that every packet passes in the virtual hub, one file each."""
