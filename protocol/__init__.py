@@ -1,1 +1,1 @@
-"""What all processes share: messages, wire format, deployment, frame and the rules over it. Imports no other package."""
+"""What all processes share: messages, wire format, deployment, frame and its rules. Imports no other package."""

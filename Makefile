@@ -1,0 +1,42 @@
+# The commands of this repository. Each sets up what it needs (tools/environment.sh) and takes more arguments in ARGS:
+#     make up ARGS='--pace fast --for 20s'
+#     make test ARGS='tests/protocol -x'
+
+PACKAGES := client node protocol rehearsal supervisor vhub
+PYTHON := .venv/bin/python
+
+# One worker per core; tests of one group (see tests/conftest.py) stay together. PYTHONPATH of the shell (ROS sets one)
+# would load other people's pytest plugins.
+PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses auto --maxprocesses 8 --dist loadgroup
+
+.PHONY: help up test lint bench clean environment
+
+help:
+	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
+	@echo 'make test    lint, type check and all tests (ARGS: options of pytest)'
+	@echo 'make lint    ruff and mypy alone'
+	@echo 'make bench   measure speed, latency and throughput (ARGS: options of the bench)'
+	@echo 'make clean   remove environments, caches and builds; captures stay'
+
+up: environment
+	@.venv/bin/foosim-supervisor up deploy/table.yaml $(ARGS)
+
+# Last in it is pytest, so that its summary ends the output.
+test: lint
+	@$(PYTEST) $(ARGS)
+
+lint: environment
+	@$(PYTHON) -m ruff check .
+	@mkdir -p .typecheck/foosim
+	@for package in $(PACKAGES); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
+	@$(PYTHON) -m mypy .typecheck/foosim tests $(wildcard bench)
+
+bench: environment
+	@$(PYTHON) -m bench $(ARGS)
+
+environment:
+	@sh tools/environment.sh
+
+clean:
+	rm -rf .venv .venv-uv .typecheck .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
+	find $(wildcard $(PACKAGES) tests bench) -type d -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,252 @@
+"""The rules of the house, as tests: who may import whom, what stays pure, how long things get, what a wheel holds.
+
+They read the source as text and syntax trees, and import nothing of it, apart from the last two, which install it.
+A rule that is in the way is changed here, in one place, with its reason.
+"""
+
+import ast
+import importlib
+import re
+import subprocess
+import sys
+import tomllib
+import venv
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from shutil import copytree, ignore_patterns
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PYPROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())
+LINES_OF_A_FUNCTION_MAX = 70
+LINES_OF_A_FILE_MAX = 500
+
+# Which packages a package may import, besides itself.
+MAY_IMPORT: dict[str, set[str]] = {
+    "protocol": set(),
+    "client": {"protocol"},
+    "node": {"protocol"},
+    "vhub": {"protocol"},
+    "supervisor": {"protocol", "client", "node", "vhub"},
+    "rehearsal": {"protocol", "client", "node", "vhub", "supervisor"},
+}
+PACKAGES = sorted(MAY_IMPORT)
+
+# The one file that knows a library which would otherwise spread.
+ONLY_IN = {"zenoh": "protocol/session.py", "pybullet": "node/engines/bullet.py"}
+
+# The files that touch the world. Every other module is a core: it gets messages and the time and returns what to do,
+# which is why rehearsal can run all of them in one process on virtual time.
+SHELLS = {
+    "client/client.py",
+    "client/main.py",
+    "node/main.py",
+    "protocol/inbox.py",
+    "protocol/journal.py",
+    "protocol/session.py",
+    "rehearsal/rehearse_command.py",
+    "rehearsal/replay_command.py",
+    "supervisor/cli.py",
+    "supervisor/display.py",
+    "supervisor/launcher.py",
+    "supervisor/main.py",
+    "supervisor/run_folder.py",
+    "vhub/capture_reader.py",
+    "vhub/capture_writer.py",
+    "vhub/main.py",
+}
+# What a core does not import: clocks, sockets, files, threads, dice.
+IMPURE = set(
+    "asyncio concurrent datetime fcntl mmap multiprocessing os pathlib queue random secrets select selectors shutil"
+    " signal socket subprocess tempfile threading time uuid zenoh".split()
+)
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """The syntax tree of a file."""
+    return ast.parse(path.read_text(), str(path))
+
+
+def python_files(*folders: str) -> list[Path]:
+    """All Python files in the folders, without caches."""
+    return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
+
+
+def name_of(path: Path) -> str:
+    """The file's name as seen from the top of the repository."""
+    return path.relative_to(ROOT).as_posix()
+
+
+def imports_of(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and full dotted name of every import in a file, at any depth of nesting."""
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{name_of(path)}:{node.lineno}: a relative import; write foosim.… in full"
+            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+def modules() -> list[str]:
+    """The dotted names of all modules and packages under foosim."""
+    dotted = (".".join(("foosim", *path.relative_to(ROOT).with_suffix("").parts)) for path in python_files(*PACKAGES))
+    return [name.removesuffix(".__init__") for name in dotted]
+
+
+SOURCES = python_files(*PACKAGES)
+ALL_FILES = python_files(*PACKAGES, "tests", "bench")
+
+
+def test_imports_point_one_way() -> None:
+    wrong = []
+    for path in SOURCES:
+        package = name_of(path).split("/")[0]
+        for line, name in imports_of(path):
+            parts = name.split(".")
+            if parts[0] == "foosim" and parts[1] != package and parts[1] not in MAY_IMPORT[package]:
+                wrong.append(f"{name_of(path)}:{line}: {package} may not import {name}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_imports_are_under_foosim() -> None:
+    bare = [
+        f"{name_of(path)}:{line}: import foosim.{name}"
+        for path in ALL_FILES
+        for line, name in imports_of(path)
+        if name.split(".")[0] in PACKAGES
+    ]
+    assert not bare, "\n".join(bare)
+
+
+@pytest.mark.parametrize("library", sorted(ONLY_IN))
+def test_a_library_is_known_to_one_file(library: str) -> None:
+    importers = {name_of(path) for path in SOURCES for _, name in imports_of(path) if name.split(".")[0] == library}
+    assert importers == {ONLY_IN[library]}
+
+
+def test_cores_are_pure() -> None:
+    wrong = []
+    for path in SOURCES:
+        if name_of(path) in SHELLS:
+            continue
+        for line, name in imports_of(path):
+            if name.split(".")[0] in IMPURE:
+                wrong.append(f"{name_of(path)}:{line}: imports {name}")
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in {"open", "input"}:
+                wrong.append(f"{name_of(path)}:{node.lineno}: calls {node.func.id}()")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_each_shell_exists_and_is_no_core() -> None:
+    """A name left over in SHELLS would let the next file of that name be impure."""
+    assert {shell for shell in SHELLS if not (ROOT / shell).is_file() or shell.endswith("/core.py")} == set()
+
+
+def test_no_running_random_generator() -> None:
+    """A draw depends on its key alone (foosim.protocol.draws); a generator also depends on who drew before."""
+    wrong = []
+    for path in SOURCES:
+        uses = [
+            *imports_of(path),
+            *((node.lineno, ast.unparse(node)) for node in ast.walk(tree_of(path)) if isinstance(node, ast.Attribute)),
+        ]
+        generators = re.compile(r"(random|secrets|np\.random|numpy\.random)\b")
+        wrong += [f"{name_of(path)}:{line}: {name}" for line, name in uses if generators.match(name)]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_functions_and_files_are_short() -> None:
+    long = []
+    for path in ALL_FILES:
+        lines = len(path.read_text().splitlines())
+        if lines > LINES_OF_A_FILE_MAX:
+            long.append(f"{name_of(path)}: {lines} lines")
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                assert node.end_lineno is not None
+                lines = node.end_lineno - node.lineno + 1
+                if lines > LINES_OF_A_FUNCTION_MAX:
+                    long.append(f"{name_of(path)}:{node.lineno}: {node.name} has {lines} lines")
+    assert not long, "\n".join(long)
+
+
+def test_every_module_says_what_it_is() -> None:
+    silent = [name_of(path) for path in ALL_FILES if not ast.get_docstring(tree_of(path))]
+    assert not silent, "\n".join(silent)
+
+
+def test_nothing_is_left_for_later() -> None:
+    later = re.compile(r"\b(TO" + r"DO|FIX" + r"ME|XX" + r"X|HA" + r"CK)\b|NotImplemented" + r"Error|\bfor no" + r"w\b")
+    left = [
+        f"{name_of(path)}:{number}: {line.strip()}"
+        for path in ALL_FILES
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if later.search(line)
+    ]
+    assert not left, "\n".join(left)
+
+
+def test_tests_are_no_package() -> None:
+    """With an __init__.py, pytest would import tests by folder name and tests/node would hide the real node."""
+    assert not list((ROOT / "tests").rglob("__init__.py"))
+
+
+def test_every_package_folder_is_in_the_wheel() -> None:
+    folders = sorted({path.parent.relative_to(ROOT) for path in SOURCES})
+    setuptools = PYPROJECT["tool"]["setuptools"]
+    assert setuptools["packages"] == [".".join(("foosim", *folder.parts)) for folder in folders]
+    assert setuptools["package-dir"] == {f"foosim.{package}": package for package in PACKAGES}
+    assert [folder for folder in folders if not (ROOT / folder / "__init__.py").is_file()] == []
+    assert [package for package in PACKAGES if not (ROOT / package / "py.typed").is_file()] == []
+
+
+def test_the_makefile_links_every_package_for_the_type_checker() -> None:
+    line = re.search(r"^PACKAGES := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert line is not None
+    assert line[1].split() == PACKAGES
+
+
+@pytest.mark.parametrize("script", sorted(PYPROJECT["project"]["scripts"]))
+def test_each_command_has_its_function(script: str) -> None:
+    module, _, function = PYPROJECT["project"]["scripts"][script].partition(":")
+    assert callable(getattr(importlib.import_module(module), function))
+
+
+def run(*arguments: str | Path, cwd: Path) -> str:
+    """Standard output of a command, which must succeed."""
+    done = subprocess.run([*map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{arguments}:\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def test_the_wheel_of_the_sdist_holds_every_module(tmp_path: Path) -> None:
+    """Build in a copy (a stale build/ would ship deleted modules), install in a clean environment, import all of it."""
+    source = tmp_path / "source"
+    source.mkdir()
+    for package in PACKAGES:
+        copytree(ROOT / package, source / package, ignore=ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        (source / name).write_bytes((ROOT / name).read_bytes())
+    # Without --wheel or --sdist, build makes the sdist, and the wheel from what is in the sdist.
+    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", cwd=source)
+    (wheel,) = (tmp_path / "dist").glob("*.whl")
+
+    environment = tmp_path / "environment"
+    venv.create(environment, symlinks=True)
+    python = environment / "bin" / "python"
+    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=tmp_path)
+    # Our dependencies, by a path file: it adds a folder without running what the folder's own path files ask for, so
+    # the editable install beside them stays out of sight.
+    (site_packages,) = environment.glob("lib/python*/site-packages")
+    (site_packages / "dependencies.pth").write_text("\n".join(path for path in sys.path if path.endswith("-packages")))
+
+    program = "import importlib, sys\nfor name in sys.argv[1:]: assert sys.prefix in importlib.import_module(name).__file__"
+    run(python, "-I", "-W", "error", "-c", program, *modules(), cwd=tmp_path)
+    assert len(list(site_packages.glob("foosim/*/py.typed"))) == len(PACKAGES)
+    for script in PYPROJECT["project"]["scripts"]:
+        assert "Usage" in run(environment / "bin" / script, "--help", cwd=tmp_path)

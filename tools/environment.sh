@@ -1,0 +1,80 @@
+#!/bin/sh
+# Makes the environment that everything in this repository runs in: .venv, with Python 3.11 and the packages that
+# pyproject.toml names. `make` calls it before each of its targets; it returns at once when .venv is up to date.
+#
+# Python 3.11 is the one found on PATH. Where there is none, any other Python 3 installs uv into .venv-uv, and uv
+# fetches a Python 3.11 into the same folder. Nothing outside the repository is touched.
+set -eu
+cd "$(dirname "$0")/.."
+
+# Both would mix other installations into ours.
+unset PYTHONPATH PYTHONHOME
+export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1
+
+# What an environment depends on: pyproject.toml, and the place, because the scripts in it begin with its path.
+key() {
+    pwd
+    cat pyproject.toml
+}
+
+# The first Python on PATH that satisfies a condition over `v`, its version. It must really run (pyenv leaves commands
+# on PATH that only print an error) and be able to make environments (Debian packs ensurepip apart from Python).
+python_where() {
+    (
+        IFS=:
+        for folder in $PATH; do
+            for name in python3.11 python3 python3.14 python3.13 python3.12 python3.10 python3.9 python; do
+                if [ -x "$folder/$name" ] && "$folder/$name" -c "
+import sys, ensurepip, venv
+v = sys.version_info[:2]
+sys.exit(not ($1 and sys.implementation.name == 'cpython'))" >/dev/null 2>&1; then
+                    echo "$folder/$name"
+                    exit 0
+                fi
+            done
+        done
+        exit 1
+    )
+}
+
+# A Python 3.11 that uv fetches; its path is the output, all else goes to standard error.
+python_from_uv() {
+    any=$(python_where 'v >= (3, 9)') || {
+        echo "There is no other Python 3 (3.9 or later, with its venv module) either, which could install uv." >&2
+        return 1
+    }
+    echo "There is no Python 3.11 on PATH: $any installs uv, which fetches one (into .venv-uv)." >&2
+    if [ ! -x .venv-uv/bin/uv ]; then
+        rm -rf .venv-uv
+        "$any" -m venv .venv-uv >&2 && .venv-uv/bin/python -m pip install --quiet uv >&2 || return 1
+    fi
+    export UV_PYTHON_INSTALL_DIR="$PWD/.venv-uv/python" UV_CACHE_DIR="$PWD/.venv-uv/cache"
+    .venv-uv/bin/uv python install --quiet --no-bin 3.11 >&2 || return 1
+    .venv-uv/bin/uv python find --managed-python 3.11
+}
+
+if [ -x .venv/bin/python ] && [ "$(key)" = "$(cat .venv/key 2>/dev/null)" ]; then
+    exit 0
+fi
+
+python=$(python_where 'v == (3, 11)') || python=$(python_from_uv) || {
+    cat >&2 <<'MESSAGE'
+
+foosim needs Python 3.11: pybullet, its physics engine, is published ready to use for Python up to 3.11 only.
+None was found on PATH, and uv could not fetch one (see above). Install it, then run make again:
+    Debian 12:  sudo apt-get install python3.11 python3.11-venv
+    Ubuntu:     sudo add-apt-repository ppa:deadsnakes/ppa && sudo apt-get install python3.11 python3.11-venv
+    Fedora:     sudo dnf install python3.11
+    macOS:      brew install python@3.11
+    pyenv:      pyenv install 3.11 && pyenv local 3.11
+Python 3.11 in another place is found if its folder is on PATH:  PATH=/opt/python3.11/bin:$PATH make
+MESSAGE
+    exit 1
+}
+
+echo "Setting up .venv with $("$python" --version) ($python); this takes about a minute, once."
+rm -rf .venv
+"$python" -m venv .venv
+.venv/bin/python -m pip install --quiet --editable '.[dev]'
+# Last, so that an environment that was interrupted half-way is made anew.
+key >.venv/key
