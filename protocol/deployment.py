@@ -1,0 +1,211 @@
+"""The deployment: everything that a run is made from, as one frozen value.
+
+This is the schema. Text becomes a `Deployment` in deployment_file.py only, because what one field cannot know (every
+robot has one owner, every selector matches an endpoint, every rate is a whole number of ticks) is checked there too,
+by references.py. Quantities are strings with units in the file and SI numbers here; times are integer nanoseconds
+whose names end in `_ns` (see units.py). The table's parameters are in table.py.
+"""
+
+from fnmatch import fnmatchcase
+from fractions import Fraction
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BeforeValidator, Field, JsonValue, StringConstraints, TypeAdapter
+
+from foosim.protocol import limits, names, units
+from foosim.protocol.table import LineName, Part, Table, Team
+from foosim.protocol.units import Pace, PaceField, Quantity, parse_pace, period_ticks
+
+__all__ = [
+    "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "Jitter", "LinkRule", "Network",
+    "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor", "deployment_schema",
+    "parse_pace", "period_ticks",
+]  # fmt: skip
+
+FORMAT: Final = 1
+
+Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
+RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
+Selector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
+ClassPath = Annotated[str, StringConstraints(pattern=names.CLASS_PATTERN, max_length=200)]
+
+Rate = Annotated[Fraction, Quantity(units.RATE, "1 mHz", "10 kHz")]
+LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
+AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
+Delay = Annotated[int, Quantity(units.TIME, "0 s", "60 s")]
+Spread = Annotated[int, Quantity(units.TIME, "1 ns", "60 s")]
+Deadline = Annotated[int, Quantity(units.TIME, "1 ms", "24 h")]
+Probability = Annotated[float, Quantity(units.PROBABILITY, "0 %", "100 %")]
+
+
+class RodSensor(Part):
+    """Reads a rod's slide (m) and angle (rad), with Gaussian noise on each: 2 float64."""
+
+    kind: Literal["encoder"]
+    rate_hz: Rate = Field(alias="rate")
+    position_noise: LengthNoise
+    angle_noise: AngleNoise
+
+
+class BallSensor(Part):
+    """Reads the ball's position x, y, z (m), with Gaussian noise on each coordinate: 3 float64."""
+
+    kind: Literal["ball"]
+    rate_hz: Rate = Field(alias="rate")
+    noise: LengthNoise
+
+
+Sensor = RodSensor | BallSensor
+
+
+class RodRobot(Part):
+    """A motorised rod with its figures. Its actuator channel is `position`: slide (m) and angle (rad), 2 float64."""
+
+    model: Literal["rod"]
+    team: Team
+    line: LineName
+    sensors: dict[Name, RodSensor] = Field(max_length=16)
+
+
+class CameraRobot(Part):
+    """A robot without a body that sees the ball."""
+
+    model: Literal["camera"]
+    sensors: dict[Name, BallSensor] = Field(max_length=16)
+
+
+Robot = Annotated[RodRobot | CameraRobot, Field(discriminator="model")]
+
+
+class NodeSpec(Part):
+    """A process that computes: the robots that it owns at the start, and who starts it."""
+
+    launch: Literal["local", "manual"] = "local"
+    robots: list[RobotName] = Field(max_length=limits.ENTITIES_MAX)
+
+
+class Player(Part):
+    """A controller that `up` starts: a class with `act(tick, samples) -> commands`."""
+
+    class_: ClassPath = Field(alias="class")
+    rate_hz: Rate = Field(alias="rate")
+    lockstep: bool = True
+    robots: dict[RobotName, list[Name]] = Field(max_length=limits.ENTITIES_MAX)
+    parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
+
+
+class ClientSpec(Part):
+    """An endpoint that is started by hand. One in lockstep is waited for before tick 0 and has a rate."""
+
+    lockstep: bool = False
+    rate_hz: Rate | None = Field(default=None, alias="rate")
+
+
+def _mean_is_sd(data: dict[str, Any]) -> int:
+    return int(data["sd_ns"])
+
+
+class Jitter(Part):
+    """A random delay on top of the constant one, never negative."""
+
+    shape: Literal["gamma"]
+    sd_ns: Spread = Field(alias="sd")
+    mean_ns: Spread = Field(alias="mean", default_factory=_mean_is_sd)
+
+
+def _one_or_more(value: object) -> object:
+    return [value] if isinstance(value, str) else value
+
+
+Selectors = Annotated[
+    list[Selector],
+    BeforeValidator(_one_or_more, json_schema_input_type=Selector | list[Selector]),
+    Field(min_length=1, max_length=64),
+]
+
+
+class LinkRule(Part):
+    """What the directed links between the endpoints that `from` and `to` select do to a packet."""
+
+    id: Name
+    from_: Selectors = Field(alias="from")
+    to: Selectors
+    delay_ns: Delay = Field(alias="delay", default=0)
+    jitter: Jitter | None = None
+    loss: Probability = 0.0
+    order: Literal["fifo", "free"] = "fifo"
+
+    def matches(self, source: str, destination: str) -> bool:
+        """True if a packet from source to destination is this rule's."""
+        return any(fnmatchcase(source, glob) for glob in self.from_) and any(
+            fnmatchcase(destination, glob) for glob in self.to
+        )
+
+
+class Network(Part):
+    """The links between endpoints: the first rule that matches; a pair without one is a perfect link."""
+
+    links: list[LinkRule] = Field(default=[], max_length=1024)
+
+    def rule_for(self, source: str, destination: str) -> LinkRule | None:
+        """The first rule that matches the directed pair, or None for a perfect link."""
+        return next((rule for rule in self.links if rule.matches(source, destination)), None)
+
+
+class Capture(Part):
+    """How much of a run the capture keeps beside its packets, orders and digests."""
+
+    frames_every: Annotated[int, Quantity(units.TICKS, "1 tick", "1000000 ticks")] = 10
+    poses_hz: Rate = Field(alias="poses", default=Fraction(50))
+    flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = Field(alias="flush", default=100_000_000)
+
+
+class Deadlines(Part):
+    """How long the run waits for whom, in wall time."""
+
+    heartbeat_ns: Deadline = Field(alias="heartbeat", default=1_000_000_000)
+    tick_named_ns: Deadline = Field(alias="tick_named", default=500_000_000)
+    tick_lost_ns: Deadline = Field(alias="tick_lost", default=1_000_000_000)
+    lockstep_fast_ns: Deadline = Field(alias="lockstep_fast", default=10_000_000_000)
+    lockstep_realtime_ns: Deadline = Field(alias="lockstep_realtime", default=1_000_000_000)
+    start_ns: Deadline = Field(alias="start", default=60_000_000_000)
+
+
+class Deployment(Part):
+    """A whole run: the world, who computes it, who plays in it, what lies between, and how it is recorded."""
+
+    format: Literal[1]
+    world: Name
+    seed: Annotated[int, Field(ge=0, le=limits.COUNTER_MAX)]
+    tick_ns: Annotated[int, Quantity(units.TIME, "0.1 ms", "100 ms")] = Field(alias="tick")
+    substeps: Annotated[int, Field(ge=1, le=64)]
+    engine: Literal["bullet", "pure"]
+    pace: PaceField
+    mixed_cpu: bool = False
+    table: Table
+    robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
+    nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)
+    players: dict[Name, Player] = Field(default={}, max_length=limits.CLIENTS_MAX)
+    clients: dict[Name, ClientSpec] = Field(default={}, max_length=limits.CLIENTS_MAX)
+    network: Network = Network()
+    capture: Capture = Capture()
+    deadlines: Deadlines = Deadlines()
+
+    def endpoints(self) -> list[str]:
+        """The names that packets go from and to, sorted: robots, players and clients."""
+        return sorted([*self.robots, *self.players, *self.clients])
+
+    def owners(self) -> dict[str, str]:
+        """The node of each robot at the start, in the robots' name order."""
+        owner = {robot: node for node, spec in self.nodes.items() for robot in spec.robots}
+        return dict(sorted(owner.items()))
+
+    def ticks(self, rate_hz: Fraction) -> int:
+        """The period of a rate in ticks of this deployment."""
+        return period_ticks(rate_hz, self.tick_ns)
+
+
+def deployment_schema() -> dict[str, Any]:
+    """The JSON Schema of a deployment file, for editors and for people."""
+    schema = TypeAdapter(Deployment).json_schema(by_alias=True, mode="validation")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "foosim deployment"}

@@ -1,0 +1,57 @@
+"""Errors that the world causes: bad input, a refused request, a broken rule of a peer.
+
+A programmer's error is an assertion. Everything that comes from outside (a file, a packet, a request, an argument)
+and is not acceptable raises a `Refused` or a class made from it, whose text names the place, the value and the valid
+choices, so that it can be shown to a person as it is. Each part of the project adds its own classes beside its code.
+"""
+
+from collections.abc import Sequence
+
+
+class Refused(Exception):
+    """Something from outside is not accepted; the text says what, where, and what would be."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(what)
+        self.what = what
+
+
+class BadValue(Refused):
+    """A value that is not valid: what is wrong with it, the value as it was given, the nearest valid one if any."""
+
+    def __init__(self, what: str, value: object, nearest: str | None = None) -> None:
+        super().__init__(describe(what, value, nearest))
+        self.problem = what
+        self.value = value
+        self.nearest = nearest
+
+
+class DeploymentError(Refused):
+    """A deployment file with problems, all of them, one a line: `file:line:column: what, value, nearest name`."""
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        assert problems, "an error without a problem"
+        super().__init__("\n".join(problems))
+        self.problems = tuple(problems)
+
+
+def describe(what: str, value: object, nearest: str | None = None) -> str:
+    """`what, value, nearest is X` on one line, whatever the value holds."""
+    text = f"{what}, {show(value)}"
+    return text if nearest is None else f"{text}, nearest is {nearest}"
+
+
+def show(value: object, length: int = 48) -> str:
+    """A value as it may stand in a message: one line, bounded, with control characters escaped."""
+    if isinstance(value, dict):
+        return f"a mapping of {len(value)}"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    text = ascii(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= length else text[: length - 4] + "..." + text[-1]
+
+
+class Malformed(Refused):
+    """Bytes, or a message made of them, that do not fit the schema or the world they claim to be about."""

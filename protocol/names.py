@@ -1,0 +1,51 @@
+"""Names: what one may be called, and the nearest valid name for an error message.
+
+Names end up in file names, keys of the wire, captures and terminals: so they are short, lower case and plain.
+"""
+
+import difflib
+import re
+from collections.abc import Iterable
+from typing import Final
+
+from foosim.protocol.limits import NAME_LENGTH_MAX
+
+SELECTOR_LENGTH_MAX: Final = 64
+
+NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*$"
+ROBOT_NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*(\.[a-z0-9_-]+)*$"
+SELECTOR_PATTERN: Final = r"^[a-z0-9_.*?-]+$"
+CLASS_PATTERN: Final = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$"
+
+# The entities of the world that are no robots, and the processes that are neither node nor player: no robot may be
+# called like the first, no node, player or client like the second.
+ENTITY_NAMES_RESERVED: Final = ("ball", "world")
+PROCESS_NAMES_RESERVED: Final = ("supervisor", "vhub")
+# Channels that every robot, or every rod, has: no sensor may be called so.
+CHANNEL_ECHO: Final = "echo"
+CHANNEL_POSITION: Final = "position"
+CHANNEL_NAMES_RESERVED: Final = (CHANNEL_ECHO, CHANNEL_POSITION)
+
+_NAME = re.compile(NAME_PATTERN)
+_ROBOT_NAME = re.compile(ROBOT_NAME_PATTERN)
+
+
+def is_name(text: str) -> bool:
+    """True for the name of a node, player, client, channel, world or link rule."""
+    return len(text) <= NAME_LENGTH_MAX and _NAME.fullmatch(text) is not None
+
+
+def is_robot_name(text: str) -> bool:
+    """True for the name of a robot: names joined by dots, as in `red.goal`."""
+    return len(text) <= NAME_LENGTH_MAX and _ROBOT_NAME.fullmatch(text) is not None
+
+
+def nearest_name(value: object, choices: Iterable[str]) -> str | None:
+    """The choice that looks most like the value, the first by name among equals; None when none does."""
+    ordered = sorted(set(choices))
+    text = str(value)[: 2 * SELECTOR_LENGTH_MAX]
+    for candidate in (text, text.lower()):
+        close = difflib.get_close_matches(candidate, ordered, n=1, cutoff=0.5)
+        if close:
+            return close[0]
+    return None

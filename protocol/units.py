@@ -1,0 +1,238 @@
+"""Quantities as people write them (`2 ms`, `0.5 %`, `84 mm`) and as the code computes with them.
+
+In a file every quantity is a string with its unit. In the code it is a float in SI units, except time, which is an
+integer count of nanoseconds, counts of ticks, which are integers, and rates, which are exact fractions of hertz.
+Numbers are read as exact fractions and rounded once, so `84 mm` is the float nearest to 0.084.
+
+`Quantity` is the annotation by which the deployment's models (deployment.py, table.py) use this.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from foosim.protocol.errors import BadValue
+from foosim.protocol.names import nearest_name
+
+NS_PER_S: Final = 1_000_000_000
+
+_NUMBER: Final = r"[+-]?[0-9]{1,18}(?:\.[0-9]{1,30})?(?:[eE][+-]?[0-9]{1,2})?"
+_RATIO: Final = r"[0-9]{1,18}/[1-9][0-9]{0,17}"
+_QUANTITY = re.compile(rf"({_NUMBER}|{_RATIO}) *([^0-9 .+-].*)?")
+_DEGREE: Final = Fraction(math.pi) / 180
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dimension:
+    """What a unit measures: the name used in messages, the units with their size, and the type of the result."""
+
+    name: str
+    units: Mapping[str, Fraction]
+    kind: Literal["float", "int", "fraction"] = "float"
+
+    @property
+    def base(self) -> str:
+        """The unit whose size is 1: the one that values are shown in."""
+        return next(unit for unit, size in self.units.items() if size == 1)
+
+    def example(self) -> str:
+        return f"a number and one of {', '.join(self.units)}"
+
+
+def _sizes(**units: str) -> dict[str, Fraction]:
+    return {unit: Fraction(size) for unit, size in units.items()}
+
+
+TIME: Final = Dimension("time", _sizes(ns="1", us="1e3", ms="1e6", s="1e9", min="60e9", h="3600e9"), "int")
+TICKS: Final = Dimension("number of ticks", _sizes(ticks="1", tick="1"), "int")
+RATE: Final = Dimension("rate", _sizes(Hz="1", kHz="1e3", mHz="1e-3"), "fraction")
+LENGTH: Final = Dimension("length", _sizes(m="1", cm="1e-2", mm="1e-3", um="1e-6"))
+MASS: Final = Dimension("mass", _sizes(kg="1", g="1e-3", mg="1e-6"))
+ANGLE: Final = Dimension("angle", {"rad": Fraction(1), "mrad": Fraction(1, 1000), "deg": _DEGREE})
+SPEED: Final = Dimension("speed", {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "km/h": Fraction(5, 18)})
+SPIN: Final = Dimension(
+    "rotational speed", {"rad/s": Fraction(1), "deg/s": _DEGREE, "rpm": Fraction(math.pi) / 30}
+)
+ACCELERATION: Final = Dimension("acceleration", {"m/s2": Fraction(1), "mm/s2": Fraction(1, 1000)})
+FORCE: Final = Dimension("force", _sizes(N="1", mN="1e-3", kN="1e3"))
+TORQUE: Final = Dimension("torque", {"N m": Fraction(1), "mN m": Fraction(1, 1000)})
+IMPULSE: Final = Dimension("impulse", {"N s": Fraction(1), "mN s": Fraction(1, 1000)})
+PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)})
+
+
+def parse(text: object, dimension: Dimension) -> Fraction:
+    """The quantity in the dimension's base unit, exact; raises BadValue."""
+    if not isinstance(text, str):
+        raise BadValue(f"a {dimension.name} is {dimension.example()}", text)
+    match = _QUANTITY.fullmatch(text.strip(" "))
+    if match is None or ("/" in match[1] and dimension.kind != "fraction"):
+        raise BadValue(f"a {dimension.name} is {dimension.example()}", text)
+    number, unit = match[1], match[2]
+    if unit not in dimension.units:
+        close = None if unit is None else nearest_name(unit, dimension.units)
+        nearest = None if close is None else repr(f"{number} {close}")
+        raise BadValue(f"a {dimension.name} is {dimension.example()}", text, nearest)
+    return Fraction(number) * dimension.units[unit]
+
+
+def parse_ns(text: object) -> int:
+    """A time (`20s`, `2 ms`) in integer nanoseconds, at least 0; raises BadValue."""
+    value = parse(text, TIME)
+    if value.denominator != 1 or value < 0:
+        raise BadValue("a time is a whole number of nanoseconds, at least 0", text)
+    return int(value)
+
+
+def parse_si(text: object, dimension: Dimension) -> float:
+    """A quantity as a float in SI units; raises BadValue."""
+    assert dimension.kind == "float", dimension.name
+    return float(parse(text, dimension))
+
+
+def format_ns(time_ns: int) -> str:
+    """A time in the largest unit that keeps it a whole number: `2 ms`, `500 us`, `20 s`."""
+    for unit, size in (("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1_000)):
+        if time_ns % size == 0:
+            return f"{time_ns // size} {unit}"
+    return f"{time_ns} ns"
+
+
+def format_rate(rate_hz: Fraction) -> str:
+    """A rate that reads back as the same fraction: `100 Hz`, `12.5 Hz`, `500/3 Hz`."""
+    denominator = rate_hz.denominator
+    for prime in (2, 5):
+        while denominator % prime == 0:
+            denominator //= prime
+    if denominator != 1:
+        return f"{rate_hz.numerator}/{rate_hz.denominator} Hz"
+    places = max(rate_hz.denominator.bit_length(), 1)
+    text = f"{rate_hz.numerator * 10**places // rate_hz.denominator:0{places + 1}d}"
+    return f"{text[:-places]}.{text[-places:]}".rstrip("0").rstrip(".") + " Hz"
+
+
+def period_ticks(rate_hz: Fraction, tick_ns: int) -> int:
+    """The ticks between two events of a rate; raises BadValue, naming the nearest valid rates, unless it is whole."""
+    period = Fraction(NS_PER_S) / rate_hz / tick_ns
+    if period.denominator == 1:
+        return int(period)
+    below, above = math.floor(period), math.ceil(period)
+    rates = [repr(format_rate(Fraction(NS_PER_S, ticks * tick_ns))) for ticks in (above, below) if ticks >= 1]
+    raise BadValue(f"not a whole number of ticks of {format_ns(tick_ns)}", format_rate(rate_hz), " and ".join(rates))
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How fast simulated time may pass: as fast as it goes, or `factor` times the wall clock."""
+
+    kind: Literal["realtime", "fast"]
+    factor: Fraction = Fraction(1)
+
+    def __str__(self) -> str:
+        if self.kind == "fast" or self.factor == 1:
+            return self.kind
+        return format_rate(self.factor).removesuffix(" Hz") + "x"
+
+
+PACE_FACTOR_MIN: Final = Fraction(1, 1000)
+PACE_FACTOR_MAX: Final = Fraction(1000)
+_FACTOR = re.compile(rf"({_NUMBER}|{_RATIO})x")
+
+
+def parse_pace(text: object) -> Pace:
+    """`realtime`, `fast`, or a multiple of the wall clock such as `2x` and `0.5x`; raises BadValue."""
+    if text == "realtime" or text == "fast":
+        return Pace(text)
+    match = _FACTOR.fullmatch(text) if isinstance(text, str) else None
+    if match is None:
+        close = nearest_name(text, ("realtime", "fast"))
+        raise BadValue("a pace is realtime, fast or a factor such as 2x", text, None if close is None else repr(close))
+    factor = Fraction(match[1])
+    if not PACE_FACTOR_MIN <= factor <= PACE_FACTOR_MAX:
+        raise BadValue(f"a pace is from {float(PACE_FACTOR_MIN)}x to {PACE_FACTOR_MAX}x", text)
+    return Pace("realtime", factor)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Annotation of a model's field: a string with a unit in the file, a number in the code, within bounds.
+
+    The bounds are written as in a file, so that messages show them as people write them.
+    """
+
+    dimension: Dimension
+    low: str
+    high: str
+
+    def read(self, value: object) -> float | int | Fraction:
+        dimension = self.dimension
+        try:
+            exact = parse(value, dimension)
+        except BadValue as bad:
+            raise custom_error(bad) from None
+        if not parse(self.low, dimension) <= exact <= parse(self.high, dimension):
+            raise custom_error(BadValue(f"out of range {self.low} to {self.high}", value))
+        if dimension.kind == "fraction":
+            return exact
+        if dimension.kind == "float":
+            return float(exact)
+        if exact.denominator != 1:
+            raise custom_error(BadValue(f"a {dimension.name} is a whole number of {dimension.base}", value))
+        return int(exact)
+
+    def write(self, value: float | int | Fraction) -> str:
+        """The text that reads back as exactly this value."""
+        if isinstance(value, Fraction):
+            return format_rate(value)
+        if self.dimension is TIME:
+            return format_ns(int(value))
+        return f"{value!r} {self.dimension.base}"
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            self.read,
+            serialization=core_schema.plain_serializer_function_ser_schema(self.write, when_used="json"),
+        )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        number = f"({_NUMBER}|{_RATIO})" if self.dimension.kind == "fraction" else f"({_NUMBER})"
+        units = "|".join(re.escape(unit) for unit in self.dimension.units).replace(r"\ ", " ")
+        return {
+            "type": "string",
+            "pattern": f"^{number} *({units})$".replace("(?:", "("),
+            "description": f"{self.dimension.name}, {self.low} to {self.high}: {self.dimension.example()}",
+        }
+
+
+def custom_error(bad: BadValue) -> PydanticCustomError:
+    """A BadValue in the form that pydantic collects; deployment.py reads it back."""
+    context = {} if bad.nearest is None else {"nearest": bad.nearest}
+    return PydanticCustomError("bad_value", "{what}", {"what": bad.problem, **context})
+
+
+class _PaceText:
+    """Annotation for a pace: text in the file, a `Pace` in the code."""
+
+    @staticmethod
+    def _read(value: object) -> Pace:
+        try:
+            return parse_pace(value)
+        except BadValue as bad:
+            raise custom_error(bad) from None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            self._read, serialization=core_schema.plain_serializer_function_ser_schema(str, when_used="json")
+        )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"type": "string", "pattern": f"^(realtime|fast|({_NUMBER}|{_RATIO})x)$".replace("(?:", "(")}
+
+
+PaceField = Annotated[Pace, _PaceText()]
