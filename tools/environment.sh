@@ -49,7 +49,7 @@ python_from_uv() {
         "$any" -m venv .venv-uv >&2 && .venv-uv/bin/python -m pip install --quiet uv >&2 || return 1
     fi
     export UV_PYTHON_INSTALL_DIR="$PWD/.venv-uv/python" UV_CACHE_DIR="$PWD/.venv-uv/cache"
-    .venv-uv/bin/uv python install --quiet --no-bin 3.11 >&2 || return 1
+    .venv-uv/bin/uv python install --no-bin 3.11 >&2 || return 1
     .venv-uv/bin/uv python find --managed-python 3.11
 }
 
