@@ -25,6 +25,7 @@ def pytest_report_header() -> str:
     return f"hypothesis: derandomize={current.derandomize}, deadline={current.deadline}"
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Keep tests/wire on one worker: its runs of six processes each would starve one another of two cores."""
     for item in items:
