@@ -1,1 +1,4 @@
-"""Actuators of robots, one file each: from commands and frame to motor commands."""
+"""Actuators of robots: what a command's bytes mean and what the motors are told.
+
+One file each. To add one: a file with `accept` and `command` like `position`, and its use in `node.step`.
+"""

@@ -1,0 +1,451 @@
+"""The core of a node: takes messages and the time, and computes ticks of the world in step with its peers.
+
+A tick reads: sense, edit, assign, solve, part, collect (design, section 4). The core owns no engine: it hands out
+`work`, the shell solves it and calls `solved`. It runs ahead of commit, by at most what deliveries allow; everything
+else in the system sees committed frames only. Neighbours: `step` (the pure parts), `protocol.member` (handshake),
+`protocol.barrier`, `protocol.assign`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from foosim.node.step import Stepper, Work
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.assign import Assignment, Share, reach_of
+from foosim.protocol.barrier import Barrier, Slots
+from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import Frame, basis_of, frame_from_bytes
+from foosim.protocol.layout import Entity, Layout, build_layout
+from foosim.protocol.member import Member
+from foosim.protocol.messages import (
+    AddedEntity,
+    Build,
+    Commit,
+    Deliveries,
+    End,
+    Epoch,
+    Heartbeat,
+    Order,
+    Outbox,
+    Part,
+    Prepare,
+    Samples,
+    Want,
+)
+from foosim.protocol.start import initial_frame
+
+FRAMES_KEPT: Final = 4
+"""A node is at most two ticks ahead of commit: an epoch's frame is among its last few."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeStatistics:
+    """What a node has done so far."""
+
+    tick: int
+    epoch: int
+    solved_ticks: int
+    refused: int
+    repeated: int
+    diverged: int
+    held: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Term:
+    """Everything that changes with an epoch or a layout: who computes and writes what."""
+
+    stepper: Stepper
+    slots: Slots
+    assignment: Assignment
+    mine: tuple[Entity, ...]
+
+
+class NodeCore:
+    """One node's state machine. `actions` is what the shell performs next; `work` what it solves next."""
+
+    def __init__(self, name: str, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
+        self.name = name
+        self.actions: list[Action] = []
+        self.work: Work | None = None
+        self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
+        self.busy = 0.0
+        self.deployment: Deployment | None = None
+        self.frame: Frame | None = None
+        self.epoch = 0
+        self.roster: tuple[str, ...] = ()
+        self.owners: dict[str, str] = {}
+        self.ended: End | None = None
+        self._steppers: dict[bytes, Stepper] = {}
+        self._term: _Term | None = None
+        self._history: dict[int, Frame] = {}
+        self._awaited_epoch: Epoch | None = None
+        self._orders: dict[int, Order] = {}
+        self._deliveries: dict[int, tuple[bytes, Deliveries]] = {}
+        self._parts: dict[int, list[Part]] = {}
+        self._sent_parts: dict[int, bytes] = {}
+        self._sent_samples: dict[int, bytes] = {}
+        self._held: list[tuple[Channel, str, bytes]] = []
+        self._counters: list[int] = []
+        self._barrier: Barrier | None = None
+        self._basis = b""
+        self._sensed = False
+        self._progress_ns = now_ns
+        self._want_after_ns = limits.WANT_AFTER_NS
+        self._want_ns = now_ns
+        self._solved_ticks = self._refused = self._repeated = self._diverged = 0
+        self._readers: dict[str, Callable[[Any, bytes, int], None]] = {
+            channels.ORDER.name: self._on_order,
+            channels.DELIVERIES.name: self._on_deliveries,
+            channels.PART.name: self._on_part,
+            channels.EPOCH.name: self._on_epoch,
+            channels.COMMIT.name: self._on_commit,
+            channels.WANT.name: self._on_want,
+            channels.BUILD.name: self._on_build,
+            channels.PREPARE.name: self._on_prepare,
+            channels.END.name: self._on_end,
+        }
+
+    # --- what the shell calls --------------------------------------------------------------------------------------
+
+    def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+        """Take one message as it came; what does not fit is counted and dropped."""
+        try:
+            if channel is channels.REFUSAL:
+                self.member.refuse(payload)
+                return
+            message = decode(channel.message, payload, channel.bytes_max)
+            reader = self._readers.get(channel.name)
+            if reader is None:
+                raise Malformed(f"a node does not read the channel {channel.name}")
+            if getattr(message, "sender", name) != name or (channel is channels.PART and message.node != name):
+                raise Malformed(f"a message on the key of {name} that names another sender")
+            reader(message, payload, now_ns)
+        except Malformed as error:
+            self._refused += 1
+            if self._refused <= 3:
+                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+
+    def advance(self, now_ns: int) -> None:
+        """Go on as far as the inputs allow; `work` is set when the engine has to solve."""
+        while self.frame is not None and self._term is not None and self.work is None and self.ended is None:
+            if not self._sensed:
+                self._sense()
+            if self._barrier is None:
+                if not self._begin():
+                    return
+            elif not self._collect(now_ns):
+                return
+
+    def solved(self, work: Work) -> None:
+        """Take the solved work back: say my part of the next frame."""
+        assert work is self.work
+        assert self.frame is not None and self._term is not None and self._barrier is not None
+        self.work = None
+        if work.islands:
+            self._solved_ticks += 1
+        values = np.array(work.numbers)
+        if self._counters:
+            values[self._counters] += 1.0
+        slots = self._barrier.slots
+        part = Part(
+            epoch=self.epoch,
+            tick=work.tick + 1,
+            node=self.name,
+            basis=self._basis,
+            solved=list(work.solved),
+            solver_values=values[slots.solver(work.solved)].tobytes(),
+            owner_values=values[slots.owner(self.name)].tobytes(),
+            outboxes=[Outbox(index, packets) for index, packets in work.outboxes.items()],
+        )
+        payload = encode(part)
+        self._sent_parts[part.tick] = payload
+        self.actions.append(Publish(channels.PART, self.name, payload))
+        self._barrier.add(part)
+
+    def engine_ready(self, layout: Layout) -> None:
+        """The shell has an engine for this layout."""
+        self.member.ready(layout)
+
+    def wake(self, now_ns: int) -> None:
+        """Do what is due by time: hello, heartbeat, asking again."""
+        self.member.wake(now_ns, self._heartbeat)
+        if self.frame is not None and self.ended is None and now_ns >= self._want_ns and self.work is None:
+            self._ask_again(now_ns)
+
+    def deadline_ns(self) -> int:
+        """When `wake` has something to do next."""
+        if self.frame is None:
+            return self.member.deadline_ns
+        return min(self.member.deadline_ns, self._want_ns)
+
+    @property
+    def layouts_wanted(self) -> list[Layout]:
+        """Layouts for which the shell should have an engine, in the order of need."""
+        return self.member.layouts
+
+    def stepper(self, layout: Layout) -> Stepper:
+        """Return the pure step of a layout, made once."""
+        assert self.deployment is not None
+        stepper = self._steppers.get(layout.digest)
+        if stepper is None:
+            stepper = self._steppers[layout.digest] = Stepper(self.deployment, layout)
+        return stepper
+
+    def statistics(self) -> NodeStatistics:
+        tick = self.frame.tick if self.frame is not None else 0
+        return NodeStatistics(
+            tick, self.epoch, self._solved_ticks, self._refused, self._repeated, self._diverged, len(self._held)
+        )
+
+    @property
+    def waiting_for(self) -> str:
+        """What the current tick lacks, for people and for the supervisor."""
+        if self.frame is None:
+            return "epoch" if self.member.is_ready else "start"
+        tick = self.frame.tick
+        if self._barrier is not None:
+            return "" if self.work is not None else f"part of {', '.join(self._barrier.missing)}"
+        lacks = [] if tick in self._orders else ["order"]
+        lacks += [] if tick in self._deliveries else ["deliveries"]
+        return " and ".join(lacks)
+
+    # --- one tick ----------------------------------------------------------------------------------------------------
+
+    def _sense(self) -> None:
+        """Step 1: say what my robots send at this frame, also when it is nothing."""
+        frame, term = self.frame, self._term
+        assert frame is not None and term is not None
+        packets, self._counters = term.stepper.sense(frame, term.mine)
+        samples = Samples(frame.tick, frame.digest, self.name, [robot.name for robot in term.mine], packets)
+        payload = encode(samples)
+        self._sent_samples[frame.tick] = payload
+        self.actions.append(Publish(channels.SAMPLES, self.name, payload))
+        self._sensed = True
+
+    def _begin(self) -> bool:
+        """Steps 2 to 4: with order and deliveries, edit the frame and hand my share to the engine."""
+        frame = self.frame
+        assert frame is not None and self._term is not None
+        order = self._orders.get(frame.tick)
+        delivered = self._deliveries.get(frame.tick)
+        if order is None or delivered is None:
+            return False
+        raw, deliveries = delivered
+        layout, numbers = self._term.stepper.edited(frame, order.edits)
+        if layout is not frame.layout:
+            self._counters = _moved_counters(self._counters, frame.layout, layout)
+            self._term = self._make_term(layout)
+        term = self._term
+        share: Share = term.assignment.shares(numbers)[self.name]
+        outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers)
+        self._basis = basis_of(frame.digest, order.edits, raw)
+        self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
+        entities = layout.entities
+        islands = tuple(tuple(entities[index] for index in island) for island in share.islands)
+        self.work = Work(frame.tick, layout, islands, share.solved, numbers, outboxes)
+        return True
+
+    def _collect(self, now_ns: int) -> bool:
+        """Step 6: take the parts of all nodes; with all of them, the next frame is there."""
+        barrier = self._barrier
+        assert barrier is not None
+        waiting = self._parts.pop(barrier.tick, None)
+        if waiting is not None:
+            for part in waiting:
+                self._take_part(barrier, part)
+        if barrier.missing:
+            return False
+        self._enter(barrier.assemble(), now_ns)
+        return True
+
+    def _take_part(self, barrier: Barrier, part: Part) -> None:
+        if part.basis != self._basis:
+            self._diverged += 1
+            self.actions.append(Say("error", f"part {part.tick} of {part.node} has another basis than mine: held"))
+            return
+        try:
+            barrier.add(part)
+        except Malformed as error:
+            self._refused += 1
+            self.actions.append(Say("error", str(error)))
+
+    def _enter(self, frame: Frame, now_ns: int) -> None:
+        """Take `frame` as mine and forget what is older than anybody may ask for."""
+        self.frame = frame
+        self._barrier = None
+        self._sensed = False
+        self._progress(now_ns)
+        self._history[frame.tick] = frame
+        self._history.pop(frame.tick - FRAMES_KEPT, None)
+        old = frame.tick - limits.KEPT_TICKS
+        for kept in (self._orders, self._deliveries, self._sent_parts, self._sent_samples):
+            kept.pop(old, None)
+
+    def _progress(self, now_ns: int) -> None:
+        self._progress_ns = now_ns
+        assert self.deployment is not None
+        self._want_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
+        self._want_ns = now_ns + self._want_after_ns
+
+    # --- messages of the tick ----------------------------------------------------------------------------------------
+
+    def _fenced(self, channel: Channel, message: Order | Part | Commit, payload: bytes) -> bool:
+        """Whether a message is of another epoch: an older one is dropped, a newer one held until its epoch comes."""
+        if message.epoch == self.epoch and self._awaited_epoch is None:
+            return False
+        if message.epoch >= self.epoch and len(self._held) < limits.INBOX_MESSAGES_MAX:
+            self._held.append((channel, message.node if isinstance(message, Part) else "", payload))
+        else:
+            self._repeated += 1
+        return True
+
+    def _on_order(self, order: Order, payload: bytes, now_ns: int) -> None:
+        if self._fenced(channels.ORDER, order, payload):
+            return
+        if self.frame is None or order.tick < self.frame.tick or order.tick in self._orders:
+            self._repeated += 1
+            return
+        self._orders[order.tick] = order
+
+    def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
+        if deliveries.tick in self._deliveries or (
+            self.frame is not None and deliveries.tick < self.frame.tick - limits.KEPT_TICKS
+        ):
+            self._repeated += 1
+            return
+        self._deliveries[deliveries.tick] = (payload, deliveries)
+
+    def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
+        if self._fenced(channels.PART, part, payload):
+            return
+        if self.frame is None or part.tick <= self.frame.tick:
+            self._repeated += 1
+            return
+        if part.tick > self.frame.tick + limits.KEPT_TICKS or part.node == self.name:
+            raise Malformed(f"a part of tick {part.tick}, this node is at {self.frame.tick}")
+        self._parts.setdefault(part.tick, []).append(part)
+
+    def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
+        if want.kind == channels.PART.name and want.epoch == self.epoch:
+            sent = self._sent_parts.get(want.tick)
+            if sent is not None:
+                self.actions.append(Publish(channels.PART, self.name, sent))
+        elif want.kind == channels.SAMPLES.name:
+            sent = self._sent_samples.get(want.tick)
+            if sent is not None:
+                self.actions.append(Publish(channels.SAMPLES, self.name, sent))
+
+    def _ask_again(self, now_ns: int) -> None:
+        """Ask for whatever the current tick lacks, the wait doubling."""
+        assert self.frame is not None
+        tick = self.frame.tick
+        kinds: list[tuple[str, int]] = []
+        if self._awaited_epoch is not None:
+            kinds.append((channels.COMMIT.name, self._awaited_epoch.tick))
+        elif self._barrier is not None:
+            kinds.append((channels.PART.name, tick + 1))
+        else:
+            kinds += [(channels.ORDER.name, tick)] if tick not in self._orders else []
+            kinds += [(channels.DELIVERIES.name, tick)] if tick not in self._deliveries else []
+        for kind, wanted in kinds:
+            message = encode(Want(self.name, kind, wanted, self.epoch))
+            self.actions.append(Publish(channels.WANT, self.name, message))
+        self._want_after_ns = min(2 * self._want_after_ns, limits.WANT_EVERY_NS_MAX)
+        self._want_ns = now_ns + self._want_after_ns
+
+    # --- epochs, layouts, start and end ------------------------------------------------------------------------------
+
+    def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
+        if self.member.take_build(build):
+            deployment = self.deployment = self.member.deployment
+            assert deployment is not None
+            added = [(entity.name, entity.model) for entity in build.added]
+            self.member.want_layout(build_layout(deployment, added))
+
+    def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
+        if self.deployment is not None:
+            self.member.want_layout(self._layout_with(prepare.added))
+
+    def _layout_with(self, added: list[AddedEntity]) -> Layout:
+        assert self.deployment is not None
+        return build_layout(self.deployment, [(entity.name, entity.model) for entity in added])
+
+    def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
+        if epoch.epoch <= self.epoch or self.deployment is None or self.name not in epoch.roster:
+            self._repeated += 1
+            return
+        self.epoch = epoch.epoch
+        self.roster = tuple(sorted(epoch.roster))
+        self.owners = dict(epoch.owners)
+        self.member.entered()
+        self._orders.clear()
+        self._parts.clear()
+        self._sent_parts.clear()
+        self.work = None
+        self._barrier = None
+        self._awaited_epoch = epoch
+        if epoch.tick == 0:
+            self._history.setdefault(0, initial_frame(self.deployment))
+        own = self._history.get(epoch.tick)
+        if own is not None and own.digest == epoch.digest:
+            self._resume(own, now_ns)
+        else:
+            message = encode(Want(self.name, channels.COMMIT.name, epoch.tick, epoch.epoch))
+            self.actions.append(Publish(channels.WANT, self.name, message))
+            self._want_after_ns = limits.WANT_AFTER_NS
+            self._want_ns = now_ns + self._want_after_ns
+
+    def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
+        """The frame that the epoch starts from, when mine is not there or not the same."""
+        epoch = self._awaited_epoch
+        if epoch is None or commit.tick != epoch.tick or commit.digest != epoch.digest:
+            self._repeated += 1
+            return
+        frame = frame_from_bytes(commit.tick, self._layout_with(epoch.added), commit.values, commit.outboxes)
+        if frame.digest != epoch.digest:
+            raise Malformed(f"commit {commit.tick} whose frame has another digest")
+        self._resume(frame, now_ns)
+
+    def _resume(self, frame: Frame, now_ns: int) -> None:
+        """Go on from the epoch's frame with the epoch's roster and owners, and with what was held for it."""
+        self._awaited_epoch = None
+        self._history = {tick: kept for tick, kept in self._history.items() if tick < frame.tick}
+        self._enter(frame, now_ns)
+        self._term = self._make_term(frame.layout)
+        held, self._held = self._held, []
+        for channel, name, payload in held:
+            self.receive(channel, name, payload, now_ns)
+
+    def _make_term(self, layout: Layout) -> _Term:
+        assert self.deployment is not None
+        assignment = Assignment(layout, reach_of(self.deployment, layout), self.roster, self.owners)
+        mine = tuple(robot for robot in layout.robots if self.owners.get(robot.name) == self.name)
+        return _Term(self.stepper(layout), Slots(layout, self.owners), assignment, mine)
+
+    def _on_end(self, end: End, payload: bytes, now_ns: int) -> None:
+        self.ended = end
+        self.work = None
+
+    def _heartbeat(self) -> Heartbeat:
+        tick = self.frame.tick if self.frame is not None else 0
+        return Heartbeat(self.name, tick, self.epoch, self.waiting_for, self.busy, encode([self._solved_ticks]))
+
+
+def _moved_counters(counters: list[int], old: Layout, new: Layout) -> list[int]:
+    """Return the positions of the same counters in another layout."""
+    moved = []
+    for entity in old.robots:
+        for field, slot in entity.offsets.items():
+            if slot in counters and slot >= entity.split and entity.name in new:
+                moved.append(new[entity.name].offsets[field])
+    return moved

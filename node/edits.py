@@ -1,0 +1,43 @@
+"""What an order does to frame k before it is solved: add, remove, push. Pure, evaluated by every node alike.
+
+Neighbours: `rules` edits after the order; `step` goes on from the edited numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame, layout_after
+from foosim.protocol.layout import Layout
+from foosim.protocol.messages import Add, Edit, Push
+from foosim.protocol.start import place_ball
+
+
+def edit(frame: Frame, edits: Sequence[Edit], deployment: Deployment) -> tuple[Layout, list[float]]:
+    """Return layout and numbers of the edited frame; the order's edits apply in their order."""
+    layout = layout_after(frame.layout, edits)
+    numbers = frame.numbers.copy() if layout is frame.layout else _moved(frame, layout)
+    for change in edits:
+        if isinstance(change, Add) and change.name in layout:
+            place_ball(numbers, layout[change.name], change.position, change.velocity)
+        elif isinstance(change, Push) and change.name in layout:
+            _push(numbers, layout, change, deployment.table.ball.mass)
+    return layout, numbers
+
+
+def _moved(frame: Frame, layout: Layout) -> list[float]:
+    """Return a frame's numbers in another layout; entities that are new there are zero."""
+    numbers = [0.0] * layout.size
+    for entity in layout.entities:
+        if entity.name in frame.layout:
+            old = frame.layout[entity.name]
+            numbers[entity.start : entity.stop] = frame.numbers[old.start : old.stop]
+    return numbers
+
+
+def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None:
+    """Change the velocity by impulse / mass."""
+    start = layout[push.name].offsets["linear_velocity"]
+    for axis, impulse in enumerate(push.impulse):
+        numbers[start + axis] += impulse / mass

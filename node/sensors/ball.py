@@ -1,0 +1,26 @@
+"""Position of the ball as an overhead camera's tracker gives it, with Gaussian noise from keyed draws."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+from foosim.protocol.deployment import BallSensor
+from foosim.protocol.draws import draw_words, gaussian
+from foosim.protocol.layout import Entity, Layout
+
+_PAYLOAD = struct.Struct("<3d")
+
+
+class BallTracker:
+    """Payload: x, y, z of the ball in the world frame in m, three little-endian float64; z carries no noise."""
+
+    def __init__(self, settings: BallSensor, layout: Layout, robot: Entity, key: bytes) -> None:
+        self._start = layout["ball"].offsets["position"]
+        self._noise_m = settings.noise
+        self._key = key
+
+    def sample(self, numbers: Sequence[float], tick: int) -> bytes:
+        words = draw_words(self._key, tick)
+        x, y, z = numbers[self._start : self._start + 3]
+        return _PAYLOAD.pack(x + self._noise_m * gaussian(words[0]), y + self._noise_m * gaussian(words[1]), z)

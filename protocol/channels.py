@@ -1,0 +1,118 @@
+"""The table of channels: key, message, direction, plane, service, whether the journal or capture has it.
+
+Nothing else in the code spells a key. `{name}` stands for the sender where many write, and for the receiver where one
+is addressed; a message that names its sender must come on that sender's key. Neighbours: `messages`, `session`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from foosim.protocol import limits, messages
+
+Plane = Enum("Plane", ["SIMULATION", "RADIO"])
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One row of the table. `express` channels are sent at once, unbatched; all block rather than drop."""
+
+    name: str
+    key: str
+    message: Any
+    plane: Plane
+    writers: str
+    readers: str
+    rate: str
+    express: bool
+    bytes_max: int = limits.MESSAGE_BYTES_MAX
+
+    def key_for(self, name: str) -> str:
+        """Return the key for one sender or receiver."""
+        return self.key.replace("{name}", name)
+
+    @property
+    def key_for_all(self) -> str:
+        """Return the key expression that matches every name."""
+        return self.key.replace("{name}", "*")
+
+
+def _simulation(name: str, message: Any, writers: str, readers: str, rate: str, named: bool = True) -> Channel:
+    key = f"foosim/simulation/{name}" + ("/{name}" if named else "")
+    return Channel(name, key, message, Plane.SIMULATION, writers, readers, rate, express=True)
+
+
+def _radio(name: str, message: Any, writers: str, readers: str, rate: str) -> Channel:
+    return Channel(
+        name,
+        f"foosim/radio/{name}/{{name}}",
+        message,
+        Plane.RADIO,
+        writers,
+        readers,
+        rate,
+        express=True,
+        bytes_max=limits.RADIO_MESSAGE_BYTES_MAX,
+    )
+
+
+HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered")
+BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
+REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
+READY: Final = _simulation("ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch")
+PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
+EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
+ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False)
+PART: Final = _simulation("part", messages.Part, "node", "node, supervisor", "tick")
+SAMPLES: Final = _simulation("samples", messages.Samples, "node", "vhub", "tick")
+COMMIT: Final = _simulation("commit", messages.Commit, "supervisor", "the named one", "tick (vhub)")
+DELIVERIES: Final = _simulation("deliveries", messages.Deliveries, "vhub", "node, supervisor", "tick", named=False)
+WANT: Final = _simulation("want", messages.Want, "all", "all", "20 ms doubling to 1 s without progress")
+HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
+END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
+FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
+REQUEST: Final = _simulation("request", messages.Request, "operator", "supervisor", "a request")
+ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named one", "an answer")
+
+CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered")
+CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
+CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
+UP: Final = _radio("up", messages.Up | messages.Done, "client", "vhub", "the client's rate")
+DOWN: Final = _radio("down", messages.Go | messages.Down, "vhub", "the named one", "the client's rate")
+
+CHANNELS: Final[tuple[Channel, ...]] = (
+    HELLO,
+    BUILD,
+    REFUSAL,
+    READY,
+    PREPARE,
+    EPOCH,
+    ORDER,
+    PART,
+    SAMPLES,
+    COMMIT,
+    DELIVERIES,
+    WANT,
+    HEARTBEAT,
+    END,
+    FAREWELL,
+    REQUEST,
+    ANSWER,
+    CLIENT_HELLO,
+    CLIENT_WELCOME,
+    CLIENT_REFUSAL,
+    UP,
+    DOWN,
+)
+
+ALIVE: Final = {
+    Plane.SIMULATION: "foosim/simulation/alive/{name}",
+    Plane.RADIO: "foosim/radio/alive/{name}",
+}
+"""Liveliness tokens: presence, which says that a process and its link are up, not that it advances."""
+
+VHUB: Final = "vhub"
+"""The name under which the vHub takes part in the simulation plane; no node may have it."""
+SUPERVISOR: Final = "supervisor"

@@ -1,0 +1,56 @@
+"""The one encode and the one decode of the wire.
+
+Decoding consumes all bytes, respects the channel's size limit, checks the version in the tag and the whole schema, and
+raises one typed error, `Malformed`. If the rule about trailing bytes were relaxed, two readers could see two messages
+in one payload. Neighbours: `messages` has the schema, `channels` which type a key carries.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, TypeVar
+
+import msgspec
+
+from foosim.protocol import limits
+from foosim.protocol.errors import Malformed
+from foosim.protocol.messages import VERSION_SUFFIX
+
+T = TypeVar("T")
+
+_encoder = msgspec.msgpack.Encoder()
+_anything = msgspec.msgpack.Decoder()
+
+
+def encode(message: msgspec.Struct | list[Any]) -> bytes:
+    """Return the MessagePack bytes of a message (or of a list of items)."""
+    return _encoder.encode(message)
+
+
+@cache
+def _decoder(kind: Any) -> msgspec.msgpack.Decoder[Any]:
+    return msgspec.msgpack.Decoder(kind)
+
+
+def decode(kind: type[T], payload: bytes, bytes_max: int = limits.MESSAGE_BYTES_MAX) -> T:
+    """Return the message of type `kind` that `payload` holds, or raise `Malformed`."""
+    if len(payload) > bytes_max:
+        raise Malformed(f"{len(payload)} bytes, at most {bytes_max} are allowed")
+    try:
+        message: T = _decoder(kind).decode(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise Malformed(_reason(payload, error)) from None
+    return message
+
+
+def _reason(payload: bytes, error: Exception) -> str:
+    """Say what is wrong; a message of another protocol version is named as that."""
+    try:
+        content = _anything.decode(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return f"no MessagePack message: {error}"
+    if isinstance(content, list) and content and isinstance(content[0], str) and "." in content[0]:
+        version = content[0].rpartition(".")[2]
+        if version != VERSION_SUFFIX[1:]:
+            return f"protocol version {version[:20]}, this is {VERSION_SUFFIX[1:]}"
+    return str(error)

@@ -1,0 +1,127 @@
+"""The frame: the complete state of the world at a tick boundary, its digest, and the basis of the next.
+
+A frame is float64 numbers in the layout's order and the bounded outboxes of its robots. Nothing that matters lives
+elsewhere. Frames are values: what changes one makes another. Neighbours: `layout` names the slots, `barrier`
+assembles frames from parts.
+"""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from hashlib import blake2b
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.protocol import codec, messages
+from foosim.protocol.errors import Malformed
+from foosim.protocol.layout import Entity, Layout
+
+assert sys.byteorder == "little", "numbers travel as raw little-endian float64"
+
+CHAIN_START: Final = bytes(32)
+_TICK = struct.Struct("<Q")
+_OUTBOX = struct.Struct("<QI")
+_NO_EDITS: Final = codec.encode([])
+
+
+class Frame:
+    """The world at the start of tick `tick`: `values` (float64, shape (layout.size,)) and outboxes by entity index."""
+
+    def __init__(
+        self, tick: int, layout: Layout, values: NDArray[np.float64], outboxes: Mapping[int, bytes] | None = None
+    ) -> None:
+        assert values.shape == (layout.size,), (values.shape, layout.size)
+        assert values.dtype == np.float64 and values.flags.c_contiguous
+        self.tick = tick
+        self.layout = layout
+        self.values = values
+        self.outboxes: dict[int, bytes] = dict(sorted(outboxes.items())) if outboxes else {}
+
+    @cached_property
+    def digest(self) -> bytes:
+        """D(tick): BLAKE2b, 32 bytes, of tick, layout and the bytes as they are."""
+        hasher = blake2b(_TICK.pack(self.tick), digest_size=32)
+        hasher.update(self.layout.digest)
+        hasher.update(self.values)
+        for index, packets in self.outboxes.items():
+            hasher.update(_OUTBOX.pack(index, len(packets)) + packets)
+        return hasher.digest()
+
+    @cached_property
+    def numbers(self) -> list[float]:
+        """The values as Python floats; whoever edits copies the list first."""
+        numbers: list[float] = self.values.tolist()
+        return numbers
+
+    def at(self, entity: str, field: str, offset: int = 0) -> float:
+        """Return one number, by names."""
+        return self.numbers[self.layout[entity].offsets[field] + offset]
+
+    def vector(self, entity: str, field: str, count: int) -> list[float]:
+        """Return `count` numbers of one field."""
+        start = self.layout[entity].offsets[field]
+        return self.numbers[start : start + count]
+
+    def entity_digest(self, entity: Entity) -> bytes:
+        """Return a digest of 8 bytes of one entity's slots and outbox: it tells which entity differs."""
+        hasher = blake2b(self.values[entity.start : entity.stop], digest_size=8)
+        hasher.update(self.outboxes.get(entity.index, b""))
+        return hasher.digest()
+
+    @property
+    def outbox_items(self) -> list[messages.Outbox]:
+        return [messages.Outbox(index, packets) for index, packets in self.outboxes.items()]
+
+    @property
+    def score(self) -> tuple[int, int]:
+        """Goals of red and of blue."""
+        red, blue = self.vector("world", "score", 2)
+        return int(red), int(blue)
+
+
+def frame_from_bytes(tick: int, layout: Layout, values: bytes, outboxes: Sequence[messages.Outbox]) -> Frame:
+    """Return the frame that a message carries, or raise `Malformed` when its size is not the layout's."""
+    if len(values) != 8 * layout.size:
+        raise Malformed(f"{len(values)} bytes of values, the layout has {8 * layout.size}")
+    indices = [outbox.index for outbox in outboxes]
+    if indices != sorted(set(indices)) or (indices and indices[-1] >= len(layout.entities)):
+        raise Malformed(f"outboxes of entities {indices}: not ascending or not in the layout")
+    return Frame(tick, layout, np.frombuffer(values), {outbox.index: outbox.packets for outbox in outboxes})
+
+
+def edits_content(edits: Sequence[messages.Edit]) -> bytes:
+    """Return the content of an order without its epoch."""
+    return codec.encode(list(edits)) if edits else _NO_EDITS
+
+
+def basis_of(digest: bytes, edits: Sequence[messages.Edit], deliveries: bytes) -> bytes:
+    """Return the BLAKE2b of what tick k is computed from: D(k), the content of order k, the deliveries' bytes."""
+    hasher = blake2b(digest, digest_size=32)
+    content = edits_content(edits)
+    hasher.update(_TICK.pack(len(content)) + content)
+    hasher.update(deliveries)
+    return hasher.digest()
+
+
+def chain_next(chain: bytes, digest: bytes) -> bytes:
+    """Return the chain over one more frame: BLAKE2b(chain + frame digest)."""
+    return blake2b(chain + digest, digest_size=32).digest()
+
+
+def layout_after(layout: Layout, edits: Sequence[messages.Edit]) -> Layout:
+    """Return the layout of frame k+1 when order k carries `edits`."""
+    changes: list[Any] = [edit for edit in edits if isinstance(edit, messages.Add | messages.Remove)]
+    if not changes:
+        return layout
+    models = dict(layout.models)
+    for edit in changes:
+        if isinstance(edit, messages.Add):
+            models[edit.name] = edit.model
+        else:
+            models.pop(edit.name, None)
+    return Layout(models, layout.sensors)

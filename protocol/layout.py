@@ -1,0 +1,136 @@
+"""The canonical layout of a frame: which entity, in name order, keeps which numbers where.
+
+An entity's slots stand in one run of float64 numbers: first what its solver writes (body, flags, contact log, rules'
+and actuators' memory), then what its owner writes (the memory of its sensors). A layout is a pure function of the
+deployment and of what was added since, so every process builds the same one and its digest names it.
+Neighbours: `frame` holds the numbers, `assign` says who computes which entity.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import blake2b
+from typing import Final
+
+from foosim.protocol.deployment import Deployment
+
+WORLD: Final = "world"
+"""Name of the entity that has no body: score and the rules' memory."""
+
+_BODY = (("position", 3), ("orientation", 4), ("linear_velocity", 3), ("angular_velocity", 3))
+_CONTACTS = ("contacts", 3)
+_SOLVER_FIELDS: Final[Mapping[str, tuple[tuple[str, int], ...]]] = {
+    "ball": (*_BODY, ("quarantined", 1), _CONTACTS, ("still_ticks", 1), ("out_ticks", 1), ("wait_ticks", 1)),
+    "rod": (
+        ("joint_positions", 2),
+        ("joint_velocities", 2),
+        ("quarantined", 1),
+        ("down", 1),
+        _CONTACTS,
+        ("wanted", 2),
+        ("refused", 1),
+    ),
+    "camera": (("down", 1), ("refused", 1)),
+    "world": (("score", 2), ("kickoffs", 1)),
+}
+"""The slots that the solver writes, by model. `contacts` is (count, impulse in N s, last substep or -1) of the tick;
+`wanted` is the actuator's memory (slide in m, spin in rad); `refused` counts packets that the robot refused;
+`still_ticks`, `out_ticks` and `wait_ticks` are the memory of the rules about dead balls, balls off the table and
+kick-off. Orientations are quaternions x, y, z, w; positions and velocities are in the world frame, SI units."""
+
+BODIES: Final = frozenset({"ball", "rod"})
+ROBOTS: Final = frozenset({"rod", "camera"})
+
+
+@dataclass(frozen=True, slots=True)
+class Entity:
+    """One entry of a layout. `start` to `split` are the solver's slots, `split` to `stop` the owner's."""
+
+    index: int
+    name: str
+    model: str
+    start: int
+    split: int
+    stop: int
+    offsets: Mapping[str, int]
+
+    @property
+    def has_body(self) -> bool:
+        return self.model in BODIES
+
+    @property
+    def is_robot(self) -> bool:
+        return self.model in ROBOTS
+
+
+class Layout:
+    """Entities in name order and where their slots are. Two layouts are equal when their digests are."""
+
+    def __init__(self, models: Mapping[str, str], sensors: Mapping[str, Sequence[str]]) -> None:
+        """Build from the model of every entity and the names of every robot's sensors (one slot each)."""
+        entities = []
+        position = 0
+        for index, name in enumerate(sorted(models)):
+            model = models[name]
+            start = position
+            offsets: dict[str, int] = {}
+            for field, count in _SOLVER_FIELDS[model]:
+                offsets[field] = position
+                position += count
+            split = position
+            for sensor in sorted(sensors.get(name, ())):
+                offsets[f"sampled.{sensor}"] = position
+                position += 1
+            entities.append(Entity(index, name, model, start, split, position, offsets))
+        self.entities: tuple[Entity, ...] = tuple(entities)
+        self.size = position
+        self.models = dict(models)
+        self.sensors = {name: tuple(sorted(channels)) for name, channels in sensors.items()}
+        self._index = {entity.name: entity for entity in entities}
+
+    def __getitem__(self, name: str) -> Entity:
+        return self._index[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._index
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(entity.name for entity in self.entities)
+
+    @cached_property
+    def robots(self) -> tuple[Entity, ...]:
+        """Entities that have an owner, in name order."""
+        return tuple(entity for entity in self.entities if entity.is_robot)
+
+    @cached_property
+    def balls(self) -> tuple[Entity, ...]:
+        return tuple(entity for entity in self.entities if entity.model == "ball")
+
+    @cached_property
+    def rods(self) -> tuple[Entity, ...]:
+        return tuple(entity for entity in self.entities if entity.model == "rod")
+
+    @cached_property
+    def digest(self) -> bytes:
+        """BLAKE2b, 32 bytes, of every entity's name, model and slots."""
+        hasher = blake2b(digest_size=32)
+        for entity in self.entities:
+            for text in (entity.name, entity.model, *entity.offsets):
+                raw = text.encode()
+                hasher.update(struct.pack("<I", len(raw)) + raw)
+            hasher.update(struct.pack("<3Q", entity.start, entity.split, entity.stop))
+        return hasher.digest()
+
+
+def build_layout(deployment: Deployment, added: Iterable[tuple[str, str]] = ()) -> Layout:
+    """Return the layout of a deployment's world with `added` (name, model) entities."""
+    models = {"ball": "ball", WORLD: "world", **dict(added)}
+    sensors: dict[str, Sequence[str]] = {}
+    for name, robot in deployment.robots.items():
+        models[name] = robot.model
+        sensors[name] = tuple(robot.sensors)
+    return Layout(models, sensors)

@@ -1,0 +1,47 @@
+"""Every limit of the project, in one file.
+
+A limit is what keeps a wrong or hostile peer, file or request from costing more than it should. Code that
+refuses something names the limit it broke. Neighbours: `codec` and `messages` use these for what arrives.
+"""
+
+from typing import Final
+
+PROTOCOL_VERSION: Final = 1
+"""Version of the messages; a peer with another one is refused at the handshake, both versions named."""
+
+NAME_LENGTH_MAX: Final = 32
+ENTITIES_MAX: Final = 4096
+NODES_MAX: Final = 256
+CLIENTS_MAX: Final = 1024
+
+COUNTER_MAX: Final = 2**63 - 1
+"""Ticks, epochs, nanoseconds and sequence numbers: what every MessagePack reader holds in a signed 64-bit integer."""
+
+PAYLOAD_BYTES_MAX: Final = 32 * 1024
+"""Opaque bytes of one packet."""
+MESSAGE_BYTES_MAX: Final = 4 * 1024 * 1024
+"""One message of the simulation plane (a commit of a large world, a build with models)."""
+RADIO_MESSAGE_BYTES_MAX: Final = 1024 * 1024
+"""One message from or to a client."""
+PACKETS_PER_MESSAGE_MAX: Final = 65_536
+DEPLOYMENT_BYTES_MAX: Final = 64 * 1024
+TEXT_LENGTH_MAX: Final = 8 * 1024
+
+ROBOT_PACKETS_PER_TICK_MAX: Final = 1 << 16
+"""A robot's sequence number is tick x 2^16 + index."""
+OUTBOX_PACKETS_MAX: Final = 64
+OUTBOX_BYTES_MAX: Final = 1024
+
+INBOX_MESSAGES_MAX: Final = 65_536
+KEPT_TICKS: Final = 16
+"""How many ticks of what it sent each process keeps for those that ask again."""
+RELEASE_AHEAD: Final = 4
+"""W: order k is released once tick k - W is committed."""
+WANT_AFTER_NS: Final = 20_000_000
+WANT_EVERY_NS_MAX: Final = 1_000_000_000
+HEARTBEAT_NS: Final = 100_000_000
+DOWNLINK_KEPT_NS: Final = 2_000_000_000
+LAG_ANCHOR_NS: Final = 100_000_000
+"""A lag above this moves the wall anchor; less is caught up."""
+JOURNAL_BYTES_MAX: Final = 64 * 1024 * 1024
+CAPTURE_QUEUE_ROWS_MAX: Final = 200_000

@@ -1,0 +1,97 @@
+"""The handshake of a process with the supervisor, as the process sees it: hello, build, ready, and the heartbeat.
+
+Hello and ready are said again until they are answered, since declaring a subscriber does not mean that the other side
+knows of it. Shared by node and vHub. Neighbours: `supervisor.roster` is the other side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, Literal
+
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.layout import Layout
+from foosim.protocol.messages import Build, Heartbeat, Hello, Ready, Refusal
+
+AGAIN_NS: Final = 200_000_000
+
+
+class Member:
+    """The state of one process's membership. What it has to say goes to `actions`."""
+
+    def __init__(
+        self,
+        role: Literal["node", "vhub"],
+        name: str,
+        boot: str,
+        fingerprint: bytes,
+        world: str,
+        actions: list[Action],
+        now_ns: int,
+    ) -> None:
+        self.role = role
+        self.name = name
+        self.boot = boot
+        self.refusal = ""
+        self.build: Build | None = None
+        self.deployment: Deployment | None = None
+        self.layouts: list[Layout] = []
+        self.deadline_ns = now_ns
+        self.is_ready = False
+        self._fingerprint = fingerprint
+        self._world = world
+        self._actions = actions
+        self._said_ready: Layout | None = None
+        self._entered = False
+        self._heartbeat_ns = now_ns
+
+    def take_build(self, build: Build) -> bool:
+        """Take the supervisor's answer to hello; False when it is for another boot or a repeat."""
+        if build.boot != self.boot or self.build is not None:
+            return False
+        self.build = build
+        self.deployment = load_deployment(build.deployment, build.deployment_name)
+        self._world = self.deployment.world
+        return True
+
+    def refuse(self, payload: bytes) -> None:
+        """Take a refusal that is meant for this boot."""
+        refusal = decode(Refusal, payload)
+        if refusal.boot == self.boot:
+            self.refusal = refusal.reason
+            self._actions.append(Say("error", f"refused by the supervisor: {refusal.reason}"))
+
+    def want_layout(self, layout: Layout) -> None:
+        """Ask the shell for what this layout needs (a node: an engine)."""
+        if all(layout.digest != wanted.digest for wanted in self.layouts):
+            self.layouts.append(layout)
+        elif self.is_ready:
+            self.ready(layout)
+
+    def ready(self, layout: Layout) -> None:
+        """Say that this layout is built."""
+        self.is_ready = True
+        self._said_ready = layout
+        self._actions.append(Publish(channels.READY, self.name, encode(Ready(self.name, self.boot, layout.digest))))
+
+    def entered(self) -> None:
+        """An epoch with this process in it has begun: nothing is to be said again."""
+        self._entered = True
+
+    def wake(self, now_ns: int, heartbeat: Callable[[], Heartbeat]) -> None:
+        """Say hello or ready again and the heartbeat, each when it is due."""
+        if now_ns < self.deadline_ns or self.refusal:
+            return
+        if self.build is None:
+            hello = Hello(self.role, self.name, self.boot, limits.PROTOCOL_VERSION, self._world, self._fingerprint)
+            self._actions.append(Publish(channels.HELLO, self.name, encode(hello)))
+            self.deadline_ns = now_ns + AGAIN_NS
+            return
+        if not self._entered and self._said_ready is not None:
+            self.ready(self._said_ready)
+        self._actions.append(Publish(channels.HEARTBEAT, self.name, encode(heartbeat())))
+        self.deadline_ns = now_ns + limits.HEARTBEAT_NS

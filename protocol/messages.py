@@ -1,0 +1,386 @@
+"""The messages of both planes, as typed structs that are their own schema.
+
+On the wire each is a MessagePack array: the tag (`part.1`: name and protocol version), then the fields in order.
+Decoding validates: unknown fields, negative counters, oversized lists and bytes are refused. Number arrays travel as
+raw little-endian float64 bytes. Floats are checked to be finite where they are used, since msgspec does not.
+Neighbours: `codec` encodes and decodes, `channels` says which message travels where.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from foosim.protocol import limits
+
+Counter = Annotated[int, Meta(ge=0, le=limits.COUNTER_MAX)]
+Name = Annotated[str, Meta(min_length=1, max_length=limits.NAME_LENGTH_MAX)]
+Text = Annotated[str, Meta(max_length=limits.TEXT_LENGTH_MAX)]
+Digest = Annotated[bytes, Meta(min_length=32, max_length=32)]
+Payload = Annotated[bytes, Meta(max_length=limits.PAYLOAD_BYTES_MAX)]
+Numbers = Annotated[bytes, Meta(max_length=limits.MESSAGE_BYTES_MAX)]
+Names = Annotated[list[Name], Meta(max_length=limits.ENTITIES_MAX)]
+Vector = tuple[float, float, float]
+
+VERSION_SUFFIX = f".{limits.PROTOCOL_VERSION}"
+
+
+def _tag(class_name: str) -> str:
+    return class_name.lower() + VERSION_SUFFIX
+
+
+class Message(msgspec.Struct, frozen=True, array_like=True, tag=_tag, forbid_unknown_fields=True, gc=False):
+    """What every message of the wire shares: array form, a tag with the version, no unknown fields."""
+
+
+class Item(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, gc=False):
+    """A part of a message, without a tag of its own."""
+
+
+# --- what changes the world: the edits of an order -------------------------------------------------------------------
+
+
+class Add(Message):
+    """Add entity `name` of `model` at `position` (m, world frame) with `velocity` (m/s)."""
+
+    name: Name
+    model: Name
+    position: Vector
+    velocity: Vector
+
+
+class Remove(Message):
+    """Remove an entity that was added."""
+
+    name: Name
+
+
+class Push(Message):
+    """Give a free body an `impulse` (N s, world frame) at its centre of mass."""
+
+    name: Name
+    impulse: Vector
+
+
+class Stop(Message):
+    """End the run in order after this tick."""
+
+    reason: Text
+
+
+Edit = Add | Remove | Push | Stop
+Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
+
+
+# --- simulation plane: the tick --------------------------------------------------------------------------------------
+
+
+class Order(Message):
+    """Permission to compute `tick`, with what changes the world at it."""
+
+    epoch: Counter
+    tick: Counter
+    edits: Edits
+
+
+class Delivered(Item):
+    """One packet that reaches a robot."""
+
+    due_ns: Counter
+    source: Name
+    sequence: Counter
+    copy: Counter
+    destination: Name
+    channel: Name
+    payload: Payload
+
+
+class Deliveries(Message):
+    """The packets that reach robots at `tick`, in (due, source, sequence, copy) order. Final when published."""
+
+    tick: Counter
+    packets: Annotated[list[Delivered], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+
+
+class RobotPacket(Item):
+    """One packet that a robot sends. `destination` is empty when it goes to all who subscribe to the channel."""
+
+    robot: Name
+    index: Annotated[int, Meta(ge=0, lt=limits.ROBOT_PACKETS_PER_TICK_MAX)]
+    destination: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
+    channel: Name
+    payload: Payload
+
+
+class Samples(Message):
+    """What the robots of `node` send at `tick`, from the frame with digest `digest`; `robots` are those it covers."""
+
+    tick: Counter
+    digest: Digest
+    node: Name
+    robots: Names
+    packets: Annotated[list[RobotPacket], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+
+
+class Outbox(Item):
+    """The bytes in the outbox of the entity at `index` of the layout; entities with an empty one are left out."""
+
+    index: Counter
+    packets: Annotated[bytes, Meta(min_length=1, max_length=limits.OUTBOX_BYTES_MAX)]
+
+
+Outboxes = Annotated[list[Outbox], Meta(max_length=limits.ENTITIES_MAX)]
+
+
+class Part(Message):
+    """One node's slots of frame `tick`: of the entities it `solved` (indices, ascending) and of the robots it owns."""
+
+    epoch: Counter
+    tick: Counter
+    node: Name
+    basis: Digest
+    solved: Annotated[list[Counter], Meta(max_length=limits.ENTITIES_MAX)]
+    solver_values: Numbers
+    owner_values: Numbers
+    outboxes: Outboxes
+
+
+class Commit(Message):
+    """Frame `tick` as the supervisor assembled it, with the order that led to it (none for frame 0)."""
+
+    epoch: Counter
+    tick: Counter
+    digest: Digest
+    values: Numbers
+    outboxes: Outboxes
+    edits: Edits
+
+
+class Want(Message):
+    """Ask again for `kind` (a channel's name) of `tick` in `epoch`."""
+
+    sender: Name
+    kind: Name
+    tick: Counter
+    epoch: Counter
+
+
+class Heartbeat(Message):
+    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `busy` is its load (0 to 1)."""
+
+    sender: Name
+    tick: Counter
+    epoch: Counter
+    waiting_for: Text
+    busy: float
+    report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
+
+
+# --- simulation plane: who takes part --------------------------------------------------------------------------------
+
+
+class Hello(Message):
+    """A process asks to take part. `world` is empty when it takes whatever world it finds."""
+
+    role: Name
+    name: Name
+    boot: Name
+    version: Counter
+    world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
+    fingerprint: Digest
+
+
+class AddedEntity(Item):
+    """An entity that is in the layout beside those of the deployment."""
+
+    name: Name
+    model: Name
+
+
+Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
+
+
+class Build(Message):
+    """Everything that a process needs to build the world: one address was all that it had to know."""
+
+    name: Name
+    boot: Name
+    run: Name
+    deployment_name: Text
+    deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
+    pace: Name
+    added: Added
+
+
+class Refusal(Message):
+    """The supervisor will not have this process, and why."""
+
+    name: Name
+    boot: Name
+    reason: Text
+
+
+class Ready(Message):
+    """The process has built the layout with this digest (and, a vHub, heard from all declared lockstep clients)."""
+
+    name: Name
+    boot: Name
+    layout: Digest
+
+
+class Prepare(Message):
+    """Build an engine for the layout with these added entities, and say when it is ready."""
+
+    added: Added
+
+
+class Epoch(Message):
+    """Who does what from tick `tick` on: `owners` is (robot, node) for every robot."""
+
+    epoch: Counter
+    tick: Counter
+    digest: Digest
+    roster: Names
+    owners: Annotated[list[tuple[Name, Name]], Meta(max_length=limits.ENTITIES_MAX)]
+    added: Added
+
+
+class End(Message):
+    """The run is over after `tick` ticks."""
+
+    tick: Counter
+    reason: Text
+    failed: bool
+
+
+class Farewell(Message):
+    """A process has finished its part of an ended run; `report` is JSON (the vHub's: packets and capture)."""
+
+    name: Name
+    report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
+
+
+class Request(Message):
+    """What a person or a script asks of the supervisor: `verb` with JSON `arguments`. The same id, the same answer."""
+
+    sender: Name
+    id: Name
+    verb: Name
+    arguments: Annotated[bytes, Meta(max_length=limits.TEXT_LENGTH_MAX)]
+
+
+class Answer(Message):
+    """The supervisor's answer: the tick at which the request takes effect and JSON `result`, or why not."""
+
+    sender: Name
+    id: Name
+    accepted: bool
+    tick: Counter
+    text: Text
+    result: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
+
+
+# --- radio plane -----------------------------------------------------------------------------------------------------
+
+
+class Subscription(Item):
+    """A robot's channel that a client wants to hear."""
+
+    robot: Name
+    channel: Name
+
+
+class ClientHello(Message):
+    """A client asks to join. `period` is in ticks (0: free-running); `received` is the last downlink number it has."""
+
+    name: Name
+    boot: Name
+    version: Counter
+    world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
+    period: Counter
+    received: Counter
+    subscriptions: Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MAX)]
+
+
+class ClientWelcome(Message):
+    """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1."""
+
+    name: Name
+    boot: Name
+    hub: Name
+    sequence: Counter
+    downlink: Counter
+    deployment_name: Text
+    deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
+
+
+class ClientRefusal(Message):
+    """The vHub will not have this client, and why."""
+
+    name: Name
+    boot: Name
+    reason: Text
+
+
+class Sent(Item):
+    """One packet that a client sends; `stamp_ns` is its own clock's, recorded and never judged."""
+
+    sequence: Counter
+    destination: Name
+    channel: Name
+    stamp_ns: Counter
+    payload: Payload
+
+
+Packets = Annotated[list[Sent], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+
+
+class Up(Message):
+    """Packets of a free-running client."""
+
+    name: Name
+    boot: Name
+    packets: Packets
+
+
+class Done(Message):
+    """A lockstep client's answer to `Go(tick)`: what it sends at that tick."""
+
+    name: Name
+    boot: Name
+    tick: Counter
+    packets: Packets
+
+
+class Received(Item):
+    """One packet that reaches a client. `sent_ns` and `due_ns` are simulated time."""
+
+    source: Name
+    sequence: Counter
+    copy: Counter
+    channel: Name
+    sent_ns: Counter
+    due_ns: Counter
+    payload: Payload
+
+
+class Go(Message):
+    """Downlink `number` to a lockstep client: it is due at `tick`; these packets have reached it since its last."""
+
+    number: Counter
+    tick: Counter
+    acknowledged: Counter
+    packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+
+
+class Down(Message):
+    """Downlink `number` to a free-running client, or (a lockstep client too) the news that the run is over."""
+
+    number: Counter
+    tick: Counter
+    acknowledged: Counter
+    packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+    ended: bool
+
