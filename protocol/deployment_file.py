@@ -1,0 +1,129 @@
+"""From the text of a deployment file to a `Deployment`, or to all that is wrong with it.
+
+The text is scanned before anything is built (yaml_tree.py), then checked against the schema (deployment.py,
+schema_problems.py) and for what lies between its parts (references.py). Every problem becomes one line,
+
+    deploy/table.yaml:7:11: nodes.red.robots[1]: unknown robot, 'red.gaol', nearest is 'red.goal'
+
+that is `file:line:column: what, value, nearest valid name`, in the order of the file. Settings given on a command
+line are placed in the same tree first: settings.py.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from foosim.protocol import limits
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import DeploymentError, describe
+from foosim.protocol.references import Finding, Location, check_references
+from foosim.protocol.schema_problems import schema_findings
+from foosim.protocol.settings import place_sets
+from foosim.protocol.yaml_tree import (
+    DEPTH_MAX,
+    NODES_MAX,
+    Fields,
+    Items,
+    Place,
+    Problem,
+    Tree,
+    locate_in,
+    measure,
+    plain,
+    read_tree,
+    write_yaml,
+)
+
+
+def load_deployment(text: str, name: str) -> Deployment:
+    """The deployment in `text`; `name` is the file's in messages. Raises DeploymentError with all problems."""
+    tree, problems = read_tree(text, locate_in(name))
+    return _check(tree, problems)
+
+
+def apply_sets(text: str, name: str, sets: Sequence[str]) -> str:
+    """The canonical text of the deployment in `text` after the settings `a.b=VALUE`; raises DeploymentError.
+
+    Canonical is block style in the file's order without comments: what travels in the handshake and is attached to
+    the capture. Loading it gives the changed deployment, and its own canonical text is itself.
+    """
+    tree, problems = read_tree(text, locate_in(name))
+    if tree is not None:
+        tree, set_problems = place_sets(tree, sets)
+        problems = [*problems, *set_problems]
+    _check(tree, problems)
+    assert tree is not None, "checked"
+    canonical = write_yaml(plain(tree))
+    depth, nodes = measure(tree)
+    size = len(canonical.encode())
+    if depth > DEPTH_MAX or nodes > NODES_MAX or size > limits.DEPLOYMENT_BYTES_MAX:
+        what = f"too large with these settings ({size} bytes, {nodes} nodes, {depth} deep)"
+        raise DeploymentError([str(Problem(tree.place, what))])
+    return canonical
+
+
+def read_deployment_text(path: Path) -> str:
+    """The text of a deployment file, bounded before it is read; raises DeploymentError."""
+    place = Place(0, 1, 1, str(path))
+    try:
+        with path.open("rb") as file:
+            raw = file.read(limits.DEPLOYMENT_BYTES_MAX + 1)
+    except OSError as error:
+        raise DeploymentError([f"{place}: cannot be read, {error.strerror or error}"]) from None
+    if len(raw) > limits.DEPLOYMENT_BYTES_MAX:
+        raise DeploymentError([f"{place}: more than {limits.DEPLOYMENT_BYTES_MAX} bytes"])
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = raw[: error.start].decode("utf-8-sig", "replace")
+        place = Place(0, before.count("\n") + 1, len(before) - before.rfind("\n"), str(path))
+        raise DeploymentError([f"{place}: {describe('not UTF-8', raw[error.start])}"]) from None
+
+
+def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
+    """Build the deployment from a tree, or raise all problems, those that the reader found among them."""
+    deployment = None
+    found = list(problems)
+    if tree is not None:
+        data = plain(tree)
+        findings = check_references(data)
+        try:
+            deployment = Deployment.model_validate(data)
+        except ValidationError as error:
+            findings += schema_findings(error)
+        found += [_problem(tree, finding) for finding in findings]
+    if found or deployment is None:
+        raise DeploymentError([str(problem) for problem in sorted(set(found))])
+    return deployment
+
+
+def _problem(tree: Tree, finding: Finding) -> Problem:
+    location = finding.location if finding.at == "value" else finding.location[:-1]
+    text = describe(finding.what, finding.value, finding.nearest)
+    path = _path(location)
+    return Problem(_place(tree, finding), f"{path}: {text}" if path else text)
+
+
+def _path(location: Location) -> str:
+    """`nodes.red.robots[1]`."""
+    text = ""
+    for step in location:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return text
+
+
+def _place(tree: Tree, finding: Finding) -> Place:
+    """Where the value, the key, or the mapping without the key stands; the nearest thing around it if it is absent."""
+    node, place = tree, tree.place
+    for step in finding.location:
+        if isinstance(node, Fields) and isinstance(step, str) and step in node.values:
+            place, node = node.keys[step], node.values[step]
+        elif isinstance(node, Items) and isinstance(step, int) and step < len(node.items):
+            node = node.items[step]
+            place = node.place
+        else:
+            break
+    else:
+        return place if finding.at == "key" else node.place
+    return node.place

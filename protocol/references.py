@@ -1,0 +1,260 @@
+"""What one field of a deployment cannot know: whether names refer to something, and whether numbers fit together.
+
+It reads the plain data of a file, not the models, so that these problems are found beside those of single fields, in
+one go: whatever is missing or malformed is passed over here, since the schema reports it. deployment_file.py turns
+findings into lines with places.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from fractions import Fraction
+from typing import Any, Literal
+
+from foosim.protocol import names, units
+from foosim.protocol.errors import BadValue
+from foosim.protocol.names import nearest_name
+
+Location = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A problem at a location in the data: at the value there, at its key, or at the mapping that lacks the key."""
+
+    location: Location
+    what: str
+    value: object
+    nearest: str | None = None
+    at: Literal["value", "key", "missing"] = "value"
+
+
+def check_references(data: object) -> list[Finding]:
+    """All problems between the parts of a deployment's plain data."""
+    view = _View(data)
+    checks = (_names, _robots, _nodes, _players, _links, _rates, _clients, _deadlines, _lines, _shapes)
+    return [finding for check in checks for finding in check(view)]
+
+
+def _quoted(nearest: str | None) -> str | None:
+    return None if nearest is None else repr(nearest)
+
+
+class _View:
+    """Tolerant access to plain data: what is not of the expected kind looks empty."""
+
+    def __init__(self, data: object) -> None:
+        self.data = data
+        self.robots = self.mapping("robots")
+        self.nodes = self.mapping("nodes")
+        self.players = self.mapping("players")
+        self.clients = self.mapping("clients")
+
+    def get(self, *path: str | int) -> Any:
+        value = self.data
+        for step in path:
+            if isinstance(value, dict) and isinstance(step, str):
+                value = value.get(step)
+            elif isinstance(value, list) and isinstance(step, int) and step < len(value):
+                value = value[step]
+            else:
+                return None
+        return value
+
+    def mapping(self, *path: str | int) -> Mapping[str, Any]:
+        value = self.get(*path)
+        return value if isinstance(value, dict) else {}
+
+    def texts(self, *path: str | int) -> list[tuple[int, str]]:
+        """The texts of a list, or the single text that may stand for it, with their indices."""
+        value = self.get(*path)
+        items = value if isinstance(value, list) else [value]
+        return [(index, item) for index, item in enumerate(items) if isinstance(item, str)]
+
+    def length(self, *path: str) -> Fraction | None:
+        """A length in metres, exact; None if it is not one."""
+        try:
+            return units.parse(self.get("table", *path), units.LENGTH)
+        except BadValue:
+            return None
+
+    def tick_ns(self) -> int | None:
+        try:
+            return units.parse_ns(self.get("tick")) or None
+        except BadValue:
+            return None
+
+
+def _names(view: _View) -> Iterator[Finding]:
+    """Endpoints, and the processes that a run starts, have names of their own."""
+    endpoints: dict[str, str] = {}
+    processes: dict[str, str] = {}
+    for section in ("robots", "nodes", "players", "clients"):
+        reserved = names.ENTITY_NAMES_RESERVED if section == "robots" else names.PROCESS_NAMES_RESERVED
+        taken = [scope for scope, member in ((endpoints, section != "nodes"), (processes, section != "robots")) if member]
+        for name in view.mapping(section):
+            if name in reserved:
+                yield Finding((section, name), "a reserved name", name, at="key")
+            other = next((scope[name] for scope in taken if name in scope), None)
+            if other is not None:
+                yield Finding((section, name), f"a name that is also one of {other}", name, at="key")
+            for scope in taken:
+                scope.setdefault(name, section)
+
+
+def _robots(view: _View) -> Iterator[Finding]:
+    """Lines exist and have one rod a team; channels are not called like built-in ones."""
+    rods: dict[tuple[str, str], str] = {}
+    lines = view.mapping("table", "lines")
+    for name in view.robots:
+        for channel in view.mapping("robots", name, "sensors"):
+            if channel in names.CHANNEL_NAMES_RESERVED:
+                yield Finding(("robots", name, "sensors", channel), "a reserved name", channel, at="key")
+        team, line = view.get("robots", name, "team"), view.get("robots", name, "line")
+        if not (isinstance(team, str) and isinstance(line, str)):
+            continue
+        if lines and line not in lines:
+            yield Finding(("robots", name, "line"), "not in table.lines", line, _quoted(nearest_name(line, lines)))
+        first = rods.setdefault((team, line), name)
+        if first != name:
+            yield Finding(("robots", name, "line"), f"{team}'s line is already the rod {first}", line)
+
+
+def _nodes(view: _View) -> Iterator[Finding]:
+    """Every robot has exactly one owner."""
+    owner: dict[str, str] = {}
+    for node in view.nodes:
+        for index, robot in view.texts("nodes", node, "robots"):
+            location = ("nodes", node, "robots", index)
+            if robot not in view.robots:
+                yield Finding(location, "unknown robot", robot, _quoted(nearest_name(robot, view.robots)))
+            elif robot in owner:
+                yield Finding(location, f"a robot with two owners, also of node {owner[robot]}", robot)
+            owner.setdefault(robot, node)
+    for robot in view.robots:
+        if robot not in owner and view.nodes:
+            yield Finding(("robots", robot), "a robot that no node owns", robot, at="key")
+
+
+def _players(view: _View) -> Iterator[Finding]:
+    """Players name robots that exist, and channels that those have."""
+    for player in view.players:
+        for robot in view.mapping("players", player, "robots"):
+            location: Location = ("players", player, "robots", robot)
+            if robot not in view.robots:
+                yield Finding(location, "unknown robot", robot, _quoted(nearest_name(robot, view.robots)), at="key")
+                continue
+            channels = [*view.mapping("robots", robot, "sensors"), names.CHANNEL_ECHO]
+            seen = set()
+            for index, channel in view.texts(*location):
+                if channel not in channels:
+                    nearest = _quoted(nearest_name(channel, channels))
+                    yield Finding((*location, index), f"{robot} has no such channel", channel, nearest)
+                elif channel in seen:
+                    yield Finding((*location, index), "a channel that is listed twice", channel)
+                seen.add(channel)
+
+
+def _links(view: _View) -> Iterator[Finding]:
+    """Every selector matches an endpoint; rules have names of their own."""
+    endpoints = [*view.robots, *view.players, *view.clients]
+    seen: dict[str, int] = {}
+    links = view.get("network", "links")
+    for number in range(len(links) if isinstance(links, list) else 0):
+        location: Location = ("network", "links", number)
+        name = view.get(*location, "id")
+        if isinstance(name, str) and seen.setdefault(name, number) != number:
+            yield Finding((*location, "id"), f"a name that is also links[{seen[name]}]'s", name)
+        for side in ("from", "to"):
+            for index, glob in view.texts(*location, side):
+                if not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
+                    nearest = _quoted(nearest_name(glob, endpoints))
+                    yield Finding((*location, side, index), "a selector that matches no endpoint", glob, nearest)
+
+
+def _rates(view: _View) -> Iterator[Finding]:
+    """The tick divides into its substeps; rates of sensors, lockstep and poses are whole ticks."""
+    tick_ns = view.tick_ns()
+    if tick_ns is None:
+        return
+    substeps = view.get("substeps")
+    if isinstance(substeps, int) and not isinstance(substeps, bool) and 1 <= substeps <= 64 and tick_ns % substeps:
+        valid = sorted((n for n in range(1, 65) if tick_ns % n == 0), key=lambda n: (abs(n - substeps), n))
+        what = f"does not divide the tick of {tick_ns} ns"
+        yield Finding(("substeps",), what, substeps, " and ".join(str(n) for n in sorted(valid[:2])))
+    places: list[Location] = [
+        ("robots", robot, "sensors", channel, "rate")
+        for robot in view.robots
+        for channel in view.mapping("robots", robot, "sensors")
+    ]
+    places += [("players", name, "rate") for name in view.players if view.get("players", name, "lockstep") is not False]
+    places += [("clients", name, "rate") for name in view.clients if view.get("clients", name, "lockstep") is True]
+    places += [("capture", "poses")]
+    for place in places:
+        yield from _rate(view, place, tick_ns)
+
+
+def _rate(view: _View, place: Location, tick_ns: int) -> Iterator[Finding]:
+    text = view.get(*place)
+    try:
+        rate = units.parse(text, units.RATE)
+        if rate > 0:
+            units.period_ticks(rate, tick_ns)
+    except BadValue as bad:
+        if bad.problem.startswith("not a whole"):
+            yield Finding(place, bad.problem, text, bad.nearest)
+
+
+def _clients(view: _View) -> Iterator[Finding]:
+    """A client in lockstep has a rate."""
+    for name in view.clients:
+        if view.get("clients", name, "lockstep") is True and view.get("clients", name, "rate") is None:
+            yield Finding(("clients", name, "rate"), "missing key of a client in lockstep", "rate", at="missing")
+
+
+def _deadlines(view: _View) -> Iterator[Finding]:
+    """Who is late is named before it is lost."""
+    try:
+        named_ns = units.parse_ns(view.get("deadlines", "tick_named"))
+        lost_ns = units.parse_ns(view.get("deadlines", "tick_lost"))
+    except BadValue:
+        return
+    if named_ns > lost_ns:
+        yield Finding(("deadlines", "tick_named"), "longer than tick_lost", view.get("deadlines", "tick_named"))
+
+
+def _lines(view: _View) -> Iterator[Finding]:
+    """Figures stay off the side walls, rods span the field, at either end of the stroke."""
+    width, foot, rod = view.length("field", "width"), view.length("rod", "foot", "width"), view.length("rod", "length")
+    for line in view.mapping("table", "lines"):
+        figures = view.get("table", "lines", line, "figures")
+        pitch, stroke = view.length("lines", line, "pitch"), view.length("lines", line, "half_stroke")
+        if width is None or stroke is None:
+            continue
+        location = ("table", "lines", line, "half_stroke")
+        value = view.get(*location)
+        if foot is not None and pitch is not None and isinstance(figures, int) and 1 <= figures <= 11:
+            free = (width - pitch * (figures - 1) - foot) / 2
+            if stroke > free:
+                yield Finding(location, "figures would reach the side wall", value, _millimetres(free))
+        if rod is not None and rod / 2 - stroke < width / 2:
+            yield Finding(location, "the rod would leave the field uncovered", value, _millimetres((rod - width) / 2))
+
+
+def _shapes(view: _View) -> Iterator[Finding]:
+    """The table's lengths describe a table that can be built."""
+    for small, big, what in (
+        (("rod", "inner_radius"), ("rod", "radius"), "not below the rod's radius"),
+        (("rod", "foot_radius"), ("rod", "axis_height"), "the feet would reach the floor: not below rod.axis_height"),
+        (("rod", "figure_com_below_axis"), ("rod", "foot_radius"), "not below rod.foot_radius"),
+        (("goal", "width"), ("field", "width"), "not below the field's width"),
+        (("goal", "height"), ("walls", "height"), "not below the walls' height"),
+        (("ball", "radius"), ("goal", "depth"), "not below the goal's depth: the ball would not fit"),
+    ):
+        least, most = view.length(*small), view.length(*big)
+        if least is not None and most is not None and least >= most:
+            yield Finding(("table", *small), what, view.get("table", *small))
+
+
+def _millimetres(length: Fraction) -> str | None:
+    return None if length <= 0 else f"'{float(length * 1000):g} mm'"

@@ -1,0 +1,153 @@
+"""What pydantic found wrong with a deployment's data, in the words and places of this project.
+
+pydantic says where in the *models* a value failed: that path has union tags and markers for keys in it, which are in
+no file. The path is followed through the JSON Schema of the deployment, which knows what each step is, and which names
+and choices are valid there. Neighbours: deployment.py (the models), deployment_file.py (places in the file).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any, Final
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from foosim.protocol import names
+from foosim.protocol.deployment import deployment_schema
+from foosim.protocol.names import nearest_name
+from foosim.protocol.references import Finding, Location
+
+_NAME = "lower case letters, digits, - and _, a letter first"
+_PATTERNS: Final = {
+    names.NAME_PATTERN: f"not a name ({_NAME})",
+    names.ROBOT_NAME_PATTERN: f"not a robot's name (names joined by dots; {_NAME})",
+    names.SELECTOR_PATTERN: "not a selector (a name, in which * and ? stand for anything)",
+    names.CLASS_PATTERN: "not a class (module:Class)",
+}
+_KINDS: Final = {
+    "string_type": "not a text",
+    "int_type": "not a whole number",
+    "float_type": "not a number",
+    "bool_type": "not true or false",
+    "list_type": "not a list",
+    "dict_type": "not a mapping",
+    "model_type": "not a mapping",
+    "model_attributes_type": "not a mapping",
+}
+_BOOLEANS: Final = {"on": "true", "yes": "true", "off": "false", "no": "false"}
+# pydantic says this of a field whose default depends on another one that is wrong: that one is reported anyway.
+_CONSEQUENCES: Final = frozenset({"default_factory_not_called"})
+
+
+def schema_findings(error: ValidationError) -> list[Finding]:
+    """One finding for each of pydantic's errors."""
+    details = error.errors(include_url=False)
+    return [_finding(detail) for detail in details if detail["type"] not in _CONSEQUENCES]
+
+
+def _finding(detail: ErrorDetails) -> Finding:
+    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
+    location, schema, is_key = _follow(detail["loc"])
+    if kind == "extra_forbidden":
+        return _unknown(location, _follow(detail["loc"][:-1])[1])
+    translate = _TRANSLATIONS.get(kind)
+    if translate is not None:
+        return translate(location, schema, value, context)
+    nearest = context.get("nearest")
+    if kind == "bool_type" and isinstance(value, str):
+        nearest = _BOOLEANS.get(value.lower())
+    what = _PATTERNS.get(context.get("pattern", "")) or _KINDS.get(kind) or _bounds(kind, context) or detail["msg"]
+    return Finding(location, what, location[-1] if is_key else value, nearest, "key" if is_key else "value")
+
+
+def _bounds(kind: str, context: Mapping[str, Any]) -> str | None:
+    match kind:
+        case "greater_than_equal":
+            return f"less than {context['ge']}"
+        case "less_than_equal":
+            return f"more than {context['le']}"
+        case "string_too_long":
+            return f"longer than {context['max_length']} characters"
+        case "too_long":
+            return f"more than {context['max_length']} entries"
+        case "too_short":
+            return "empty"
+    return None
+
+
+def _missing(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
+    return Finding(location, "missing key", location[-1], at="missing")
+
+
+def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
+    key = location[-1]
+    nearest = nearest_name(key, parent.get("properties", ()))
+    return Finding(location, "unknown key", key, None if nearest is None else repr(nearest), "key")
+
+
+def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
+    choices = [str(choice) for choice in schema.get("enum", [schema.get("const")])]
+    return _not_a_choice(location, value, choices)
+
+
+def _tag(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
+    key = str(context["discriminator"]).strip("'")
+    tag = value.get(key) if isinstance(value, dict) else value
+    return _not_a_choice((*location, key), tag, sorted(schema["discriminator"]["mapping"]))
+
+
+def _no_tag(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
+    key = str(context["discriminator"]).strip("'")
+    return Finding((*location, key), "missing key", key, at="missing")
+
+
+def _not_a_choice(location: Location, value: object, choices: Sequence[str]) -> Finding:
+    nearest = nearest_name(value, choices) if isinstance(value, str) else None
+    return Finding(location, f"not one of {', '.join(choices)}", value, None if nearest is None else repr(nearest))
+
+
+_TRANSLATIONS: Final[dict[str, Callable[[Location, Mapping[str, Any], object, Mapping[str, Any]], Finding]]] = {
+    "missing": _missing,
+    "literal_error": _choice,
+    "union_tag_invalid": _tag,
+    "union_tag_not_found": _no_tag,
+}
+
+
+@cache
+def _root() -> Mapping[str, Any]:
+    return deployment_schema()
+
+
+def _follow(path: Sequence[str | int]) -> tuple[Location, Mapping[str, Any], bool]:
+    """The location in the data of a path through the models, its schema, and whether the key there is meant."""
+    location: list[str | int] = []
+    schema = _resolve(_root())
+    for step in path:
+        if step == "[key]":
+            return tuple(location), schema, True
+        if "discriminator" in schema and step in schema["discriminator"]["mapping"]:
+            schema = _resolve({"$ref": schema["discriminator"]["mapping"][step]})
+            continue
+        location.append(step)
+        schema = _child(schema, step)
+    return tuple(location), schema, False
+
+
+def _child(schema: Mapping[str, Any], step: str | int) -> Mapping[str, Any]:
+    if isinstance(step, int):
+        found = schema.get("items", {})
+    else:
+        found = schema.get("properties", {}).get(step, schema.get("additionalProperties"))
+    return _resolve(found if isinstance(found, dict) else {})
+
+
+def _resolve(schema: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The schema itself behind references, and behind `or null` and `or a list of them`."""
+    while True:
+        if "$ref" in schema:
+            schema = _root()["$defs"][schema["$ref"].removeprefix("#/$defs/")]
+        elif "anyOf" in schema:
+            schema = next((s for s in schema["anyOf"] if "$ref" in s or s.get("type") in ("array", "object")), {})
+        else:
+            return schema
