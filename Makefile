@@ -5,9 +5,8 @@
 PACKAGES := client node protocol rehearsal supervisor vhub
 PYTHON := .venv/bin/python
 
-# One worker per core; tests of one group (see tests/conftest.py) stay together. PYTHONPATH of the shell (ROS sets one)
-# would load other people's pytest plugins.
-PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses auto --maxprocesses 8 --dist loadgroup
+# One worker per core. The shell's PYTHONPATH (ROS sets one) would load other people's pytest plugins.
+PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses auto --maxprocesses 8
 
 .PHONY: help up test lint bench clean environment
 
