@@ -44,6 +44,7 @@ SHELLS = {
     "client/client.py",
     "client/main.py",
     "node/main.py",
+    "protocol/deployment_file.py",
     "protocol/inbox.py",
     "protocol/journal.py",
     "protocol/session.py",
