@@ -6,23 +6,25 @@ by references.py. Quantities are strings with units in the file and SI numbers h
 whose names end in `_ns` (see units.py). The table's parameters are in table.py.
 """
 
+import json
 from fnmatch import fnmatchcase
 from fractions import Fraction
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, JsonValue, StringConstraints, TypeAdapter
+from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
 
 from foosim.protocol import limits, names, units
-from foosim.protocol.table import LineName, Part, Table, Team
-from foosim.protocol.units import Pace, PaceField, Quantity, parse_pace, period_ticks
+from foosim.protocol.errors import BadValue
+from foosim.protocol.names import LineName, Team
+from foosim.protocol.references import LINK_RULES_MAX, SELECTORS_MAX
+from foosim.protocol.table import Part, Table
+from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks
 
 __all__ = [
     "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "Jitter", "LinkRule", "Network",
     "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor", "deployment_schema",
-    "parse_pace", "period_ticks",
+    "deployment_schema_text", "parse_pace", "period_ticks",
 ]  # fmt: skip
-
-FORMAT: Final = 1
 
 Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
@@ -36,6 +38,11 @@ Delay = Annotated[int, Quantity(units.TIME, "0 s", "60 s")]
 Spread = Annotated[int, Quantity(units.TIME, "1 ns", "60 s")]
 Deadline = Annotated[int, Quantity(units.TIME, "1 ms", "24 h")]
 Probability = Annotated[float, Quantity(units.PROBABILITY, "0 %", "100 %")]
+
+
+def _default(text: str, alias: str | None = None) -> Any:
+    """A field with a default that is written, checked and documented as in a file."""
+    return Field(default=text, alias=alias, validate_default=True)
 
 
 class RodSensor(Part):
@@ -120,7 +127,7 @@ def _one_or_more(value: object) -> object:
 Selectors = Annotated[
     list[Selector],
     BeforeValidator(_one_or_more, json_schema_input_type=Selector | list[Selector]),
-    Field(min_length=1, max_length=64),
+    Field(min_length=1, max_length=SELECTORS_MAX),
 ]
 
 
@@ -130,9 +137,9 @@ class LinkRule(Part):
     id: Name
     from_: Selectors = Field(alias="from")
     to: Selectors
-    delay_ns: Delay = Field(alias="delay", default=0)
+    delay_ns: Delay = _default("0 s", "delay")
     jitter: Jitter | None = None
-    loss: Probability = 0.0
+    loss: Probability = _default("0 %")
     order: Literal["fifo", "free"] = "fifo"
 
     def matches(self, source: str, destination: str) -> bool:
@@ -145,7 +152,7 @@ class LinkRule(Part):
 class Network(Part):
     """The links between endpoints: the first rule that matches; a pair without one is a perfect link."""
 
-    links: list[LinkRule] = Field(default=[], max_length=1024)
+    links: list[LinkRule] = Field(default=[], max_length=LINK_RULES_MAX)
 
     def rule_for(self, source: str, destination: str) -> LinkRule | None:
         """The first rule that matches the directed pair, or None for a perfect link."""
@@ -155,26 +162,33 @@ class Network(Part):
 class Capture(Part):
     """How much of a run the capture keeps beside its packets, orders and digests."""
 
-    frames_every: Annotated[int, Quantity(units.TICKS, "1 tick", "1000000 ticks")] = 10
-    poses_hz: Rate = Field(alias="poses", default=Fraction(50))
-    flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = Field(alias="flush", default=100_000_000)
+    frames_every: Annotated[int, Quantity(units.TICKS, "1 tick", "1000000 ticks")] = _default("10 ticks")
+    poses_hz: Rate = _default("50 Hz", "poses")
+    flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = _default("100 ms", "flush")
 
 
 class Deadlines(Part):
     """How long the run waits for whom, in wall time."""
 
-    heartbeat_ns: Deadline = Field(alias="heartbeat", default=1_000_000_000)
-    tick_named_ns: Deadline = Field(alias="tick_named", default=500_000_000)
-    tick_lost_ns: Deadline = Field(alias="tick_lost", default=1_000_000_000)
-    lockstep_fast_ns: Deadline = Field(alias="lockstep_fast", default=10_000_000_000)
-    lockstep_realtime_ns: Deadline = Field(alias="lockstep_realtime", default=1_000_000_000)
-    start_ns: Deadline = Field(alias="start", default=60_000_000_000)
+    heartbeat_ns: Deadline = _default("1 s", "heartbeat")
+    tick_named_ns: Deadline = _default("500 ms", "tick_named")
+    tick_lost_ns: Deadline = _default("1 s", "tick_lost")
+    lockstep_fast_ns: Deadline = _default("10 s", "lockstep_fast")
+    lockstep_realtime_ns: Deadline = _default("1 s", "lockstep_realtime")
+    start_ns: Deadline = _default("60 s", "start")
+
+
+def _int_only(value: object) -> object:
+    """Literal[1] alone would take `true` and `1.0` for 1."""
+    if type(value) is not int:
+        raise custom_error(BadValue("not one of 1", value))
+    return value
 
 
 class Deployment(Part):
     """A whole run: the world, who computes it, who plays in it, what lies between, and how it is recorded."""
 
-    format: Literal[1]
+    format: Annotated[Literal[1], BeforeValidator(_int_only, json_schema_input_type=Literal[1])]
     world: Name
     seed: Annotated[int, Field(ge=0, le=limits.COUNTER_MAX)]
     tick_ns: Annotated[int, Quantity(units.TIME, "0.1 ms", "100 ms")] = Field(alias="tick")
@@ -187,9 +201,9 @@ class Deployment(Part):
     nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)
     players: dict[Name, Player] = Field(default={}, max_length=limits.CLIENTS_MAX)
     clients: dict[Name, ClientSpec] = Field(default={}, max_length=limits.CLIENTS_MAX)
-    network: Network = Network()
-    capture: Capture = Capture()
-    deadlines: Deadlines = Deadlines()
+    network: Network = Field(default_factory=Network)
+    capture: Capture = Field(default_factory=Capture)
+    deadlines: Deadlines = Field(default_factory=Deadlines)
 
     def endpoints(self) -> list[str]:
         """The names that packets go from and to, sorted: robots, players and clients."""
@@ -206,6 +220,11 @@ class Deployment(Part):
 
 
 def deployment_schema() -> dict[str, Any]:
-    """The JSON Schema of a deployment file, for editors and for people."""
-    schema = TypeAdapter(Deployment).json_schema(by_alias=True, mode="validation")
+    """The JSON Schema of a deployment file, for editors and for people; deploy/deployment.schema.json is its text."""
+    schema = Deployment.model_json_schema(by_alias=True, mode="validation")
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "foosim deployment"}
+
+
+def deployment_schema_text() -> str:
+    """What deploy/deployment.schema.json holds."""
+    return json.dumps(deployment_schema(), indent=2) + "\n"

@@ -9,14 +9,17 @@ that is `file:line:column: what, value, nearest valid name`, in the order of the
 line are placed in the same tree first: settings.py.
 """
 
+import re
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
+from typing import Final
 
 from pydantic import ValidationError
 
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import DeploymentError, describe
+from foosim.protocol.errors import DeploymentError, describe, show
 from foosim.protocol.references import Finding, Location, check_references
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.settings import place_sets
@@ -34,6 +37,11 @@ from foosim.protocol.yaml_tree import (
     read_tree,
     write_yaml,
 )
+
+PROBLEMS_MAX: Final = 100
+"""How many problems are looked for and shown: a hostile file may hold many thousands, each with names to compare."""
+
+_PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
 
 
 def load_deployment(text: str, name: str) -> Deployment:
@@ -87,15 +95,23 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
     found = list(problems)
     if tree is not None:
         data = plain(tree)
-        findings = check_references(data)
+        findings = list(islice(check_references(data), PROBLEMS_MAX + 1))
         try:
             deployment = Deployment.model_validate(data)
         except ValidationError as error:
-            findings += schema_findings(error)
+            findings += islice(schema_findings(error), PROBLEMS_MAX + 1)
         found += [_problem(tree, finding) for finding in findings]
     if found or deployment is None:
-        raise DeploymentError([str(problem) for problem in sorted(set(found))])
+        raise DeploymentError(_report(found))
     return deployment
+
+
+def _report(found: Sequence[Problem]) -> list[str]:
+    """The problems in the order of the file, each once, bounded."""
+    lines = [str(problem) for problem in sorted(set(found))]
+    if len(lines) <= PROBLEMS_MAX:
+        return lines
+    return [*lines[:PROBLEMS_MAX], f"and more: only the first {PROBLEMS_MAX} problems are shown"]
 
 
 def _problem(tree: Tree, finding: Finding) -> Problem:
@@ -109,7 +125,11 @@ def _path(location: Location) -> str:
     """`nodes.red.robots[1]`."""
     text = ""
     for step in location:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+        if isinstance(step, int):
+            text += f"[{step}]"
+        else:
+            name = step if _PLAIN_KEY.fullmatch(step) else show(step)
+            text += f".{name}" if text else name
     return text
 
 

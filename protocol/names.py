@@ -6,7 +6,7 @@ Names end up in file names, keys of the wire, captures and terminals: so they ar
 import difflib
 import re
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, Literal
 
 from foosim.protocol.limits import NAME_LENGTH_MAX
 
@@ -17,6 +17,11 @@ ROBOT_NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*(\.[a-z0-9_-]+)*$"
 SELECTOR_PATTERN: Final = r"^[a-z0-9_.*?-]+$"
 CLASS_PATTERN: Final = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$"
 
+LineName = Literal["goal", "defence", "midfield", "attack"]
+LINE_NAMES: Final[tuple[LineName, ...]] = ("goal", "defence", "midfield", "attack")
+Team = Literal["red", "blue"]
+TEAMS: Final[tuple[Team, ...]] = ("red", "blue")
+
 # The entities of the world that are no robots, and the processes that are neither node nor player: no robot may be
 # called like the first, no node, player or client like the second.
 ENTITY_NAMES_RESERVED: Final = ("ball", "world")
@@ -26,7 +31,11 @@ CHANNEL_ECHO: Final = "echo"
 CHANNEL_POSITION: Final = "position"
 CHANNEL_NAMES_RESERVED: Final = (CHANNEL_ECHO, CHANNEL_POSITION)
 
+SIMILAR: Final = 0.6
+"""From here on two texts are alike: 0 is nothing in common, 1 is equal but for capitals."""
+
 _NAME = re.compile(NAME_PATTERN)
+_SELECTOR = re.compile(SELECTOR_PATTERN)
 _ROBOT_NAME = re.compile(ROBOT_NAME_PATTERN)
 
 
@@ -40,12 +49,20 @@ def is_robot_name(text: str) -> bool:
     return len(text) <= NAME_LENGTH_MAX and _ROBOT_NAME.fullmatch(text) is not None
 
 
-def nearest_name(value: object, choices: Iterable[str]) -> str | None:
+def is_selector(text: str) -> bool:
+    """True for what may select endpoints: a name in which * and ? stand for anything."""
+    return len(text) <= SELECTOR_LENGTH_MAX and _SELECTOR.fullmatch(text) is not None
+
+
+def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR) -> str | None:
     """The choice that looks most like the value, the first by name among equals; None when none does."""
-    ordered = sorted(set(choices))
     text = str(value)[: 2 * SELECTOR_LENGTH_MAX]
-    for candidate in (text, text.lower()):
-        close = difflib.get_close_matches(candidate, ordered, n=1, cutoff=0.5)
-        if close:
-            return close[0]
-    return None
+    best, best_ratio = None, 0.0
+    matcher = difflib.SequenceMatcher(autojunk=False)
+    matcher.set_seq2(text.lower())
+    for choice in sorted(set(choices)):
+        matcher.set_seq1(choice.lower())
+        bound = min(matcher.real_quick_ratio(), matcher.quick_ratio())
+        if bound >= similar and bound > best_ratio and (ratio := matcher.ratio()) >= similar and ratio > best_ratio:
+            best, best_ratio = choice, ratio
+    return best

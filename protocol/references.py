@@ -9,13 +9,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
-from foosim.protocol.names import nearest_name
+from foosim.protocol.names import LINE_NAMES, nearest_name
 
 Location = tuple[str | int, ...]
+
+# Bounds of what is looked at; what is beyond them, the schema refuses.
+TEXTS_MAX: Final = 4096
+LINK_RULES_MAX: Final = 512
+SELECTORS_MAX: Final = 16
+"""Selectors on one side of a link rule."""
+JITTER_RATIO_MAX: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +36,11 @@ class Finding:
     at: Literal["value", "key", "missing"] = "value"
 
 
-def check_references(data: object) -> list[Finding]:
-    """All problems between the parts of a deployment's plain data."""
+def check_references(data: object) -> Iterator[Finding]:
+    """All problems between the parts of a deployment's plain data, found as they are asked for."""
     view = _View(data)
-    checks = (_names, _robots, _nodes, _players, _links, _rates, _clients, _deadlines, _lines, _shapes)
-    return [finding for check in checks for finding in check(view)]
+    for check in (_names, _robots, _nodes, _players, _links, _rates, _clients, _deadlines, _lines, _shapes):
+        yield from check(view)
 
 
 def _quoted(nearest: str | None) -> str | None:
@@ -69,7 +76,7 @@ class _View:
         """The texts of a list, or the single text that may stand for it, with their indices."""
         value = self.get(*path)
         items = value if isinstance(value, list) else [value]
-        return [(index, item) for index, item in enumerate(items) if isinstance(item, str)]
+        return [(index, item) for index, item in enumerate(items[:TEXTS_MAX]) if isinstance(item, str)]
 
     def length(self, *path: str) -> Fraction | None:
         """A length in metres, exact; None if it is not one."""
@@ -89,23 +96,26 @@ def _names(view: _View) -> Iterator[Finding]:
     """Endpoints, and the processes that a run starts, have names of their own."""
     endpoints: dict[str, str] = {}
     processes: dict[str, str] = {}
-    for section in ("robots", "nodes", "players", "clients"):
-        reserved = names.ENTITY_NAMES_RESERVED if section == "robots" else names.PROCESS_NAMES_RESERVED
-        taken = [scope for scope, member in ((endpoints, section != "nodes"), (processes, section != "robots")) if member]
+    for section, scopes, reserved in (
+        ("robots", (endpoints,), names.ENTITY_NAMES_RESERVED),
+        ("nodes", (processes,), names.PROCESS_NAMES_RESERVED),
+        ("players", (endpoints, processes), names.PROCESS_NAMES_RESERVED),
+        ("clients", (endpoints, processes), names.PROCESS_NAMES_RESERVED),
+    ):
         for name in view.mapping(section):
             if name in reserved:
                 yield Finding((section, name), "a reserved name", name, at="key")
-            other = next((scope[name] for scope in taken if name in scope), None)
+            other = next((scope[name] for scope in scopes if name in scope), None)
             if other is not None:
                 yield Finding((section, name), f"a name that is also one of {other}", name, at="key")
-            for scope in taken:
+            for scope in scopes:
                 scope.setdefault(name, section)
 
 
 def _robots(view: _View) -> Iterator[Finding]:
     """Lines exist and have one rod a team; channels are not called like built-in ones."""
     rods: dict[tuple[str, str], str] = {}
-    lines = view.mapping("table", "lines")
+    lines = view.get("table", "lines")
     for name in view.robots:
         for channel in view.mapping("robots", name, "sensors"):
             if channel in names.CHANNEL_NAMES_RESERVED:
@@ -113,7 +123,7 @@ def _robots(view: _View) -> Iterator[Finding]:
         team, line = view.get("robots", name, "team"), view.get("robots", name, "line")
         if not (isinstance(team, str) and isinstance(line, str)):
             continue
-        if lines and line not in lines:
+        if line in LINE_NAMES and isinstance(lines, dict) and line not in lines:
             yield Finding(("robots", name, "line"), "not in table.lines", line, _quoted(nearest_name(line, lines)))
         first = rods.setdefault((team, line), name)
         if first != name:
@@ -123,13 +133,18 @@ def _robots(view: _View) -> Iterator[Finding]:
 def _nodes(view: _View) -> Iterator[Finding]:
     """Every robot has exactly one owner."""
     owner: dict[str, str] = {}
+    if not view.robots:
+        return
     for node in view.nodes:
         for index, robot in view.texts("nodes", node, "robots"):
             location = ("nodes", node, "robots", index)
             if robot not in view.robots:
                 yield Finding(location, "unknown robot", robot, _quoted(nearest_name(robot, view.robots)))
             elif robot in owner:
-                yield Finding(location, f"a robot with two owners, also of node {owner[robot]}", robot)
+                what = (
+                    "listed twice" if owner[robot] == node else f"a robot with two owners, also of node {owner[robot]}"
+                )
+                yield Finding(location, what, robot)
             owner.setdefault(robot, node)
     for robot in view.robots:
         if robot not in owner and view.nodes:
@@ -138,13 +153,16 @@ def _nodes(view: _View) -> Iterator[Finding]:
 
 def _players(view: _View) -> Iterator[Finding]:
     """Players name robots that exist, and channels that those have."""
-    for player in view.players:
+    for player in view.players if view.robots else ():
         for robot in view.mapping("players", player, "robots"):
             location: Location = ("players", player, "robots", robot)
             if robot not in view.robots:
                 yield Finding(location, "unknown robot", robot, _quoted(nearest_name(robot, view.robots)), at="key")
                 continue
-            channels = [*view.mapping("robots", robot, "sensors"), names.CHANNEL_ECHO]
+            sensors = view.get("robots", robot, "sensors")
+            if not isinstance(sensors, dict):
+                continue
+            channels = [*sensors, names.CHANNEL_ECHO]
             seen = set()
             for index, channel in view.texts(*location):
                 if channel not in channels:
@@ -159,17 +177,29 @@ def _links(view: _View) -> Iterator[Finding]:
     """Every selector matches an endpoint; rules have names of their own."""
     endpoints = [*view.robots, *view.players, *view.clients]
     seen: dict[str, int] = {}
-    links = view.get("network", "links")
-    for number in range(len(links) if isinstance(links, list) else 0):
+    links = view.get("network", "links") if view.robots else None
+    for number in range(min(len(links), LINK_RULES_MAX) if isinstance(links, list) else 0):
         location: Location = ("network", "links", number)
         name = view.get(*location, "id")
         if isinstance(name, str) and seen.setdefault(name, number) != number:
             yield Finding((*location, "id"), f"a name that is also links[{seen[name]}]'s", name)
         for side in ("from", "to"):
             for index, glob in view.texts(*location, side):
-                if not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
+                if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
                     nearest = _quoted(nearest_name(glob, endpoints))
                     yield Finding((*location, side, index), "a selector that matches no endpoint", glob, nearest)
+        yield from _jitter(view, (*location, "jitter"))
+
+
+def _jitter(view: _View, location: Location) -> Iterator[Finding]:
+    """The spread of a gamma jitter fits its mean: else nearly all of it is 0, or nearly none of it is spread."""
+    try:
+        mean_ns, sd_ns = (units.parse_ns(view.get(*location, key)) for key in ("mean", "sd"))
+    except BadValue:
+        return
+    if not mean_ns <= JITTER_RATIO_MAX * sd_ns <= JITTER_RATIO_MAX * 3 * mean_ns:
+        what = f"not between 1/{JITTER_RATIO_MAX} of the mean and 3 times the mean"
+        yield Finding((*location, "sd"), what, view.get(*location, "sd"))
 
 
 def _rates(view: _View) -> Iterator[Finding]:

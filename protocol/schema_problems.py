@@ -5,7 +5,8 @@ no file. The path is followed through the JSON Schema of the deployment, which k
 and choices are valid there. Neighbours: deployment.py (the models), deployment_file.py (places in the file).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any, Final
 
@@ -39,10 +40,10 @@ _BOOLEANS: Final = {"on": "true", "yes": "true", "off": "false", "no": "false"}
 _CONSEQUENCES: Final = frozenset({"default_factory_not_called"})
 
 
-def schema_findings(error: ValidationError) -> list[Finding]:
-    """One finding for each of pydantic's errors."""
+def schema_findings(error: ValidationError) -> Iterator[Finding]:
+    """One finding for each of pydantic's errors, worked out as they are asked for."""
     details = error.errors(include_url=False)
-    return [_finding(detail) for detail in details if detail["type"] not in _CONSEQUENCES]
+    return (_finding(detail) for detail in details if detail["type"] not in _CONSEQUENCES)
 
 
 def _finding(detail: ErrorDetails) -> Finding:
@@ -86,8 +87,10 @@ def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
 
 
 def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
-    choices = [str(choice) for choice in schema.get("enum", [schema.get("const")])]
-    return _not_a_choice(location, value, choices)
+    choices = schema.get("enum", [schema.get("const")])
+    finding = _not_a_choice(location, value, [str(choice) for choice in choices])
+    # A choice that is no text is not written in quotes.
+    return finding if isinstance(choices[0], str) else replace(finding, nearest=None)
 
 
 def _tag(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
@@ -138,7 +141,8 @@ def _child(schema: Mapping[str, Any], step: str | int) -> Mapping[str, Any]:
     if isinstance(step, int):
         found = schema.get("items", {})
     else:
-        found = schema.get("properties", {}).get(step, schema.get("additionalProperties"))
+        named, patterns = schema.get("properties", {}), schema.get("patternProperties", {})
+        found = named.get(step) or next(iter(patterns.values()), schema.get("additionalProperties"))
     return _resolve(found if isinstance(found, dict) else {})
 
 

@@ -2,25 +2,24 @@
 
 The path is made of keys joined by dots, as messages print it: `robots.red.goal.sensors.encoder.rate`. Where names hold
 dots themselves, the longest key that fits is meant; a new one is written in double quotes. An entry of a list is named
-by its number or its `id`. The value is YAML. Settings apply in order; what they hold is placed at `--set:N:COLUMN`, N
-counting settings from 1. Neighbours: deployment_file.py checks the tree that results.
+by its number, `[0]` or `.0`, or by its `id`. The value is YAML. Settings apply in order; what they hold is placed at
+`--set:N:COLUMN`, N counting settings from 1. Neighbours: deployment_file.py checks the tree that results.
 """
 
 import re
 from collections.abc import Sequence
 from typing import Final
 
-import yaml
-
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import describe, show
 from foosim.protocol.names import nearest_name
-from foosim.protocol.yaml_tree import Fields, Items, Leaf, Locate, Place, Problem, Tree, read_tree
+from foosim.protocol.yaml_tree import Fields, Items, Leaf, Place, Problem, Tree, read_tree
 
 SETS_MAX: Final = 256
 SET_LENGTH_MAX: Final = 4096
 
-_STEP = re.compile(r'"([^"]*)"|([^".=\[\]]+)')
+_STEP = re.compile(r'(?:"(?P<quoted>[^"]*)"|(?P<plain>[^".=\[\]]+))')
+_INDEX = re.compile(r"\[(?P<index>[0-9]+)\]")
 
 
 class _Misplaced(Exception):
@@ -60,8 +59,10 @@ def _read_path(text: str) -> tuple[list[tuple[str, int]], int]:
     steps = []
     index = 0
     while (match := _STEP.match(text, index)) is not None:
-        steps.append((match[1] if match[2] is None else match[2], index + 1))
-        index = match.end()
+        while match is not None:
+            steps.append((next(part for part in match.groups() if part is not None), index + 1))
+            index = match.end()
+            match = _INDEX.match(text, index)
         if text[index : index + 1] == "=":
             return steps, index + 1
         if text[index : index + 1] != ".":
@@ -71,8 +72,8 @@ def _read_path(text: str) -> tuple[list[tuple[str, int]], int]:
 
 
 def _read_value(text: str, start: int, number: int) -> tuple[Tree | None, list[Problem]]:
-    def locate(mark: yaml.Mark) -> Place:
-        return _place(number, start + mark.index + 1)
+    def locate(index: int, line: int, column: int) -> Place:
+        return _place(number, start + index + 1)
 
     value = text[start:]
     if not value.strip():
@@ -121,8 +122,11 @@ def _open(tree: Tree, node: Fields, key: str, steps: Sequence[tuple[str, int]], 
         node.keys[key] = _place(number, steps[index][1])
         node.values[key] = Fields(_place(number, steps[index][1]))
         return
-    near = [".".join(step for step, _ in steps[index:stop]) for stop in range(len(steps) - 1, index, -1)]
-    nearest = next((found for name in near if (found := nearest_name(name, node.values)) is not None), None)
+    nearest = None
+    for stop in range(len(steps) - 1, index, -1):
+        name = ".".join(step for step, _ in steps[index:stop])
+        if nearest is None and (nearest := nearest_name(name, node.values)) is not None:
+            key = name
     path = ".".join(step for step, _ in steps[:index])
     text = describe("unknown key", key, None if nearest is None else repr(nearest))
     raise _Misplaced(steps[index][1], f"{path}: {text}" if path else text)
@@ -132,7 +136,7 @@ def _entry(node: Items, step: str, column: int) -> int:
     """The index of a list's entry, from its number or its id."""
     if step.isascii() and step.isdigit() and len(step) < 6 and int(step) < len(node.items):
         return int(step)
-    ids = {}
+    ids: dict[str, int] = {}
     for index, item in enumerate(node.items):
         name = item.values.get("id") if isinstance(item, Fields) else None
         if isinstance(name, Leaf) and isinstance(name.value, str):

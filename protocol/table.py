@@ -5,17 +5,13 @@ the middle. Every value is in SI units here. Where a number comes from stands be
 Neighbours: deployment.py, which holds one `Table`; the engines and `scene`, which build the world from it.
 """
 
-from typing import Annotated, Final, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from foosim.protocol import units
+from foosim.protocol.names import LineName
 from foosim.protocol.units import Quantity
-
-LineName = Literal["goal", "defence", "midfield", "attack"]
-LINE_NAMES: Final[tuple[LineName, ...]] = ("goal", "defence", "midfield", "attack")
-Team = Literal["red", "blue"]
-TEAMS: Final[tuple[Team, ...]] = ("red", "blue")
 
 Gravity = Annotated[float, Quantity(units.ACCELERATION, "0 m/s2", "100 m/s2")]
 Length = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "10 m")]
@@ -93,7 +89,7 @@ class Surfaces(Part):
 
 
 class Ball(Part):
-    """A solid sphere. Its speed limit bounds how far it can get in a tick: no actuator's limit, a promise of the model."""
+    """A solid sphere. Its speed limit, a promise of the model, bounds how far it can get in a tick."""
 
     radius: Length
     mass: Mass

@@ -26,6 +26,8 @@ NS_PER_S: Final = 1_000_000_000
 _NUMBER: Final = r"[+-]?[0-9]{1,18}(?:\.[0-9]{1,30})?(?:[eE][+-]?[0-9]{1,2})?"
 _RATIO: Final = r"[0-9]{1,18}/[1-9][0-9]{0,17}"
 _QUANTITY = re.compile(rf"({_NUMBER}|{_RATIO}) *([^0-9 .+-].*)?")
+# Signs that people write in units, and what stands for them here.
+_SIGNS: Final = str.maketrans({"^": "", "\u00b2": "2", "\u00b0": "deg", "\u00b7": " ", "*": " ", "\u00b5": "u"})
 _DEGREE: Final = Fraction(math.pi) / 180
 
 
@@ -42,8 +44,16 @@ class Dimension:
         """The unit whose size is 1: the one that values are shown in."""
         return next(unit for unit, size in self.units.items() if size == 1)
 
-    def example(self) -> str:
+    @property
+    def form(self) -> str:
+        """How a quantity is written."""
         return f"a number and one of {', '.join(self.units)}"
+
+    @property
+    def refusal(self) -> str:
+        """What is wrong with a text that is none."""
+        article = "an" if self.name[0] in "aeiou" else "a"
+        return f"not {article} {self.name} ({self.form})"
 
 
 def _sizes(**units: str) -> dict[str, Fraction]:
@@ -57,9 +67,7 @@ LENGTH: Final = Dimension("length", _sizes(m="1", cm="1e-2", mm="1e-3", um="1e-6
 MASS: Final = Dimension("mass", _sizes(kg="1", g="1e-3", mg="1e-6"))
 ANGLE: Final = Dimension("angle", {"rad": Fraction(1), "mrad": Fraction(1, 1000), "deg": _DEGREE})
 SPEED: Final = Dimension("speed", {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "km/h": Fraction(5, 18)})
-SPIN: Final = Dimension(
-    "rotational speed", {"rad/s": Fraction(1), "deg/s": _DEGREE, "rpm": Fraction(math.pi) / 30}
-)
+SPIN: Final = Dimension("rotational speed", {"rad/s": Fraction(1), "deg/s": _DEGREE, "rpm": Fraction(math.pi) / 30})
 ACCELERATION: Final = Dimension("acceleration", {"m/s2": Fraction(1), "mm/s2": Fraction(1, 1000)})
 FORCE: Final = Dimension("force", _sizes(N="1", mN="1e-3", kN="1e3"))
 TORQUE: Final = Dimension("torque", {"N m": Fraction(1), "mN m": Fraction(1, 1000)})
@@ -70,23 +78,30 @@ PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1
 def parse(text: object, dimension: Dimension) -> Fraction:
     """The quantity in the dimension's base unit, exact; raises BadValue."""
     if not isinstance(text, str):
-        raise BadValue(f"a {dimension.name} is {dimension.example()}", text)
+        raise BadValue(dimension.refusal, text)
     match = _QUANTITY.fullmatch(text.strip(" "))
     if match is None or ("/" in match[1] and dimension.kind != "fraction"):
-        raise BadValue(f"a {dimension.name} is {dimension.example()}", text)
+        raise BadValue(dimension.refusal, text)
     number, unit = match[1], match[2]
     if unit not in dimension.units:
-        close = None if unit is None else nearest_name(unit, dimension.units)
+        close = None if unit is None else _nearest_unit(unit, dimension)
         nearest = None if close is None else repr(f"{number} {close}")
-        raise BadValue(f"a {dimension.name} is {dimension.example()}", text, nearest)
+        raise BadValue(dimension.refusal, text, nearest)
     return Fraction(number) * dimension.units[unit]
+
+
+def _nearest_unit(unit: str, dimension: Dimension) -> str | None:
+    """The unit that was probably meant: one of equal length first, so that `ms` for a length suggests `mm`."""
+    plain = unit[:32].translate(_SIGNS)
+    equal = [candidate for candidate in dimension.units if len(candidate) == len(plain)]
+    return nearest_name(plain, equal, 0.5) or nearest_name(plain, dimension.units, 0.5)
 
 
 def parse_ns(text: object) -> int:
     """A time (`20s`, `2 ms`) in integer nanoseconds, at least 0; raises BadValue."""
     value = parse(text, TIME)
     if value.denominator != 1 or value < 0:
-        raise BadValue("a time is a whole number of nanoseconds, at least 0", text)
+        raise BadValue("not a whole number of ns, at least 0", text)
     return int(value)
 
 
@@ -147,15 +162,19 @@ _FACTOR = re.compile(rf"({_NUMBER}|{_RATIO})x")
 
 def parse_pace(text: object) -> Pace:
     """`realtime`, `fast`, or a multiple of the wall clock such as `2x` and `0.5x`; raises BadValue."""
-    if text == "realtime" or text == "fast":
-        return Pace(text)
+    if text == "fast":
+        return Pace("fast")
+    if text == "realtime":
+        return Pace("realtime")
     match = _FACTOR.fullmatch(text) if isinstance(text, str) else None
     if match is None:
         close = nearest_name(text, ("realtime", "fast"))
-        raise BadValue("a pace is realtime, fast or a factor such as 2x", text, None if close is None else repr(close))
+        raise BadValue(
+            "not a pace (realtime, fast or a factor such as 2x)", text, None if close is None else repr(close)
+        )
     factor = Fraction(match[1])
     if not PACE_FACTOR_MIN <= factor <= PACE_FACTOR_MAX:
-        raise BadValue(f"a pace is from {float(PACE_FACTOR_MIN)}x to {PACE_FACTOR_MAX}x", text)
+        raise BadValue(f"out of range {float(PACE_FACTOR_MIN)}x to {PACE_FACTOR_MAX}x", text)
     return Pace("realtime", factor)
 
 
@@ -183,7 +202,7 @@ class Quantity:
         if dimension.kind == "float":
             return float(exact)
         if exact.denominator != 1:
-            raise custom_error(BadValue(f"a {dimension.name} is a whole number of {dimension.base}", value))
+            raise custom_error(BadValue(f"not a whole number of {dimension.base}", value))
         return int(exact)
 
     def write(self, value: float | int | Fraction) -> str:
@@ -206,7 +225,7 @@ class Quantity:
         return {
             "type": "string",
             "pattern": f"^{number} *({units})$".replace("(?:", "("),
-            "description": f"{self.dimension.name}, {self.low} to {self.high}: {self.dimension.example()}",
+            "description": f"{self.dimension.name}, {self.low} to {self.high}: {self.dimension.form}",
         }
 
 

@@ -53,12 +53,15 @@ class Problem:
         return f"{self.place}: {self.text}"
 
 
+Scalar = bool | int | float | str | None
+
+
 @dataclass(slots=True)
 class Leaf:
-    """A scalar: None, bool, int, float or str."""
+    """A scalar."""
 
     place: Place
-    value: None | bool | int | float | str
+    value: Scalar
 
 
 @dataclass(slots=True)
@@ -79,7 +82,9 @@ class Fields:
 
 
 Tree = Leaf | Items | Fields
-Locate = Callable[[yaml.Mark], Place]
+
+Locate = Callable[[int, int, int], Place]
+"""From what PyYAML counts from 0, the index in the text, the line and the column, to a place."""
 
 
 class _Stop(Exception):
@@ -88,7 +93,7 @@ class _Stop(Exception):
 
 def locate_in(file: str) -> Locate:
     """Places in a file of that name."""
-    return lambda mark: Place(0, mark.line + 1, mark.column + 1, file)
+    return lambda index, line, column: Place(0, line + 1, column + 1, file)
 
 
 def read_tree(text: str, locate: Locate) -> tuple[Tree | None, list[Problem]]:
@@ -110,106 +115,103 @@ class _Reader:
         self.problems: list[Problem] = []
         self._locate = locate
         self._stack: list[Items | Fields] = []
-        # For each open mapping the key whose value comes next; None when a key comes next. "" keeps sequences even.
+        # For each open collection the key whose value comes next: None where a key comes next, and in sequences.
         self._keys: list[tuple[str, Place] | None] = []
         self._nodes = 0
         self._documents = 0
         self._harmless = True
 
     def read(self, text: str) -> bool:
-        start = yaml.Mark("", 0, 0, 0, None, None)
         size = len(text.encode("utf-8", "surrogatepass"))
-        if size > limits.DEPLOYMENT_BYTES_MAX:
-            self._refuse(start, f"more than {limits.DEPLOYMENT_BYTES_MAX} bytes", size)
-            return False
         try:
-            self._read_events(text, start)
+            if size > limits.DEPLOYMENT_BYTES_MAX:
+                raise self._stop(self._locate(0, 0, 0), f"more than {limits.DEPLOYMENT_BYTES_MAX} bytes", size)
+            self._read_events(text)
         except _Stop:
             return False
         if self._documents == 0:
-            self._refuse(start, "no YAML document", text[:40])
+            self._refuse(self._locate(0, 0, 0), "no YAML document", text[:40])
         return self._harmless
 
-    def _read_events(self, text: str, start: yaml.Mark) -> None:
+    def _read_events(self, text: str) -> None:
         try:
             loader = yaml.SafeLoader(text)
         except yaml.reader.ReaderError as error:
-            mark = _mark_at(text, error.position)
-            raise self._stop(mark, "a character that YAML does not allow", chr(int(error.character))) from None
+            before = text[: error.position]
+            line_start = before.rfind("\n") + 1
+            place = self._locate(len(before), before.count("\n"), len(before) - line_start)
+            raise self._stop(place, "a character that YAML does not allow", text[error.position]) from None
         try:
             while loader.check_event():
-                self._take(loader.get_event())
+                self._take(loader.get_event())  # type: ignore[no-untyped-call]
         except yaml.MarkedYAMLError as error:
             what = ", ".join(part for part in (error.problem, error.context) if part)
-            self.problems.append(Problem(self._locate(error.problem_mark or start), f"not valid YAML, {what}"))
+            self.problems.append(Problem(self._at(error.problem_mark), f"not valid YAML, {what}"))
             raise _Stop from None
         except (ValueError, OverflowError):
-            # PyYAML's scanner does not catch what chr() and int() say to absurd escapes and versions.
-            raise self._stop(loader.get_mark(), "not valid YAML", "a number out of range") from None
+            # PyYAML's scanner passes absurd escapes and versions to chr() and int(), and their errors on.
+            raise self._stop(self._at(loader.get_mark()), "not valid YAML", "a number out of range") from None
         finally:
             loader.dispose()
 
+    def _at(self, mark: Any) -> Place:
+        return self._locate(0, 0, 0) if mark is None else self._locate(mark.index, mark.line, mark.column)
+
     def _take(self, event: yaml.Event) -> None:
+        place = self._at(event.start_mark)
         if isinstance(event, yaml.DocumentStartEvent):
             self._documents += 1
             if self._documents > 1:
-                raise self._stop(event.start_mark, "more than one YAML document", "---")
+                raise self._stop(place, "more than one YAML document", "---")
         elif isinstance(event, yaml.AliasEvent):
-            self._count(event.start_mark)
-            self._refuse(event.start_mark, "aliases are refused (a text that begins with * needs quotes)", f"*{event.anchor}")
-            self._add(Leaf(self._locate(event.start_mark), None), event.start_mark)
+            self._count(place)
+            self._refuse(place, _refused("aliases", "*"), f"*{event.anchor}")
+            self._add(Leaf(place, None))
         elif isinstance(event, yaml.ScalarEvent):
-            self._open(event)
-            self._scalar(event)
+            self._open(event, place)
+            self._scalar(event, place)
         elif isinstance(event, yaml.CollectionStartEvent):
-            self._open(event)
-            place = self._locate(event.start_mark)
+            self._open(event, place)
             node = Items(place) if isinstance(event, yaml.SequenceStartEvent) else Fields(place)
-            self._add(node, event.start_mark)
+            self._add(node)
             self._stack.append(node)
             self._keys.append(None)
             if len(self._stack) > DEPTH_MAX:
-                raise self._stop(event.start_mark, f"nested more than {DEPTH_MAX} deep", len(self._stack))
+                raise self._stop(place, f"nested more than {DEPTH_MAX} deep", len(self._stack))
         elif isinstance(event, yaml.CollectionEndEvent):
             self._stack.pop()
             self._keys.pop()
 
-    def _open(self, event: yaml.ScalarEvent | yaml.CollectionStartEvent) -> None:
-        self._count(event.start_mark)
+    def _open(self, event: yaml.ScalarEvent | yaml.CollectionStartEvent, place: Place) -> None:
+        self._count(place)
         if event.anchor is not None:
-            self._refuse(event.start_mark, "anchors are refused (a text that begins with & needs quotes)", f"&{event.anchor}")
+            self._refuse(place, _refused("anchors", "&"), f"&{event.anchor}")
         if event.tag is not None:
-            self._refuse(event.start_mark, "tags are refused (a text that begins with ! needs quotes)", event.tag)
+            self._refuse(place, _refused("tags", "!"), event.tag)
 
-    def _count(self, mark: yaml.Mark) -> None:
+    def _count(self, place: Place) -> None:
         self._nodes += 1
         if self._nodes > NODES_MAX:
-            raise self._stop(mark, f"more than {NODES_MAX} nodes", self._nodes)
+            raise self._stop(place, f"more than {NODES_MAX} nodes", self._nodes)
 
-    def _scalar(self, event: yaml.ScalarEvent) -> None:
-        mark, text = event.start_mark, event.value
+    def _scalar(self, event: yaml.ScalarEvent, place: Place) -> None:
+        text = event.value
         if any("\ud800" <= character <= "\udfff" for character in text):
-            self._refuse(mark, "half a character (a lone surrogate)", text)
-        if self._expects_key():
-            self._key(event)
+            self._refuse(place, "half a character (a lone surrogate)", text)
+        if self._stack and isinstance(self._stack[-1], Fields) and self._keys[-1] is None:
+            if text == "<<" and event.implicit[0]:
+                self._refuse(place, "merge keys are refused", text)
+            self._keys[-1] = (text, place)
             return
-        value: None | bool | int | float | str = text
+        value: Scalar = text
         if event.implicit[0] and event.tag is None:
             try:
                 value = resolve(text)
             except ValueError as error:
-                self._refuse(mark, str(error), text)
-        self._add(Leaf(self._locate(mark), value), mark)
+                self._refuse(place, str(error), text)
+        self._add(Leaf(place, value))
 
-    def _expects_key(self) -> bool:
-        return bool(self._stack) and isinstance(self._stack[-1], Fields) and self._keys[-1] is None
-
-    def _key(self, event: yaml.ScalarEvent) -> None:
-        if event.value == "<<" and event.implicit[0]:
-            self._refuse(event.start_mark, "merge keys are refused", event.value)
-        self._keys[-1] = (event.value, self._locate(event.start_mark))
-
-    def _add(self, node: Tree, mark: yaml.Mark) -> None:
+    def _add(self, node: Tree) -> None:
         if not self._stack:
             self.root = node
             return
@@ -218,7 +220,7 @@ class _Reader:
             parent.items.append(node)
             return
         if self._keys[-1] is None:
-            raise self._stop(mark, "a key is a text", "a collection or an alias")
+            raise self._stop(node.place, "a key is a text", "a collection or an alias")
         name, place = self._keys[-1]
         self._keys[-1] = None
         if name in parent.values:
@@ -228,21 +230,20 @@ class _Reader:
             parent.values[name] = node
             parent.keys[name] = place
 
-    def _refuse(self, mark: yaml.Mark, what: str, value: object) -> None:
+    def _refuse(self, place: Place, what: str, value: object) -> None:
         self._harmless = False
-        self.problems.append(Problem(self._locate(mark), describe(what, value)))
+        self.problems.append(Problem(place, describe(what, value)))
 
-    def _stop(self, mark: yaml.Mark, what: str, value: object) -> _Stop:
-        self._refuse(mark, what, value)
+    def _stop(self, place: Place, what: str, value: object) -> _Stop:
+        self._refuse(place, what, value)
         return _Stop()
 
 
-def _mark_at(text: str, index: int) -> yaml.Mark:
-    before = text[:index]
-    return yaml.Mark("", index, before.count("\n"), index - (before.rfind("\n") + 1), None, None)
+def _refused(what: str, sign: str) -> str:
+    return f"{what} are refused (a text that begins with {sign} needs quotes)"
 
 
-def resolve(text: str) -> None | bool | int | float | str:
+def resolve(text: str) -> Scalar:
     """What a plain scalar means by YAML 1.2's core schema; ValueError if it is a number that is not usable."""
     if _NULL.fullmatch(text):
         return None
@@ -288,8 +289,8 @@ def measure(tree: Tree) -> tuple[int, int]:
 class _Dumper(yaml.SafeDumper):
     """Writes so that `resolve` reads the same back: PyYAML's own idea of which texts need quotes is YAML 1.1's."""
 
-    yaml_implicit_resolvers: dict[Any, Any] = {}
 
+_Dumper.yaml_implicit_resolvers = {}
 
 for _tag, _pattern, _first in (
     ("null", _NULL, ["~", "n", "N", ""]),
