@@ -6,6 +6,7 @@ Names end up in file names, keys of the wire, captures and terminals: so they ar
 import difflib
 import re
 from collections.abc import Iterable
+from itertools import takewhile
 from typing import Final, Literal
 
 from foosim.protocol.limits import NAME_LENGTH_MAX
@@ -55,14 +56,25 @@ def is_selector(text: str) -> bool:
 
 
 def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR) -> str | None:
-    """The choice that looks most like the value, the first by name among equals; None when none does."""
+    """The choice that looks most like the value; None when none does.
+
+    Among equals it is the one that begins most like the value, then the first by name.
+    """
     text = str(value)[: 2 * SELECTOR_LENGTH_MAX]
-    best, best_ratio = None, 0.0
+    best, best_likeness = None, (0.0, 0)
     matcher = difflib.SequenceMatcher(autojunk=False)
     matcher.set_seq2(text.lower())
     for choice in sorted(set(choices)):
         matcher.set_seq1(choice.lower())
-        bound = min(matcher.real_quick_ratio(), matcher.quick_ratio())
-        if bound >= similar and bound > best_ratio and (ratio := matcher.ratio()) >= similar and ratio > best_ratio:
-            best, best_ratio = choice, ratio
+        if matcher.real_quick_ratio() < similar or matcher.quick_ratio() < similar:
+            continue
+        likeness = (matcher.ratio(), _common_start(choice.lower(), text.lower()))
+        if likeness[0] >= similar and likeness > best_likeness:
+            best, best_likeness = choice, likeness
     return best
+
+
+def _common_start(one: str, other: str) -> int:
+    """How many first characters two texts share."""
+    pairs = zip(one, other, strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))

@@ -23,9 +23,9 @@ from foosim.protocol.names import nearest_name
 
 NS_PER_S: Final = 1_000_000_000
 
-_NUMBER: Final = r"[+-]?[0-9]{1,18}(?:\.[0-9]{1,30})?(?:[eE][+-]?[0-9]{1,2})?"
-_RATIO: Final = r"[0-9]{1,18}/[1-9][0-9]{0,17}"
-_QUANTITY = re.compile(rf"({_NUMBER}|{_RATIO}) *([^0-9 .+-].*)?")
+_NUMBER: Final = r"[+-]?[0-9]{1,20}(?:\.[0-9]{1,30})?(?:[eE][+-]?[0-9]{1,2})?"
+_RATIO: Final = r"[0-9]{1,20}/[1-9][0-9]{0,19}"
+_QUANTITY = re.compile(rf"({_NUMBER}|{_RATIO}) *([A-Za-z%\u00b0\u00b5].*)?")
 # Signs that people write in units, and what stands for them here.
 _SIGNS: Final = str.maketrans({"^": "", "\u00b2": "2", "\u00b0": "deg", "\u00b7": " ", "*": " ", "\u00b5": "u"})
 _DEGREE: Final = Fraction(math.pi) / 180

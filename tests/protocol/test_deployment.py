@@ -1,0 +1,184 @@
+"""The schema: what table.yaml becomes, what defaults are, and that the committed JSON Schema is the current one."""
+
+import json
+import re
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+from pydantic import ValidationError
+
+from foosim.protocol.deployment import (
+    CameraRobot,
+    Deployment,
+    RodRobot,
+    deployment_schema_text,
+)
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.names import LINE_NAMES, TEAMS
+from foosim.protocol.units import Pace
+from foosim.protocol.yaml_tree import locate_in, plain, read_tree
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
+TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
+REGENERATE = "python -c \"from foosim.protocol.deployment import deployment_schema_text as t; print(t(), end='')\""
+
+
+@pytest.fixture(scope="module")
+def table() -> Deployment:
+    """The deployment of deploy/table.yaml."""
+    return load_deployment(TABLE_TEXT, "table.yaml")
+
+
+def data_of(text: str) -> Any:
+    """A YAML text as plain data."""
+    tree, problems = read_tree(text, locate_in("f"))
+    assert tree is not None
+    assert problems == []
+    return plain(tree)
+
+
+def test_the_table_has_eight_rods_a_camera_two_nodes_and_two_players(table: Deployment) -> None:
+    rods = [f"{team}.{line}" for team in TEAMS for line in LINE_NAMES]
+    assert sorted(table.robots) == sorted([*rods, "camera"])
+    for name in rods:
+        robot = table.robots[name]
+        assert isinstance(robot, RodRobot)
+        assert name == f"{robot.team}.{robot.line}"
+    owners = table.owners()
+    assert list(owners) == sorted(owners)
+    assert owners == {name: name.split(".")[0] for name in rods} | {"camera": "red"}
+    assert table.endpoints() == sorted([*rods, "camera", "player-red", "player-blue"])
+    for team in TEAMS:
+        player = table.players[f"player-{team}"]
+        assert (player.class_, player.rate_hz, player.lockstep) == ("foosim.client.players:Team", Fraction(100), True)
+        assert player.robots == {f"{team}.{line}": ["encoder"] for line in LINE_NAMES} | {"camera": ["ball"]}
+        assert player.parameters == {"team": team}
+
+
+def test_quantities_are_si_numbers_and_times_are_nanoseconds(table: Deployment) -> None:
+    assert (table.tick_ns, table.substeps, table.pace) == (2_000_000, 4, Pace("realtime"))
+    assert (table.table.ball.radius, table.table.ball.mass, table.table.gravity) == (0.0175, 0.021, 9.81)
+    assert (table.table.lines["goal"].x, table.table.lines["midfield"].half_stroke) == (-0.522, 0.0615)
+    assert table.table.surfaces.floor.rolling_friction == 0.00015
+    assert (table.table.drive.slide.speed, table.table.drive.spin.torque) == (3.5, 2.0)
+    camera, rod = table.robots["camera"], table.robots["red.goal"]
+    assert isinstance(camera, CameraRobot)
+    assert isinstance(rod, RodRobot)
+    assert (camera.sensors["ball"].rate_hz, camera.sensors["ball"].noise) == (Fraction(100), 0.0015)
+    encoder = rod.sensors["encoder"]
+    assert (encoder.position_noise, encoder.angle_noise) == (0.0002, pytest.approx(0.00872664625997, rel=1e-12))
+    rule = table.network.rule_for("player-red", "red.goal")
+    assert rule is not None
+    assert rule.jitter is not None
+    assert (rule.delay_ns, rule.jitter.mean_ns, rule.jitter.sd_ns) == (1_000_000, 300_000, 300_000)
+    assert (rule.loss, rule.order) == (0.005, "fifo")
+    assert (table.capture.frames_every, table.capture.poses_hz, table.capture.flush_ns) == (10, 50, 100_000_000)
+
+
+def test_what_is_left_out_has_its_default(table: Deployment) -> None:
+    data = data_of(TABLE_TEXT)
+    for section in ("network", "capture", "deadlines", "players", "mixed_cpu"):
+        del data[section]
+    bare = Deployment.model_validate(data)
+    assert bare.capture == table.capture
+    assert bare.deadlines == table.deadlines
+    assert bare.network.links == []
+    assert bare.players == {}
+    assert bare.clients == {}
+    assert bare.mixed_cpu is False
+    assert bare.network.rule_for("red.goal", "camera") is None
+
+
+def test_a_jitters_mean_is_its_spread_unless_said_otherwise() -> None:
+    text = apply_sets(TABLE_TEXT, "f", ["network.links.everything.jitter={shape: gamma, sd: 0.2 ms}"])
+    jitter = load_deployment(text, "f").network.links[0].jitter
+    assert jitter is not None
+    assert (jitter.mean_ns, jitter.sd_ns) == (200_000, 200_000)
+
+
+def test_the_first_rule_that_matches_wins_and_links_are_directed() -> None:
+    rules = "[{id: a, from: player-red, to: [camera, red.*]}, {id: b, from: '*', to: 'red.goa?'}]"
+    network = load_deployment(apply_sets(TABLE_TEXT, "f", [f"network.links={rules}"]), "f").network
+    matched = {
+        (source, destination): rule.id if (rule := network.rule_for(source, destination)) else None
+        for source in ("player-red", "player-blue", "red.goal")
+        for destination in ("red.goal", "red.attack", "player-red")
+    }
+    assert matched == {
+        ("player-red", "red.goal"): "a",
+        ("player-red", "red.attack"): "a",
+        ("player-red", "player-red"): None,
+        ("player-blue", "red.goal"): "b",
+        ("player-blue", "red.attack"): None,
+        ("player-blue", "player-red"): None,
+        ("red.goal", "red.goal"): "b",
+        ("red.goal", "red.attack"): None,
+        ("red.goal", "player-red"): None,
+    }
+
+
+def test_a_rule_without_effects_is_a_perfect_link() -> None:
+    rules = "[{id: a, from: '*', to: '*'}]"
+    rule = load_deployment(apply_sets(TABLE_TEXT, "f", [f"network.links={rules}"]), "f").network.links[0]
+    assert (rule.delay_ns, rule.jitter, rule.loss, rule.order) == (0, None, 0.0, "fifo")
+
+
+def test_a_deployment_written_in_si_units_is_the_same_deployment(table: Deployment) -> None:
+    assert Deployment.model_validate(table.model_dump(mode="json", by_alias=True)) == table
+
+
+def test_values_do_not_change(table: Deployment) -> None:
+    with pytest.raises(ValidationError, match="frozen"):
+        table.tick_ns = 1  # type: ignore[misc]
+
+
+def test_the_committed_json_schema_is_current() -> None:
+    assert (DEPLOY / "deployment.schema.json").read_text() == deployment_schema_text(), f"write it anew: {REGENERATE}"
+
+
+def test_the_json_schema_takes_the_table_and_refuses_what_the_models_refuse() -> None:
+    schema = json.loads(deployment_schema_text())
+    Draft202012Validator.check_schema(schema)
+    validator = Draft202012Validator(schema)
+    assert list(validator.iter_errors(data_of(TABLE_TEXT))) == []
+    for change in (
+        "tick=2",
+        "engine=bulet",
+        "tik=2 ms",
+        "table.ball.mass=21 mm",
+        "network.links.0.loss=0.5",
+        "format=2",
+    ):
+        key, _, value = change.partition("=")
+        data = data_of(TABLE_TEXT)
+        *path, last = key.split(".")
+        inner = data
+        for step in path:
+            inner = inner[int(step)] if step.isdigit() else inner[step]
+        inner[last] = data_of(value)
+        assert list(validator.iter_errors(data)), change
+
+
+def test_the_defaults_in_the_json_schema_are_written_as_in_a_file() -> None:
+    definitions = json.loads(deployment_schema_text())["$defs"]
+    assert definitions["Deadlines"]["properties"]["heartbeat"]["default"] == "1 s"
+    assert definitions["LinkRule"]["properties"]["loss"]["default"] == "0 %"
+    assert definitions["Capture"]["properties"]["frames_every"]["default"] == "10 ticks"
+
+
+def test_table_yaml_is_block_style_with_the_tick_on_a_line_of_its_own() -> None:
+    lines = TABLE_TEXT.splitlines()
+    assert "tick: 2 ms" in lines
+    assert not [line for line in lines if re.search(r":\s*[\[{]", line)]
+    assert max(len(line) for line in lines) <= 120
+
+
+def test_each_parameter_of_the_world_has_its_source_and_mark() -> None:
+    block = TABLE_TEXT[TABLE_TEXT.index("\ntable:\n") : TABLE_TEXT.index("\nrobots:\n")]
+    values = [line for line in block.splitlines() if re.match(r"\s+\w+: +[^\s#]", line)]
+    assert len(values) > 60
+    unmarked = [line for line in values if not re.search(r"# .*(\[[SMDA]\]|standard|one figure)", line)]
+    assert unmarked == ["  gravity: 9.81 m/s2"] or unmarked == []

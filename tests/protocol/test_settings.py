@@ -1,0 +1,122 @@
+"""Settings of a command line: where they go, what they may say, and that the text that results says the same."""
+
+from pathlib import Path
+
+import pytest
+
+from foosim.protocol import limits
+from foosim.protocol.deployment import Deployment, RodRobot
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.errors import DeploymentError
+
+TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
+
+
+def changed(*sets: str) -> Deployment:
+    """The deployment of table.yaml with settings, loaded from its canonical text."""
+    return load_deployment(apply_sets(TABLE_TEXT, "table.yaml", sets), "canonical")
+
+
+def refused(*sets: str) -> list[str]:
+    """The problems that settings make in table.yaml."""
+    with pytest.raises(DeploymentError) as error:
+        apply_sets(TABLE_TEXT, "table.yaml", sets)
+    return list(error.value.problems)
+
+
+def test_without_settings_the_canonical_text_is_the_same_deployment_and_its_own_canonical_text() -> None:
+    canonical = apply_sets(TABLE_TEXT, "table.yaml", [])
+    assert load_deployment(canonical, "canonical") == load_deployment(TABLE_TEXT, "table.yaml")
+    assert apply_sets(canonical, "canonical", []) == canonical
+    assert "tick: 2 ms\n" in canonical
+    assert "#" not in canonical
+
+
+def test_settings_reach_scalars_lists_and_names_with_dots() -> None:
+    deployment = changed(
+        "tick=5 ms",
+        "seed=7",
+        "robots.red.goal.sensors.encoder.rate=50 Hz",
+        "network.links.everything.delay=3 ms",
+        "network.links[0].loss=0 %",
+        "network.links.0.jitter=",
+        "nodes.red.robots[4]=camera",
+        "table.lines.goal.figures=1",
+        'players.player-red.parameters.plan={"on": [1, 2.5, x]}',
+    )
+    assert (deployment.tick_ns, deployment.seed) == (5_000_000, 7)
+    goal = deployment.robots["red.goal"]
+    assert isinstance(goal, RodRobot)
+    assert goal.sensors["encoder"].rate_hz == 50
+    rule = deployment.network.links[0]
+    assert (rule.delay_ns, rule.loss, rule.jitter) == (3_000_000, 0.0, None)
+    assert deployment.players["player-red"].parameters == {"team": "red", "plan": {"on": [1, 2.5, "x"]}}
+
+
+def test_a_later_setting_wins_and_may_build_on_an_earlier_one() -> None:
+    deployment = changed("network.links=[]", "network.links=[{id: a, from: '*', to: '*'}]", "network.links.a.delay=1 s")
+    assert [(rule.id, rule.delay_ns) for rule in deployment.network.links] == [("a", 1_000_000_000)]
+
+
+def test_a_section_that_the_file_leaves_out_can_be_set() -> None:
+    text = TABLE_TEXT[: TABLE_TEXT.index("\ndeadlines:")]
+    assert load_deployment(apply_sets(text, "f", ["deadlines.start=5 s"]), "f").deadlines.start_ns == 5_000_000_000
+    assert changed("clients.hand={lockstep: false}").clients["hand"].rate_hz is None
+
+
+def test_a_new_name_with_dots_stands_in_quotes() -> None:
+    deployment = changed(
+        'robots."spare.eye"={model: camera, sensors: {}}',
+        "nodes.blue.robots=[blue.goal, blue.defence, blue.midfield, blue.attack, spare.eye]",
+    )
+    assert deployment.owners()["spare.eye"] == "blue"
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("tick=2", "--set:1:6: tick: not a time (a number and one of ns, us, ms, s, min, h), 2"),
+        ("ticks=5 ms", "--set:1:1: unknown key, 'ticks', nearest is 'tick'"),
+        ("table.bal.mass=1 g", "--set:1:7: table: unknown key, 'bal', nearest is 'ball'"),
+        ("table.ball.mas=1 g", "--set:1:12: table.ball: unknown key, 'mas', nearest is 'mass'"),
+        ("robots.red.gaol.line=goal", "--set:1:8: robots: unknown key, 'red.gaol', nearest is 'red.goal'"),
+        ("network.links.evry.loss=4 %", "--set:1:15: no such entry, 'evry', valid are everything, 0"),
+        ("network.links[1].loss=4 %", "--set:1:15: no such entry, '1', valid are everything, 0"),
+        ("pace.x=5", "--set:1:6: set inside a value that is no mapping, 'x'"),
+        ("tick", "--set:1:5: not of the form key.key=VALUE, 'tick'"),
+        ("=1", "--set:1:1: not of the form key.key=VALUE, '=1'"),
+        ("tick..a=1", "--set:1:6: not of the form key.key=VALUE, 'tick..a=1'"),
+        ("seed=&a 5", "--set:1:6: anchors are refused (a text that begins with & needs quotes), '&a'"),
+        ("seed=!!int 5", "--set:1:6: tags are refused (a text that begins with ! needs quotes), 'tag:yaml.org,2002:int'"),
+        ("network.links=[{", "--set:1:17: not valid YAML, expected the node content, but found '<stream end>', while parsing a flow node"),
+        ("seed=1\n---\n2", "--set:1:8: more than one YAML document, '---'"),
+        ("mixed_cpu=yes", "--set:1:11: mixed_cpu: not true or false, 'yes', nearest is true"),
+        ("seed=" + "9" * 5000, "--set:1:1: more than 4096 characters, 5005"),
+    ],
+)  # fmt: skip
+def test_a_settings_problem_is_placed_in_the_setting(text: str, problem: str) -> None:
+    assert refused(text) == [problem]
+
+
+def test_problems_of_the_file_and_of_all_settings_come_together() -> None:
+    bad = TABLE_TEXT.replace("engine: bullet", "engine: bulet")
+    line = bad[: bad.index("engine:")].count("\n") + 1
+    with pytest.raises(DeploymentError) as error:
+        apply_sets(bad, "bad.yaml", ["seed=5", "tik=1 ms", "substeps=3", "nodes.red.robots[0]=red.gaol"])
+    assert list(error.value.problems)[0] == (
+        f"bad.yaml:{line}:9: engine: not one of bullet, pure, 'bulet', nearest is 'bullet'"
+    )
+    assert [problem for problem in error.value.problems if problem.startswith("--set")] == [
+        "--set:2:1: unknown key, 'tik', nearest is 'tick'",
+        "--set:3:10: substeps: does not divide the tick of 2000000 ns, 3, nearest is 2 and 4",
+        "--set:4:21: nodes.red.robots[0]: unknown robot, 'red.gaol', nearest is 'red.goal'",
+    ]
+
+
+def test_settings_do_not_lift_the_limits_of_a_file() -> None:
+    pages = [f"players.player-red.parameters.p{n}='{'x' * 4000}'" for n in range(20)]
+    assert refused(*pages)[0].endswith("deep)")
+    deep = "players.player-red.parameters.deep=" + "[" * 15 + "]" * 15
+    assert "19 deep" in refused(deep)[0]
+    assert refused(*["seed=1"] * 257) == ["--set:257:1: more than 256 settings, 257"]
+    assert len(apply_sets(TABLE_TEXT, "f", pages[:5]).encode()) < limits.DEPLOYMENT_BYTES_MAX
