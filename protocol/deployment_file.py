@@ -9,6 +9,7 @@ that is `file:line:column: what, value, nearest valid name`, in the order of the
 line are placed in the same tree first: settings.py.
 """
 
+import codecs
 import re
 from collections.abc import Sequence
 from itertools import islice
@@ -81,10 +82,11 @@ def read_deployment_text(path: Path) -> str:
         raise DeploymentError([f"{place}: cannot be read, {error.strerror or error}"]) from None
     if len(raw) > limits.DEPLOYMENT_BYTES_MAX:
         raise DeploymentError([f"{place}: more than {limits.DEPLOYMENT_BYTES_MAX} bytes"])
+    raw = raw.removeprefix(codecs.BOM_UTF8)
     try:
-        return raw.decode("utf-8-sig")
+        return raw.decode("utf-8")
     except UnicodeDecodeError as error:
-        before = raw[: error.start].decode("utf-8-sig", "replace")
+        before = raw[: error.start].decode("utf-8")
         place = Place(0, before.count("\n") + 1, len(before) - before.rfind("\n"), str(path))
         raise DeploymentError([f"{place}: {describe('not UTF-8', raw[error.start])}"]) from None
 

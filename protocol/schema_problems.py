@@ -53,7 +53,8 @@ def _finding(detail: ErrorDetails) -> Finding:
         return _unknown(location, _follow(detail["loc"][:-1])[1])
     translate = _TRANSLATIONS.get(kind)
     if translate is not None:
-        return translate(location, schema, value, context)
+        finding = translate(location, schema, value, context)
+        return replace(finding, at="key") if is_key else finding
     nearest = context.get("nearest")
     if kind == "bool_type" and isinstance(value, str):
         nearest = _BOOLEANS.get(value.lower())
@@ -123,16 +124,21 @@ def _root() -> Mapping[str, Any]:
 
 
 def _follow(path: Sequence[str | int]) -> tuple[Location, Mapping[str, Any], bool]:
-    """The location in the data of a path through the models, its schema, and whether the key there is meant."""
+    """The location in the data of a path through the models, its schema, and whether the key there is meant.
+
+    Of a key that is meant, the schema is that of keys.
+    """
     location: list[str | int] = []
+    keys: Mapping[str, Any] = {}
     schema = _resolve(_root())
     for step in path:
         if step == "[key]":
-            return tuple(location), schema, True
+            return tuple(location), _resolve(keys), True
         if "discriminator" in schema and step in schema["discriminator"]["mapping"]:
             schema = _resolve({"$ref": schema["discriminator"]["mapping"][step]})
             continue
         location.append(step)
+        keys = schema.get("propertyNames", {})
         schema = _child(schema, step)
     return tuple(location), schema, False
 

@@ -1,0 +1,264 @@
+"""Deployment files: every problem at once, each with its place, byte for byte, and nothing from outside gets through.
+
+The bad files are made from a small good one by replacing single lines: deployment_problems.txt has them with their
+reports.
+"""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foosim.protocol.deployment_file import PROBLEMS_MAX, apply_sets, load_deployment, read_deployment_text
+from foosim.protocol.errors import DeploymentError
+from foosim.protocol.yaml_tree import locate_in, plain, read_tree
+
+CASES = Path(__file__).with_name("deployment_problems.txt")
+TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
+
+
+def small_text() -> str:
+    """One rod, a camera, one node, a player and a client; the table of table.yaml on a single line."""
+    tree, _ = read_tree(TABLE_TEXT, locate_in("table.yaml"))
+    assert tree is not None
+    return f"""\
+format: 1
+world: small
+seed: 1
+tick: 2 ms
+substeps: 4
+engine: pure
+pace: fast
+table: {json.dumps(plain(tree)["table"])}
+robots:
+  red.goal:
+    model: rod
+    team: red
+    line: goal
+    sensors:
+      encoder:
+        kind: encoder
+        rate: 100 Hz
+        position_noise: 0.2 mm
+        angle_noise: 0.5 deg
+  camera:
+    model: camera
+    sensors:
+      ball:
+        kind: ball
+        rate: 100 Hz
+        noise: 1.5 mm
+nodes:
+  one:
+    robots: [red.goal, camera]
+players:
+  keeper:
+    class: foosim.client.players:Team
+    rate: 100 Hz
+    robots:
+      red.goal: [encoder]
+      camera: [ball]
+clients:
+  hand:
+    lockstep: true
+    rate: 50 Hz
+network:
+  links:
+    - id: up
+      from: [keeper, hand]
+      to: red.*
+      loss: 0.5 %
+      jitter:
+        shape: gamma
+        sd: 0.3 ms
+    - id: down
+      from: '*'
+      to: keeper
+deadlines:
+  tick_named: 500 ms
+  tick_lost: 1 s
+"""
+
+
+SMALL = small_text()
+GOOD = SMALL.splitlines(keepends=True)
+
+
+def problems_of(text: str) -> list[str]:
+    """The lines of the report on a bad file."""
+    with pytest.raises(DeploymentError) as error:
+        load_deployment(text, "small.yaml")
+    assert str(error.value) == "\n".join(error.value.problems)
+    return list(error.value.problems)
+
+
+def changed(*lines: tuple[int, str]) -> str:
+    """The small file with these lines, counted from 1, replaced (by nothing, one or several)."""
+    text = GOOD.copy()
+    for number, line in lines:
+        text[number - 1] = line + "\n" if line else ""
+    return "".join(text)
+
+
+def test_the_small_file_is_good() -> None:
+    deployment = load_deployment(SMALL, "small.yaml")
+    assert deployment.endpoints() == ["camera", "hand", "keeper", "red.goal"]
+    assert deployment.owners() == {"camera": "one", "red.goal": "one"}
+
+
+def cases() -> Iterator[tuple[str, list[str], list[tuple[int, str]], list[str]]]:
+    """Name, settings, replaced lines and report of each case in deployment_problems.txt."""
+    text = CASES.read_text().partition("\n\n")[2]
+    for block in text.strip("\n").split("\n\n"):
+        lines = block.split("\n")
+        problems = [line.removeprefix("> ") for line in lines if line.startswith("> ")]
+        sets = [line.removeprefix("--set ") for line in lines if line.startswith("--set ")]
+        replaced: dict[int, list[str]] = {}
+        for match in filter(None, (re.fullmatch(r"([0-9]+)\|(?: (.*))?", line) for line in lines)):
+            replaced.setdefault(int(match[1]), []).append(match[2] or "")
+        assert len(lines) == len(problems) + len(sets) + sum(map(len, replaced.values())), block
+        yield lines[0], sets, [(number, "\n".join(texts)) for number, texts in replaced.items()], problems
+
+
+@pytest.mark.parametrize(("name", "sets", "lines", "problems"), list(cases()))
+def test_each_problem_is_one_line_with_its_place(
+    name: str, sets: list[str], lines: list[tuple[int, str]], problems: list[str]
+) -> None:
+    found: tuple[str, ...] = ()
+    try:
+        if sets:
+            apply_sets(TABLE_TEXT, "table.yaml", sets)
+        else:
+            load_deployment(changed(*lines), "small.yaml")
+    except DeploymentError as error:
+        assert str(error) == "\n".join(error.problems)
+        found = error.problems
+    assert [problem.removeprefix("small.yaml:") for problem in found] == problems
+
+
+def set_problems(*sets: str) -> list[str]:
+    """The problems that settings make in table.yaml."""
+    with pytest.raises(DeploymentError) as error:
+        apply_sets(TABLE_TEXT, "table.yaml", sets)
+    return list(error.value.problems)
+
+
+def test_a_line_that_a_rod_stands_on_must_exist() -> None:
+    problems = set_problems("table.lines={}")
+    assert len(problems) == 8
+    assert problems[0].endswith("robots.red.goal.line: not in table.lines, 'goal'")
+
+
+def test_all_problems_of_a_file_come_at_once_in_its_order() -> None:
+    text = changed(
+        (3, "seed: x"),
+        (5, "substeps: 3"),
+        (6, "engine: bulet"),
+        (29, "    robots: [red.gaol, camera]"),
+        (46, "      los: 0.5 %"),
+    )
+    assert problems_of(text) == [
+        "small.yaml:3:7: seed: not a whole number, 'x'",
+        "small.yaml:5:11: substeps: does not divide the tick of 2000000 ns, 3, nearest is 2 and 4",
+        "small.yaml:6:9: engine: not one of bullet, pure, 'bulet', nearest is 'bullet'",
+        "small.yaml:10:3: robots: a robot that no node owns, 'red.goal'",
+        "small.yaml:29:14: nodes.one.robots[0]: unknown robot, 'red.gaol', nearest is 'red.goal'",
+        "small.yaml:46:7: network.links[0]: unknown key, 'los', nearest is 'loss'",
+    ]
+
+
+@pytest.mark.parametrize("text", ["null", "[]", "text", "1", "''"])
+def test_a_file_that_is_no_mapping_is_refused(text: str) -> None:
+    assert len(problems_of(text)) == 1
+    assert problems_of(text)[0].startswith("small.yaml:1:1: not a mapping, ")
+
+
+def test_an_empty_mapping_lacks_every_required_key() -> None:
+    missing = [problem.rpartition(" ")[2] for problem in problems_of("{}")]
+    assert missing == sorted(
+        f"'{key}'"
+        for key in ["engine", "format", "nodes", "pace", "robots", "seed", "substeps", "table", "tick", "world"]
+    )
+
+
+def test_nothing_is_built_from_what_is_refused_by_the_scan() -> None:
+    """The schema is not asked: its problems would be reported too."""
+    assert problems_of("a: &a [1]\nb: *a\n") == [
+        "small.yaml:1:4: anchors are refused (a text that begins with & needs quotes), '&a'",
+        "small.yaml:2:4: aliases are refused (a text that begins with * needs quotes), '*a'",
+    ]
+
+
+def test_the_report_of_a_hostile_file_is_bounded() -> None:
+    keys = problems_of("".join(f"k{number}: 1\n" for number in range(5000)))
+    assert len(keys) == PROBLEMS_MAX + 1
+    assert keys[-1] == f"and more: only the first {PROBLEMS_MAX} problems are shown"
+    robots = "".join(f"  a{number}: {{model: camera, sensors: {{}}}}\n" for number in range(600))
+    names = ",".join(f"b{number}" for number in range(4000))
+    assert len(problems_of(f"robots:\n{robots}nodes: {{n: {{robots: [{names}]}}}}\n")) == PROBLEMS_MAX + 1
+
+
+def test_a_file_is_read_from_disk_within_its_bounds(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_bytes(b"\xef\xbb\xbf" + SMALL.encode())
+    assert read_deployment_text(path) == SMALL
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"a: 1\nb: caf\xe9\n", "2:7: not UTF-8, 233"),
+        (b"\xef\xbb\xbf\xff", "1:1: not UTF-8, 255"),
+        (b"a" * 65_537, "1:1: more than 65536 bytes"),
+        (None, "1:1: cannot be read, No such file or directory"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path, content: bytes | None, problem: str) -> None:
+    path = tmp_path / "a.yaml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(DeploymentError) as error:
+        read_deployment_text(path)
+    assert list(error.value.problems) == [f"{path}:{problem}"]
+
+
+EDITS = st.lists(
+    st.tuples(
+        st.sampled_from(["drop", "double", "swap", "insert", "value"]),
+        st.integers(0, len(GOOD) - 1),
+        st.integers(0, 40),
+        st.sampled_from(
+            [*"[]{}:,-?!&*#|>'\"%@ \t\n~10", "null", "on", "1e999", "<<: ", "\x00", "\u2028", "\\ud800", "!!str "]
+        ),
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+@given(EDITS)
+def test_a_mangled_file_is_loaded_or_refused_in_plain_lines(edits: list[tuple[str, int, int, str]]) -> None:
+    lines = GOOD.copy()
+    for kind, number, column, text in edits:
+        index = number % len(lines)
+        line = lines[index]
+        if kind == "drop":
+            del lines[index]
+        elif kind == "double":
+            lines.insert(index, line)
+        elif kind == "swap":
+            lines[index], lines[column % len(lines)] = lines[column % len(lines)], line
+        elif kind == "insert":
+            lines[index] = line[:column] + text + line[column:]
+        else:
+            lines[index] = line.partition(":")[0] + ": " + text + "\n"
+    try:
+        load_deployment("".join(lines), "f")
+    except DeploymentError as error:
+        for problem in error.problems:
+            assert problem.startswith("f:")
+            assert problem.isprintable()
