@@ -287,10 +287,8 @@ def measure(tree: Tree) -> tuple[int, int]:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes so that `resolve` reads the same back: PyYAML's own idea of which texts need quotes is YAML 1.1's."""
+    """Writes so that `resolve` reads the same back: quotes what YAML 1.2 needs quoted beside what YAML 1.1 does."""
 
-
-_Dumper.yaml_implicit_resolvers = {}
 
 for _tag, _pattern, _first in (
     ("null", _NULL, ["~", "n", "N", ""]),
