@@ -20,7 +20,7 @@ from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.assign import Assignment, Share, reach_of
 from foosim.protocol.barrier import Barrier, Slots
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, encode
+from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, basis_of, frame_from_bytes
@@ -172,8 +172,9 @@ class NodeCore:
         self.actions.append(Publish(channels.PART, self.name, payload))
         self._barrier.add(part)
 
-    def engine_ready(self, layout: Layout) -> None:
-        """The shell has an engine for this layout."""
+    def engine_ready(self, layout: Layout, fingerprint: bytes) -> None:
+        """The shell has an engine for this layout; `fingerprint` is the digest of its fixed small run."""
+        self.member.simulation = fingerprint
         self.member.ready(layout)
 
     def wake(self, now_ns: int) -> None:
@@ -438,7 +439,7 @@ class NodeCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = self.frame.tick if self.frame is not None else 0
-        return Heartbeat(self.name, tick, self.epoch, self.waiting_for, self.busy, encode([self._solved_ticks]))
+        return Heartbeat(self.name, tick, self.epoch, self.waiting_for, "", self.busy, encode_json({"solved_ticks": self._solved_ticks}))
 
 
 def _moved_counters(counters: list[int], old: Layout, new: Layout) -> list[int]:

@@ -71,6 +71,7 @@ COMMIT: Final = _simulation("commit", messages.Commit, "supervisor", "the named 
 DELIVERIES: Final = _simulation("deliveries", messages.Deliveries, "vhub", "node, supervisor", "tick", named=False)
 WANT: Final = _simulation("want", messages.Want, "all", "all", "20 ms doubling to 1 s without progress")
 HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
+TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a change, and an answer", named=False)
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
 REQUEST: Final = _simulation("request", messages.Request, "operator", "supervisor", "a request")
@@ -79,7 +80,7 @@ ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named 
 CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered")
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
 CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
-UP: Final = _radio("up", messages.Up | messages.Done, "client", "vhub", "the client's rate")
+UP: Final = _radio("up", messages.Join | messages.Up | messages.Done, "client", "vhub", "the client's rate")
 DOWN: Final = _radio("down", messages.Go | messages.Down, "vhub", "the named one", "the client's rate")
 
 CHANNELS: Final[tuple[Channel, ...]] = (
@@ -96,6 +97,7 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     DELIVERIES,
     WANT,
     HEARTBEAT,
+    TEMPO,
     END,
     FAREWELL,
     REQUEST,

@@ -42,6 +42,8 @@ class Member:
         self.layouts: list[Layout] = []
         self.deadline_ns = now_ns
         self.is_ready = False
+        self.simulation = b""
+        """A node's digest of a fixed small run of its engine, once it has one."""
         self._fingerprint = fingerprint
         self._world = world
         self._actions = actions
@@ -76,7 +78,8 @@ class Member:
         """Say that this layout is built."""
         self.is_ready = True
         self._said_ready = layout
-        self._actions.append(Publish(channels.READY, self.name, encode(Ready(self.name, self.boot, layout.digest))))
+        ready = Ready(self.name, self.boot, layout.digest, self.simulation or self._fingerprint)
+        self._actions.append(Publish(channels.READY, self.name, encode(ready)))
 
     def entered(self) -> None:
         """An epoch with this process in it has begun: nothing is to be said again."""

@@ -42,7 +42,7 @@ class Item(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=T
 # --- what changes the world: the edits of an order -------------------------------------------------------------------
 
 
-class Add(Message):
+class Add(Message, frozen=True):
     """Add entity `name` of `model` at `position` (m, world frame) with `velocity` (m/s)."""
 
     name: Name
@@ -51,20 +51,20 @@ class Add(Message):
     velocity: Vector
 
 
-class Remove(Message):
+class Remove(Message, frozen=True):
     """Remove an entity that was added."""
 
     name: Name
 
 
-class Push(Message):
+class Push(Message, frozen=True):
     """Give a free body an `impulse` (N s, world frame) at its centre of mass."""
 
     name: Name
     impulse: Vector
 
 
-class Stop(Message):
+class Stop(Message, frozen=True):
     """End the run in order after this tick."""
 
     reason: Text
@@ -77,7 +77,7 @@ Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 # --- simulation plane: the tick --------------------------------------------------------------------------------------
 
 
-class Order(Message):
+class Order(Message, frozen=True):
     """Permission to compute `tick`, with what changes the world at it."""
 
     epoch: Counter
@@ -85,7 +85,7 @@ class Order(Message):
     edits: Edits
 
 
-class Delivered(Item):
+class Delivered(Item, frozen=True):
     """One packet that reaches a robot."""
 
     due_ns: Counter
@@ -97,14 +97,14 @@ class Delivered(Item):
     payload: Payload
 
 
-class Deliveries(Message):
+class Deliveries(Message, frozen=True):
     """The packets that reach robots at `tick`, in (due, source, sequence, copy) order. Final when published."""
 
     tick: Counter
     packets: Annotated[list[Delivered], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
 
 
-class RobotPacket(Item):
+class RobotPacket(Item, frozen=True):
     """One packet that a robot sends. `destination` is empty when it goes to all who subscribe to the channel."""
 
     robot: Name
@@ -114,7 +114,7 @@ class RobotPacket(Item):
     payload: Payload
 
 
-class Samples(Message):
+class Samples(Message, frozen=True):
     """What the robots of `node` send at `tick`, from the frame with digest `digest`; `robots` are those it covers."""
 
     tick: Counter
@@ -124,7 +124,7 @@ class Samples(Message):
     packets: Annotated[list[RobotPacket], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
 
 
-class Outbox(Item):
+class Outbox(Item, frozen=True):
     """The bytes in the outbox of the entity at `index` of the layout; entities with an empty one are left out."""
 
     index: Counter
@@ -134,7 +134,7 @@ class Outbox(Item):
 Outboxes = Annotated[list[Outbox], Meta(max_length=limits.ENTITIES_MAX)]
 
 
-class Part(Message):
+class Part(Message, frozen=True):
     """One node's slots of frame `tick`: of the entities it `solved` (indices, ascending) and of the robots it owns."""
 
     epoch: Counter
@@ -147,7 +147,7 @@ class Part(Message):
     outboxes: Outboxes
 
 
-class Commit(Message):
+class Commit(Message, frozen=True):
     """Frame `tick` as the supervisor assembled it, with the order that led to it (none for frame 0)."""
 
     epoch: Counter
@@ -158,7 +158,7 @@ class Commit(Message):
     edits: Edits
 
 
-class Want(Message):
+class Want(Message, frozen=True):
     """Ask again for `kind` (a channel's name) of `tick` in `epoch`."""
 
     sender: Name
@@ -167,13 +167,15 @@ class Want(Message):
     epoch: Counter
 
 
-class Heartbeat(Message):
-    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `busy` is its load (0 to 1)."""
+class Heartbeat(Message, frozen=True):
+    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` a client
+    that is gone (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people."""
 
     sender: Name
     tick: Counter
     epoch: Counter
     waiting_for: Text
+    lost: Text
     busy: float
     report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
 
@@ -181,7 +183,7 @@ class Heartbeat(Message):
 # --- simulation plane: who takes part --------------------------------------------------------------------------------
 
 
-class Hello(Message):
+class Hello(Message, frozen=True):
     """A process asks to take part. `world` is empty when it takes whatever world it finds."""
 
     role: Name
@@ -192,7 +194,7 @@ class Hello(Message):
     fingerprint: Digest
 
 
-class AddedEntity(Item):
+class AddedEntity(Item, frozen=True):
     """An entity that is in the layout beside those of the deployment."""
 
     name: Name
@@ -202,7 +204,7 @@ class AddedEntity(Item):
 Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
 
 
-class Build(Message):
+class Build(Message, frozen=True):
     """Everything that a process needs to build the world: one address was all that it had to know."""
 
     name: Name
@@ -214,7 +216,7 @@ class Build(Message):
     added: Added
 
 
-class Refusal(Message):
+class Refusal(Message, frozen=True):
     """The supervisor will not have this process, and why."""
 
     name: Name
@@ -222,21 +224,25 @@ class Refusal(Message):
     reason: Text
 
 
-class Ready(Message):
-    """The process has built the layout with this digest (and, a vHub, heard from all declared lockstep clients)."""
+class Ready(Message, frozen=True):
+    """The process has built the layout with this digest (and, a vHub, heard from all declared lockstep clients).
+
+    A node's `fingerprint` is the digest of a fixed small run of its engine: equal ones compute equal worlds.
+    """
 
     name: Name
     boot: Name
     layout: Digest
+    fingerprint: Digest
 
 
-class Prepare(Message):
+class Prepare(Message, frozen=True):
     """Build an engine for the layout with these added entities, and say when it is ready."""
 
     added: Added
 
 
-class Epoch(Message):
+class Epoch(Message, frozen=True):
     """Who does what from tick `tick` on: `owners` is (robot, node) for every robot."""
 
     epoch: Counter
@@ -247,7 +253,14 @@ class Epoch(Message):
     added: Added
 
 
-class End(Message):
+class Tempo(Message, frozen=True):
+    """The pace that the supervisor keeps (`realtime`, `fast`, `2x`): the vHub releases by it."""
+
+    pace: Name
+    paused: bool
+
+
+class End(Message, frozen=True):
     """The run is over after `tick` ticks."""
 
     tick: Counter
@@ -255,14 +268,14 @@ class End(Message):
     failed: bool
 
 
-class Farewell(Message):
+class Farewell(Message, frozen=True):
     """A process has finished its part of an ended run; `report` is JSON (the vHub's: packets and capture)."""
 
     name: Name
     report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
 
 
-class Request(Message):
+class Request(Message, frozen=True):
     """What a person or a script asks of the supervisor: `verb` with JSON `arguments`. The same id, the same answer."""
 
     sender: Name
@@ -271,7 +284,7 @@ class Request(Message):
     arguments: Annotated[bytes, Meta(max_length=limits.TEXT_LENGTH_MAX)]
 
 
-class Answer(Message):
+class Answer(Message, frozen=True):
     """The supervisor's answer: the tick at which the request takes effect and JSON `result`, or why not."""
 
     sender: Name
@@ -285,26 +298,24 @@ class Answer(Message):
 # --- radio plane -----------------------------------------------------------------------------------------------------
 
 
-class Subscription(Item):
+class Subscription(Item, frozen=True):
     """A robot's channel that a client wants to hear."""
 
     robot: Name
     channel: Name
 
 
-class ClientHello(Message):
-    """A client asks to join. `period` is in ticks (0: free-running); `received` is the last downlink number it has."""
+class ClientHello(Message, frozen=True):
+    """A client asks to be let in. `received` is the last downlink number it has."""
 
     name: Name
     boot: Name
     version: Counter
     world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
-    period: Counter
     received: Counter
-    subscriptions: Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MAX)]
 
 
-class ClientWelcome(Message):
+class ClientWelcome(Message, frozen=True):
     """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1."""
 
     name: Name
@@ -316,7 +327,7 @@ class ClientWelcome(Message):
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
 
 
-class ClientRefusal(Message):
+class ClientRefusal(Message, frozen=True):
     """The vHub will not have this client, and why."""
 
     name: Name
@@ -324,7 +335,7 @@ class ClientRefusal(Message):
     reason: Text
 
 
-class Sent(Item):
+class Sent(Item, frozen=True):
     """One packet that a client sends; `stamp_ns` is its own clock's, recorded and never judged."""
 
     sequence: Counter
@@ -337,7 +348,16 @@ class Sent(Item):
 Packets = Annotated[list[Sent], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
 
 
-class Up(Message):
+class Join(Message, frozen=True):
+    """A client takes part: `period` is in ticks (0: free-running). It takes effect at a tick that the vHub chooses."""
+
+    name: Name
+    boot: Name
+    period: Counter
+    subscriptions: Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MAX)]
+
+
+class Up(Message, frozen=True):
     """Packets of a free-running client."""
 
     name: Name
@@ -345,7 +365,7 @@ class Up(Message):
     packets: Packets
 
 
-class Done(Message):
+class Done(Message, frozen=True):
     """A lockstep client's answer to `Go(tick)`: what it sends at that tick."""
 
     name: Name
@@ -354,7 +374,7 @@ class Done(Message):
     packets: Packets
 
 
-class Received(Item):
+class Received(Item, frozen=True):
     """One packet that reaches a client. `sent_ns` and `due_ns` are simulated time."""
 
     source: Name
@@ -366,7 +386,7 @@ class Received(Item):
     payload: Payload
 
 
-class Go(Message):
+class Go(Message, frozen=True):
     """Downlink `number` to a lockstep client: it is due at `tick`; these packets have reached it since its last."""
 
     number: Counter
@@ -375,7 +395,7 @@ class Go(Message):
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
 
 
-class Down(Message):
+class Down(Message, frozen=True):
     """Downlink `number` to a free-running client, or (a lockstep client too) the news that the run is over."""
 
     number: Counter

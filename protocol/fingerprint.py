@@ -1,0 +1,27 @@
+"""The arithmetic fingerprint: what tells whether another machine computes the same bits.
+
+Part one is here: a digest of values of the mathematical library, which differ between CPU classes (glibc picks
+routines with or without fused multiply-add). Part two is a node's: the digest of a fixed small run of its engine
+(`node.solver`). Both are compared in the handshake and kept in the capture.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from functools import cache
+from hashlib import blake2b
+
+
+@cache
+def library_fingerprint() -> bytes:
+    """Return the BLAKE2b, 32 bytes, of sin, cos, exp, log, atan2 and hypot at 4,096 fixed points."""
+    hasher = blake2b(digest_size=32)
+    for number in range(1, 4097):
+        x = number * 0.0123456789
+        hasher.update(
+            struct.pack(
+                "<6d", math.sin(x), math.cos(x), math.exp(-x), math.log(x), math.atan2(x, 1.5), math.hypot(x, 0.7)
+            )
+        )
+    return hasher.digest()

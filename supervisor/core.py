@@ -1,0 +1,430 @@
+"""The core of the supervisor: takes messages and the time, releases orders, assembles and commits frames.
+
+It computes nothing of the world: it knows who computes what (epochs), what changes the world (orders), and puts the
+nodes' parts together. It journals, then speaks. A committed tick never changes. Neighbours: `roster` (who takes part),
+`pacing` (when orders are released), `requests` (what people ask), `watch` (who is waited for), `records` (journal).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Action, Journal, Publish, Say
+from foosim.protocol.barrier import Barrier, Slots
+from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, decode_json, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, layout_after
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.messages import (
+    AddedEntity,
+    Build,
+    Commit,
+    Deliveries,
+    Edit,
+    End,
+    Epoch,
+    Farewell,
+    Heartbeat,
+    Hello,
+    Order,
+    Part,
+    Prepare,
+    Ready,
+    Refusal,
+    Request,
+    Tempo,
+    Want,
+)
+from foosim.protocol.start import initial_frame
+from foosim.protocol.units import Pace
+from foosim.supervisor.pacing import Pacer
+from foosim.supervisor.records import RunRecord
+from foosim.supervisor.requests import Requests
+from foosim.supervisor.roster import Roster
+from foosim.supervisor.watch import Watch
+
+FAREWELL_NS: Final = 10_000_000_000
+"""How long an ended run waits for the vHub to close its capture."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """What a supervisor is started with. `ticks` ends the run; 0 is until it is asked to end."""
+
+    run: str
+    deployment_name: str
+    deployment_text: str
+    pace: Pace
+    ticks: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisorStatistics:
+    """What the supervisor has done so far."""
+
+    tick: int
+    epoch: int
+    moves: int
+    handovers: int
+    refused: int
+    repeated: int
+    diverged: int
+
+
+class SupervisorCore:
+    """The supervisor's state machine. `actions` is what the shell performs next."""
+
+    def __init__(self, settings: RunSettings, fingerprint: bytes, now_ns: int) -> None:
+        self.settings = settings
+        self.actions: list[Action] = []
+        self.deployment: Deployment = load_deployment(settings.deployment_text, settings.deployment_name)
+        self.roster = Roster(self.deployment, fingerprint)
+        self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
+        self.watch = Watch(self.deployment, self.roster, now_ns)
+        self.requests = Requests(self)
+        self.frame: Frame = initial_frame(self.deployment)
+        self.chain = CHAIN_START
+        self.epoch = 0
+        self.owners = self.deployment.owners()
+        self.members: tuple[str, ...] = ()
+        self.released = 0
+        """The first tick whose order is not released."""
+        self.stop_at = settings.ticks
+        self.end: End | None = None
+        self.finished = False
+        self.moves = self.handovers = 0
+        self.solved_ticks: dict[str, int] = {}
+        self.started_ns = self.committed_ns = 0
+        self.ball_solver = ""
+        self._slots = Slots(self.frame.layout, self.owners)
+        self._epoch_payload = b""
+        self._orders: dict[int, tuple[bytes, list[Edit]]] = {}
+        self._deliveries: dict[int, bytes] = {}
+        self._parts: dict[int, list[Part]] = {}
+        self._commits: dict[int, bytes] = {}
+        self._refused = self._repeated = self._diverged = 0
+        self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
+            Hello: self._on_hello,
+            Ready: self._on_ready,
+            Heartbeat: self._on_heartbeat,
+            Part: self._on_part,
+            Deliveries: self._on_deliveries,
+            Want: self._on_want,
+            Request: self.requests.take,
+            Farewell: self._on_farewell,
+        }
+        self.actions.append(Journal(encode(RunRecord(settings.run, settings.deployment_name, settings.deployment_text))))
+
+    # --- what the shell calls --------------------------------------------------------------------------------------
+
+    def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+        """Take one message as it came; what does not fit is counted and dropped."""
+        try:
+            message = decode(channel.message, payload, channel.bytes_max)
+            reader = self._readers.get(type(message))
+            if reader is None:
+                raise Malformed(f"the supervisor does not read the channel {channel.name}")
+            sender = getattr(message, "sender", None) or getattr(message, "node", None) or getattr(message, "name", name)
+            if sender != name:
+                raise Malformed(f"a message on the key of {name} that names {sender}")
+            reader(message, payload, now_ns)
+        except Malformed as error:
+            self._refused += 1
+            if self._refused <= 3:
+                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+
+    def advance(self, now_ns: int) -> None:
+        """Commit and release as far as parts, pace and clock allow."""
+        if self.epoch == 0 or self.end is not None:
+            return
+        self._release(now_ns)
+        while self._commit_next(now_ns):
+            self._release(now_ns)
+        if self.stop_at and self.frame.tick >= self.stop_at:
+            self.finish("done", failed=False)
+
+    def wake(self, now_ns: int) -> None:
+        """Look for who is silent or overdue, and for the end of an ended run."""
+        if self.end is None:
+            lost = self.watch.lost(self, now_ns)
+            if lost:
+                self.finish(f"lost {lost}", failed=True)
+        elif not self.finished:
+            hub = self.roster.by_name.get(channels.VHUB)
+            self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
+
+    def deadline_ns(self, now_ns: int) -> int:
+        """When the shell has to call again at the latest."""
+        deadline = now_ns + limits.HEARTBEAT_NS
+        if self.epoch > 0 and self.end is None and self.released <= self.frame.tick + limits.RELEASE_AHEAD:
+            release_ns = self.pacer.release_ns(self.released)
+            if release_ns is not None and (not self.stop_at or self.released < self.stop_at):
+                deadline = min(deadline, release_ns)
+        return deadline
+
+    def process_gone(self, name: str, now_ns: int) -> None:
+        """A process's presence has ended."""
+        process = self.roster.by_name.get(name)
+        if process is not None and not process.farewell and self.end is None:
+            self.finish(f"lost {name}: its connection closed", failed=True)
+
+    def finish(self, reason: str, failed: bool) -> None:
+        """End the run in order at the last committed tick; say it once."""
+        if self.end is not None:
+            return
+        self.end = End(self.frame.tick, reason, failed)
+        self.watch.ended_ns = self.watch.now_ns
+        self.actions.append(Say("error" if failed else "info", f"run ends at tick {self.frame.tick}: {reason}"))
+        self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+
+    def stop(self) -> int:
+        """End the run in order after what is released; return the tick."""
+        self.stop_at = self.released if not self.stop_at else min(self.stop_at, self.released)
+        if self.epoch == 0 or self.frame.tick >= self.stop_at:
+            self.finish("stopped", failed=False)
+        return self.stop_at
+
+    def statistics(self) -> SupervisorStatistics:
+        return SupervisorStatistics(
+            self.frame.tick, self.epoch, self.moves, self.handovers, self._refused, self._repeated, self._diverged
+        )
+
+    def say(self, level: str, text: str) -> None:
+        """Log a line for people."""
+        self.actions.append(Say(level, text))
+
+    def ordered_edits(self) -> list[Edit]:
+        """Return the edits of released ticks that are not committed yet, and of those still to be released."""
+        released = [edit for tick in range(self.frame.tick, self.released) for edit in self._orders[tick][1]]
+        return released + self.requests.coming_edits()
+
+    def removable(self, layout: Layout) -> list[str]:
+        """Return the names of the entities that were added."""
+        base = build_layout(self.deployment)
+        return [name for name in layout.names if name not in base]
+
+    def unready_nodes(self, layout: bytes) -> list[str]:
+        """Return the nodes that have no engine for a layout yet."""
+        return [name for name in self.members if layout not in self.roster.by_name[name].ready]
+
+    @property
+    def added(self) -> list[AddedEntity]:
+        """Entities of the committed frame's layout beside the deployment's."""
+        base = build_layout(self.deployment)
+        return [AddedEntity(e.name, e.model) for e in self.frame.layout.entities if e.name not in base]
+
+    # --- release and commit ------------------------------------------------------------------------------------------
+
+    def _release(self, now_ns: int) -> None:
+        """Release the orders that pace and clock allow."""
+        while not self.stop_at or self.released < self.stop_at:
+            if not self.pacer.may_release(self.released, self.frame.tick, now_ns):
+                return
+            tick = self.released
+            edits = self.requests.edits_for(tick)
+            self.released += 1
+            self._say_order(tick, edits)
+            if tick == 0:
+                self.started_ns = now_ns
+            self.watch.released(tick, now_ns)
+
+    def _say_order(self, tick: int, edits: list[Edit]) -> None:
+        payload = encode(Order(self.epoch, tick, edits))
+        self._orders[tick] = payload, edits
+        self._orders.pop(tick - limits.KEPT_TICKS, None)
+        self.actions.append(Publish(channels.ORDER, channels.SUPERVISOR, payload))
+
+    def _commit_next(self, now_ns: int) -> bool:
+        """Assemble and commit the next frame when all its parts are there; False when something is missing."""
+        tick = self.frame.tick
+        parts = self._parts.get(tick + 1)
+        deliveries = self._deliveries.get(tick)
+        if parts is None or deliveries is None or len(parts) < len(self.members) or tick not in self._orders:
+            return False
+        edits = self._orders[tick][1]
+        layout = layout_after(self.frame.layout, edits)
+        slots = self._slots if layout is self.frame.layout else Slots(layout, self.owners)
+        barrier = Barrier(tick + 1, self.members, slots)
+        basis = basis_of(self.frame.digest, edits, deliveries)
+        for part in parts:
+            if part.basis != basis:
+                self._diverged += 1
+                self.finish(f"node {part.node} has diverged: its part {part.tick} has another basis", failed=True)
+                return False
+            barrier.add(part)
+        frame = barrier.assemble()
+        self._slots = slots
+        self._parts.pop(tick + 1)
+        self._deliveries.pop(tick - limits.KEPT_TICKS, None)
+        self._count(barrier, frame)
+        self._take_frame(frame, edits, now_ns)
+        return True
+
+    def _count(self, barrier: Barrier, frame: Frame) -> None:
+        """Keep account of who solved what."""
+        for name, part in barrier.parts.items():
+            if any(frame.layout.entities[index].has_body for index in part.solved):
+                self.solved_ticks[name] = self.solved_ticks.get(name, 0) + 1
+        solver = barrier.solver_of(frame.layout["ball"].index)
+        if self.ball_solver and solver != self.ball_solver:
+            self.handovers += 1
+        self.ball_solver = solver
+
+    def _take_frame(self, frame: Frame, edits: list[Edit], now_ns: int) -> None:
+        self.frame = frame
+        self.chain = chain_next(self.chain, frame.digest)
+        self.committed_ns = now_ns
+        self._say_commit(edits)
+        moved_ns = self.pacer.committed(frame.tick, now_ns)
+        self.watch.committed(frame.tick, self.pacer.last_lag_ns, now_ns)
+        if moved_ns:
+            self.actions.append(
+                Say("warning", f"tick {frame.tick}: lag {moved_ns / 1e6:.1f} ms, waited for {self.watch.late}")
+            )
+
+    def _say_commit(self, edits: list[Edit]) -> None:
+        """Journal a frame, then publish it to the vHub."""
+        frame = self.frame
+        commit = Commit(
+            self.epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, edits
+        )
+        payload = encode(commit)
+        self._commits[frame.tick] = payload
+        self._commits.pop(frame.tick - limits.KEPT_TICKS, None)
+        self.actions.append(Journal(payload))
+        self.actions.append(Publish(channels.COMMIT, channels.VHUB, payload))
+
+    # --- epochs ------------------------------------------------------------------------------------------------------
+
+    def open_epoch(self, owners: dict[str, str], now_ns: int) -> None:
+        """Begin a new epoch at the last commit: journal it, say it, issue the orders from there again."""
+        self.epoch += 1
+        self.owners = owners
+        self.members = tuple(sorted(self.deployment.nodes))
+        self._parts.clear()
+        self._slots = Slots(self.frame.layout, owners)
+        epoch = Epoch(
+            self.epoch, self.frame.tick, self.frame.digest, list(self.members), sorted(owners.items()), self.added
+        )
+        payload = encode(epoch)
+        self.actions.append(Journal(payload))
+        self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, payload))
+        self._epoch_payload = payload
+        for tick in range(self.frame.tick, self.released):
+            self._say_order(tick, self._orders[tick][1])
+        self.watch.begun(now_ns)
+
+    def _start_if_ready(self, now_ns: int) -> None:
+        """Open the first epoch when every declared process has built the world."""
+        if self.epoch > 0 or self.end is not None or self.roster.missing(self.frame.layout.digest):
+            return
+        self.pacer.start(now_ns)
+        self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
+        self.solved_ticks = dict.fromkeys(sorted(self.deployment.nodes), 0)
+        self.open_epoch(self.owners, now_ns)
+        self._say_commit([])
+
+    def tempo(self) -> bytes:
+        """Return the message that tells the vHub the pace."""
+        return encode(Tempo(str(self.pacer.pace), self.pacer.paused))
+
+    def prepare(self, layout: Layout) -> None:
+        """Have every node build an engine for a layout."""
+        base = build_layout(self.deployment)
+        added = [AddedEntity(e.name, e.model) for e in layout.entities if e.name not in base]
+        self.actions.append(Publish(channels.PREPARE, channels.SUPERVISOR, encode(Prepare(added))))
+
+    # --- messages ----------------------------------------------------------------------------------------------------
+
+    def _on_hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
+        reason = self.roster.reason_against(hello)
+        if reason:
+            self._refuse(hello.role, hello.name, hello.boot, reason)
+            return
+        self.roster.take(hello, now_ns)
+        settings = self.settings
+        build = Build(
+            hello.name,
+            hello.boot,
+            settings.run,
+            settings.deployment_name,
+            settings.deployment_text,
+            str(self.pacer.pace),
+            self.added,
+        )
+        self.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
+
+    def _refuse(self, role: str, name: str, boot: str, reason: str) -> None:
+        self.actions.append(Say("warning", f"{role} {name} refused: {reason}"))
+        self.actions.append(Publish(channels.REFUSAL, name, encode(Refusal(name, boot, reason))))
+
+    def _on_ready(self, ready: Ready, payload: bytes, now_ns: int) -> None:
+        process = self.roster.by_name.get(ready.name)
+        if process is None or process.boot != ready.boot:
+            self._repeated += 1
+            return
+        process.heard_ns = now_ns
+        reason = self.roster.note_ready(process, ready)
+        if reason:
+            self._refuse(process.role, process.name, process.boot, reason)
+            return
+        if self.epoch > 0 and ready.layout == self.frame.layout.digest and self.frame.tick == 0:
+            self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
+        self._start_if_ready(now_ns)
+        self.requests.layout_ready(now_ns)
+
+    def _on_heartbeat(self, heartbeat: Heartbeat, payload: bytes, now_ns: int) -> None:
+        process = self.roster.by_name.get(heartbeat.sender)
+        if process is None:
+            self._repeated += 1
+            return
+        process.heard_ns = now_ns
+        process.heartbeat = heartbeat
+        report = decode_json(heartbeat.report)
+        process.report = report if isinstance(report, dict) else {}
+        if self.epoch > 0 and heartbeat.epoch < self.epoch and self.end is None:
+            self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
+            if heartbeat.sender == channels.VHUB:
+                self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
+        if heartbeat.lost and self.end is None:
+            self.finish(f"lost {heartbeat.lost}", failed=True)
+
+    def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
+        if part.epoch != self.epoch or part.tick <= self.frame.tick or part.tick > self.frame.tick + limits.KEPT_TICKS:
+            self._repeated += 1
+            return
+        if part.node not in self.members:
+            raise Malformed(f"a part of {part.node}, the roster is {', '.join(self.members)}")
+        parts = self._parts.setdefault(part.tick, [])
+        if any(known.node == part.node for known in parts):
+            self._repeated += 1
+            return
+        parts.append(part)
+        self.watch.part(part.tick - 1, part.node, now_ns)
+
+    def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
+        if deliveries.tick in self._deliveries or deliveries.tick < self.frame.tick:
+            self._repeated += 1
+            return
+        self._deliveries[deliveries.tick] = payload
+        self.watch.delivered(deliveries.tick, now_ns)
+
+    def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
+        if want.kind == channels.ORDER.name and want.tick in self._orders and want.epoch == self.epoch:
+            self.actions.append(Publish(channels.ORDER, channels.SUPERVISOR, self._orders[want.tick][0]))
+        elif want.kind == channels.COMMIT.name and want.tick in self._commits:
+            self.actions.append(Publish(channels.COMMIT, want.sender, self._commits[want.tick]))
+
+    def _on_farewell(self, farewell: Farewell, payload: bytes, now_ns: int) -> None:
+        process = self.roster.by_name.get(farewell.name)
+        if process is not None:
+            process.farewell = True
+            report = decode_json(farewell.report)
+            if isinstance(report, dict) and report:
+                process.report = report

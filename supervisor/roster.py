@@ -1,0 +1,105 @@
+"""Who takes part: the handshake as the supervisor sees it, and who is heard of.
+
+A hello is checked (protocol version, world, a free and declared name, the arithmetic fingerprint) and answered with a
+build or a refusal that says why. Neighbours: `protocol.member` is the other side, `core` opens epochs with who is ready.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from foosim.protocol import limits
+from foosim.protocol.channels import VHUB
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.messages import Heartbeat, Hello, Ready
+from foosim.protocol.names import nearest_name
+
+
+@dataclass(slots=True)
+class Process:
+    """One process that takes part."""
+
+    role: str
+    name: str
+    boot: str
+    ready: set[bytes] = field(default_factory=set)
+    """Digests of the layouts that it has built."""
+    heard_ns: int = 0
+    heartbeat: Heartbeat | None = None
+    report: dict[str, Any] = field(default_factory=dict)
+    farewell: bool = False
+
+
+class Roster:
+    """The processes of a run, by name."""
+
+    def __init__(self, deployment: Deployment, fingerprint: bytes) -> None:
+        self.deployment = deployment
+        self.by_name: dict[str, Process] = {}
+        self._fingerprint = fingerprint
+        self._simulation = b""
+
+    @property
+    def expected(self) -> list[str]:
+        """Names of the nodes and the vHub that the deployment declares."""
+        return [*sorted(self.deployment.nodes), VHUB]
+
+    @property
+    def nodes(self) -> list[str]:
+        return sorted(name for name, process in self.by_name.items() if process.role == "node")
+
+    def reason_against(self, hello: Hello) -> str:
+        """Return why this process cannot take part, or an empty string."""
+        if hello.version != limits.PROTOCOL_VERSION:
+            return f"protocol version {hello.version}, this is {limits.PROTOCOL_VERSION}"
+        if hello.world not in ("", self.deployment.world):
+            return f"world {hello.world}, this is {self.deployment.world}"
+        choices = [VHUB] if hello.role == "vhub" else sorted(self.deployment.nodes)
+        if hello.name not in choices:
+            nearest = nearest_name(hello.name, choices)
+            hint = f", nearest is {nearest}" if nearest else ""
+            return f"no {hello.role} {hello.name} is declared; declared are {', '.join(choices)}{hint}"
+        known = self.by_name.get(hello.name)
+        if known is not None and known.boot != hello.boot:
+            return f"a {known.role} {hello.name} is already here"
+        if hello.fingerprint != self._fingerprint and not self.deployment.mixed_cpu:
+            return (
+                f"arithmetic fingerprint {hello.fingerprint.hex()[:16]}, this is {self._fingerprint.hex()[:16]}: "
+                "its results would differ (the deployment may say mixed_cpu: true)"
+            )
+        return ""
+
+    def take(self, hello: Hello, now_ns: int) -> Process:
+        """Note a process whose hello was accepted."""
+        return self.by_name.setdefault(
+            hello.name, Process(hello.role, hello.name, hello.boot, heard_ns=now_ns)
+        )
+
+    def note_ready(self, process: Process, ready: Ready) -> str:
+        """Note a layout that is built; return why the process cannot take part after all, or an empty string."""
+        if process.role == "node":
+            if not self._simulation:
+                self._simulation = ready.fingerprint
+            if ready.fingerprint != self._simulation and not self.deployment.mixed_cpu:
+                self.by_name.pop(process.name)
+                return (
+                    f"a fixed small run of its engine has digest {ready.fingerprint.hex()[:16]}, the first node's is "
+                    f"{self._simulation.hex()[:16]}: its results would differ (the deployment may say mixed_cpu: true)"
+                )
+        process.ready.add(ready.layout)
+        return ""
+
+    def missing(self, layout: bytes) -> list[str]:
+        """Return who is not ready for a layout yet, of those that the deployment declares."""
+        return [
+            name for name in self.expected if name not in self.by_name or layout not in self.by_name[name].ready
+        ]
+
+    def silent(self, now_ns: int, deadline_ns: int) -> list[str]:
+        """Return who has not been heard of for longer than the deadline."""
+        return [
+            name
+            for name, process in sorted(self.by_name.items())
+            if now_ns - process.heard_ns > deadline_ns and not process.farewell
+        ]

@@ -1,0 +1,90 @@
+"""What the supervisor knows of a run, as JSON: for `status`, for the display, and the result at its end.
+
+Neighbours: `requests` answers with it, `display` shows it, `up` prints the result.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from foosim.protocol.channels import VHUB
+
+if TYPE_CHECKING:
+    from foosim.supervisor.core import SupervisorCore
+
+NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
+
+
+def result(core: SupervisorCore) -> dict[str, Any]:
+    """Return the result of a run, or of a run so far."""
+    frame = core.frame
+    hub = core.roster.by_name.get(VHUB)
+    report = {} if hub is None else hub.report
+    wall_ns = core.committed_ns - core.started_ns
+    red, blue = frame.score
+    lags = core.pacer.lags
+    fast = core.pacer.is_fast
+    return {
+        "run": core.settings.run,
+        "world": core.deployment.world,
+        "seed": core.deployment.seed,
+        "ticks": frame.tick,
+        "tick_ns": core.deployment.tick_ns,
+        "rtf": round(frame.tick * core.deployment.tick_ns / wall_ns, 3) if wall_ns > 0 else None,
+        "lag_ms": None
+        if fast
+        else {"p50": lags.quantile_ms(0.5), "p99": lags.quantile_ms(0.99), "max": lags.max_ns / 1e6},
+        "digest": {"frame": frame.digest.hex(), "chain": core.chain.hex()},
+        "packets": report.get("packets", NO_PACKETS),
+        "nodes": {
+            name: {
+                "owned": sorted(robot for robot, owner in core.owners.items() if owner == name),
+                "solved_ticks": core.solved_ticks.get(name, 0),
+            }
+            for name in sorted(core.deployment.nodes)
+        },
+        "moves": core.moves,
+        "handovers": core.handovers,
+        "score": {"red": red, "blue": blue},
+        "capture": report.get("capture") or None,
+        "reason": core.end.reason if core.end is not None else None,
+        "failed": core.end.failed if core.end is not None else False,
+    }
+
+
+def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
+    """Return the result so far and what only a running system has."""
+    hub = core.roster.by_name.get(VHUB)
+    report = {} if hub is None else hub.report
+    pacer = core.pacer
+    ball = core.frame.vector("ball", "position", 3)
+    return {
+        **result(core),
+        "epoch": core.epoch,
+        "state": _state(core),
+        "pace": str(pacer.pace),
+        "released": core.released,
+        "late": {"lag_ms": pacer.last_lag_ns / 1e6, "waited_for": core.watch.late, "tick": core.watch.late_tick},
+        "waiting_for": core.watch.waiting_for(core),
+        "ball": {"position": [round(value, 4) for value in ball], "solver": core.ball_solver},
+        "processes": {
+            name: {
+                "role": process.role,
+                "busy": 0.0 if process.heartbeat is None else round(process.heartbeat.busy, 3),
+                "tick": 0 if process.heartbeat is None else process.heartbeat.tick,
+                "waiting_for": "" if process.heartbeat is None else process.heartbeat.waiting_for,
+            }
+            for name, process in sorted(core.roster.by_name.items())
+        },
+        "links": report.get("links", []),
+        "refusals": report.get("refusals", {}),
+        "clients": report.get("clients", []),
+    }
+
+
+def _state(core: SupervisorCore) -> str:
+    if core.end is not None:
+        return "failed" if core.end.failed else "ended"
+    if core.epoch == 0:
+        return "starting"
+    return "paused" if core.pacer.paused else "running"

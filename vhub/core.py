@@ -1,0 +1,567 @@
+"""The core of the vHub: takes messages and the time, and closes ticks in two phases.
+
+It sees committed frames only. Closing tick k waits for Commit(k) and the samples of every robot (world phase), then for
+the Dones of the lockstep clients that are due (clients phase); the record is written before the deliveries are spoken.
+`Go` alone may be spoken before: it is a function of what is already written, commit and samples.
+Neighbours: `state` (what a closing does), `sessions` (clients), `records` (journal), `protocol.member` (handshake).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Action, Journal, Publish, Say
+from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.member import Member
+from foosim.protocol.messages import (
+    Build,
+    ClientHello,
+    Commit,
+    Deliveries,
+    Done,
+    End,
+    Epoch,
+    Farewell,
+    Heartbeat,
+    Join,
+    RobotPacket,
+    Samples,
+    Sent,
+    Tempo,
+    Up,
+    Want,
+)
+from foosim.protocol.units import parse_pace
+from foosim.vhub.packet import IN_FLIGHT, Flight
+from foosim.vhub.records import Closing, HeadRecord, TickRecord, world_packets
+from foosim.vhub.sessions import Session, Sessions
+from foosim.vhub.state import HubState, received
+
+ANCHOR_WINDOW_NS: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """Rows for the capture, behind the journal: what one closing gave."""
+
+    closing: Closing
+
+
+@dataclass(frozen=True, slots=True)
+class HubStatistics:
+    """The hub's account so far."""
+
+    closed: int
+    offered: int
+    delivered: int
+    dropped: int
+    in_flight: int
+    refused: int
+    malformed: int
+    repeated: int
+
+
+HubAction = Action | Keep
+
+
+@dataclass(slots=True)
+class _World:
+    """The tick that is being closed, after its world phase."""
+
+    frame: Frame
+    closing: Closing
+    waited: list[str]
+    free: dict[str, list[Flight]]
+
+
+class HubCore:
+    """The vHub's state machine. `actions` is what the shell performs next."""
+
+    def __init__(self, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
+        self.actions: list[HubAction] = []
+        self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
+        self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
+        self.deployment: Deployment | None = None
+        self.state: HubState | None = None
+        self.ended: End | None = None
+        self.finished = False
+        self.lost = ""
+        self.busy = 0.0
+        self.capture = ""
+        self._layout: Layout | None = None
+        self._epoch = 0
+        self._pace = 0.0
+        self._paused = False
+        self._commits: dict[int, tuple[bytes, Commit, Frame]] = {}
+        self._next_commit = 0
+        self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
+        self._sent: dict[int, bytes] = {}
+        self._world: _World | None = None
+        self._leaves: list[str] = []
+        self._anchors: deque[tuple[int, int]] = deque()
+        self._releases: list[tuple[int, str, int, list[Flight]]] = []
+        self._want_after_ns = limits.WANT_AFTER_NS
+        self._want_ns = now_ns
+        self._end_ns = 0
+        self._malformed = self._repeated = 0
+        self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
+            Commit: self._on_commit,
+            Samples: self._on_samples,
+            Epoch: self._on_epoch,
+            Want: self._on_want,
+            Build: self._on_build,
+            Tempo: self._on_tempo,
+            End: self._on_end,
+            ClientHello: self._on_hello,
+            Join: self._on_join,
+            Up: self._on_up,
+            Done: self._on_done,
+        }
+
+    # --- what the shell calls --------------------------------------------------------------------------------------
+
+    def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+        """Take one message as it came; what does not fit is counted and dropped."""
+        try:
+            if channel is channels.REFUSAL:
+                self.member.refuse(payload)
+                return
+            message = decode(channel.message, payload, channel.bytes_max)
+            reader = self._readers.get(type(message))
+            if reader is None:
+                raise Malformed(f"the vHub does not read the channel {channel.name}")
+            if channel.plane is channels.Plane.RADIO and message.name != name:
+                raise Malformed(f"a message on the key of {name} that names {message.name}")
+            reader(message, payload, now_ns)
+        except Malformed as error:
+            self._malformed += 1
+            if channel.plane is channels.Plane.RADIO and self.state is not None:
+                self.state.refuse("malformed")
+            if self._malformed <= 3:
+                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+
+    def advance(self, now_ns: int) -> None:
+        """Close ticks as far as the inputs allow."""
+        while self.state is not None and self._epoch > 0 and not self.finished:
+            if self.ended is not None and self.state.closed + 1 >= self.ended.tick:
+                self._finish(now_ns)
+                return
+            if self._world is None and not self._close_world(now_ns):
+                return
+            if not self._close_clients(now_ns):
+                return
+
+    def wake(self, now_ns: int) -> None:
+        """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
+        self.member.wake(now_ns, self._heartbeat)
+        if self._world is not None and self._world.waited:
+            self.sessions.repeat(self._world.waited, now_ns)
+            self._check_deadlines(now_ns)
+        if now_ns >= self._want_ns and self._epoch > 0 and not self.finished:
+            self._ask_again(now_ns)
+        self._release(now_ns)
+        if self.ended is not None and not self.finished and now_ns >= self._end_ns:
+            self._finish(now_ns)
+
+    def deadline_ns(self) -> int:
+        """When `wake` has something to do next."""
+        deadline = self.member.deadline_ns
+        if self._epoch > 0 and not self.finished:
+            deadline = min(deadline, self._want_ns)
+        if self._releases:
+            deadline = min(deadline, self._releases[0][0])
+        if self._world is not None:
+            for name in self._world.waited:
+                deadline = min(deadline, self.sessions.by_name[name].again_ns)
+        return deadline
+
+    def client_gone(self, name: str, now_ns: int) -> None:
+        """A client's presence has ended: a lockstep one ends the run, a free-running one leaves it."""
+        session = self.sessions.by_name.pop(name, None)
+        if session is None or self.state is None or self.ended is not None:
+            return
+        member = self.state.members.get(name)
+        if member is not None and member.period > 0:
+            self._lose(name, "its connection closed")
+        elif member is not None:
+            self._leaves.append(name)
+
+    def statistics(self) -> HubStatistics:
+        if self.state is None:
+            return HubStatistics(-1, 0, 0, 0, 0, 0, self._malformed, self._repeated)
+        packets = self.state.packets
+        return HubStatistics(
+            self.state.closed,
+            packets.offered,
+            packets.delivered,
+            packets.dropped,
+            packets.in_flight,
+            packets.refused,
+            self._malformed,
+            self._repeated,
+        )
+
+    @property
+    def waiting_for(self) -> str:
+        """What the closing of the current tick lacks, for people and for the supervisor."""
+        if self.state is None:
+            return "start"
+        if self._epoch == 0:
+            missing = self._missing_clients()
+            return f"join of {', '.join(missing)}" if missing else "epoch"
+        if self._world is not None:
+            return f"Done of {', '.join(self._world.waited)}" if self._world.waited else ""
+        tick = self.state.closed + 1
+        return "samples" if tick in self._commits else "commit"
+
+    # --- closing a tick ----------------------------------------------------------------------------------------------
+
+    def _close_world(self, now_ns: int) -> bool:
+        """Phase one, when commit and all samples are there: judge what robots sent, say Go."""
+        state = self.state
+        assert state is not None
+        tick = state.closed + 1
+        committed = self._commits.get(tick)
+        if committed is None:
+            return False
+        raw, commit, frame = committed
+        packets = self._packets_of(tick, commit, frame)
+        if packets is None:
+            return False
+        leaves, self._leaves = self._leaves, []
+        joins = self.sessions.take_joins(tick)
+        for name in leaves:
+            state.leave(name)
+        for joining in joins:
+            state.join(joining, tick)
+        closing = Closing(
+            frame, commit.digest, commit.edits, state.deliveries.get(tick - 1, []), joins, leaves, wall_ns=now_ns
+        )
+        released = state.close_world(frame, packets, closing.fates)
+        due = state.due_members(tick)
+        for name in due:
+            self._go(name, tick, released.pop(name, []), now_ns)
+        self._world = _World(frame, closing, [name for name in due if name in self.sessions.by_name], released)
+        return True
+
+    def _packets_of(self, tick: int, commit: Commit, frame: Frame) -> list[RobotPacket] | None:
+        samples = self._samples.get(tick)
+        return None if samples is None else world_packets((s for _, s in samples), commit.digest, frame.layout)
+
+    def _go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
+        assert self.state is not None and self.deployment is not None
+        member = self.state.members[name]
+        member.downlink += 1
+        session = self.sessions.by_name.get(name)
+        if session is None:
+            return
+        self.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
+        deadlines = self.deployment.deadlines
+        session.deadline_ns = now_ns + (deadlines.lockstep_realtime_ns if self._pace else deadlines.lockstep_fast_ns)
+        session.again_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
+        session.again_ns = now_ns + session.again_after_ns
+
+    def _close_clients(self, now_ns: int) -> bool:
+        """Phase two, when all Dones are there: judge what clients sent, write, speak."""
+        world, state = self._world, self.state
+        assert world is not None and state is not None
+        if world.waited:
+            return False
+        tick = world.frame.tick
+        admitted: dict[str, list[Sent]] = {}
+        for name, session in self.sessions.by_name.items():
+            packets = session.inbox
+            session.inbox = []
+            if session.done is not None:
+                packets = [*packets, *session.done.packets]
+                session.done = None
+            if packets:
+                admitted[name] = packets
+        deliveries = Deliveries(tick + 1, state.close_clients(world.frame, admitted, world.closing.fates))
+        payload = encode(deliveries)
+        for name in world.free:
+            state.members[name].downlink += 1
+        self._write(tick, world, admitted, payload)
+        self._sent[tick + 1] = payload
+        self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
+        self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
+        for name, flights in world.free.items():
+            self._release_later(name, tick, flights, now_ns)
+        self.actions.append(Keep(world.closing))
+        self._world = None
+        self._commits.pop(tick - limits.KEPT_TICKS, None)
+        self._samples.pop(tick, None)
+        self._progress(now_ns)
+        return True
+
+    def _write(self, tick: int, world: _World, admitted: dict[str, list[Sent]], deliveries: bytes) -> None:
+        samples = [raw for raw, message in self._samples[tick] if message.digest == world.closing.digest]
+        record = TickRecord(
+            tick,
+            self._commits[tick][0],
+            samples,
+            sorted(admitted.items()),
+            world.closing.joins,
+            world.closing.leaves,
+            deliveries,
+        )
+        self.actions.append(Journal(encode(record)))
+
+    def head(self) -> bytes:
+        """Return the record with which a journal file starts: the state after the last closed tick."""
+        assert self.state is not None and self.member.build is not None and self._layout is not None
+        layout = self._commits[self.state.closed][2].layout if self.state.closed in self._commits else self._layout
+        base = build_layout(self.state.deployment)
+        added = [(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
+        return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added))
+
+    # --- releasing to free-running clients ---------------------------------------------------------------------------
+
+    def _release_later(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
+        """In realtime a packet leaves at anchor + due, never before its tick is closed; else at once."""
+        assert self.state is not None
+        number = self.state.members[name].downlink
+        if not self._pace or not self._anchors:
+            self._say_down(name, number, tick, flights, now_ns)
+            return
+        due_ns = max(flight.due_ns for flight in flights)
+        at_ns = self._anchor_ns() + int(due_ns / self._pace)
+        if at_ns <= now_ns:
+            self._say_down(name, number, tick, flights, now_ns)
+        else:
+            self._releases.append((at_ns, name, number, flights))
+            self._releases.sort(key=lambda release: release[:3])
+
+    def _release(self, now_ns: int) -> None:
+        while self._releases and self._releases[0][0] <= now_ns:
+            _, name, number, flights = self._releases.pop(0)
+            self._say_down(name, number, flights[0].arrival_tick, flights, now_ns)
+
+    def _say_down(self, name: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
+        assert self.state is not None
+        for flight in flights:
+            flight.released_wall_ns = now_ns
+        self.sessions.say_down(name, number, tick, received(flights), self.state.members[name].sequence)
+
+    def _anchor_ns(self) -> int:
+        return min(anchor for _, anchor in self._anchors)
+
+    # --- messages ----------------------------------------------------------------------------------------------------
+
+    def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
+        if not self.member.take_build(build):
+            return
+        deployment = self.deployment = self.member.deployment
+        assert deployment is not None
+        self._layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
+        self.state = HubState(deployment)
+        self.actions.append(Journal(self.head()))
+        self._ready_if_complete()
+
+    def _missing_clients(self) -> list[str]:
+        assert self.deployment is not None
+        declared = {**self.deployment.players, **self.deployment.clients}
+        return [
+            name for name, client in sorted(declared.items()) if client.lockstep and name not in self.sessions.joins
+        ]
+
+    def _ready_if_complete(self) -> None:
+        """The hub is ready when all declared lockstep clients have joined."""
+        if self._layout is not None and not self.member.is_ready and not self._missing_clients():
+            self.member.ready(self._layout)
+
+    def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
+        if epoch.epoch <= self._epoch or self.state is None:
+            self._repeated += 1
+            return
+        first = self._epoch == 0
+        self._epoch = epoch.epoch
+        self.member.entered()
+        if first:
+            self._sent[0] = encode(Deliveries(0, []))
+            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[0]))
+            self._progress(now_ns)
+
+    def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
+        if commit.tick != self._next_commit or self._layout is None or commit.epoch < self._epoch:
+            self._repeated += 1
+            return
+        layout = layout_after(self._layout, commit.edits)
+        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        self._layout = layout
+        self._next_commit += 1
+        self._commits[commit.tick] = payload, commit, frame
+        if self._pace and self.deployment is not None:
+            anchor = now_ns - int(commit.tick * self.deployment.tick_ns / self._pace)
+            self._anchors.append((now_ns, anchor))
+            while self._anchors[0][0] < now_ns - ANCHOR_WINDOW_NS:
+                self._anchors.popleft()
+
+    def _on_samples(self, samples: Samples, payload: bytes, now_ns: int) -> None:
+        if self.state is None or not self.state.closed < samples.tick <= self.state.closed + limits.KEPT_TICKS:
+            self._repeated += 1
+            return
+        kept = self._samples.setdefault(samples.tick, [])
+        if any(raw == payload for raw, _ in kept):
+            self._repeated += 1
+        elif len(kept) < limits.NODES_MAX * 4:
+            kept.append((payload, samples))
+
+    def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
+        if want.kind == channels.DELIVERIES.name and want.tick in self._sent:
+            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[want.tick]))
+
+    def _on_hello(self, hello: ClientHello, payload: bytes, now_ns: int) -> None:
+        if self.state is None or self.deployment is None or self.member.build is None:
+            return
+        self.sessions.hello(hello, self.member.build, self.deployment, self.state)
+
+    def _session(self, message: Join | Up | Done) -> Session | None:
+        session = self.sessions.by_name.get(message.name)
+        if session is None or session.boot != message.boot:
+            self._repeated += 1
+            return None
+        return session
+
+    def _on_join(self, join: Join, payload: bytes, now_ns: int) -> None:
+        if self._session(join) is None or self.state is None:
+            return
+        known = self.state.members.get(join.name)
+        if known is not None and known.active and known.period == join.period:
+            self._repeated += 1
+            return
+        self.sessions.join(join)
+        self._ready_if_complete()
+
+    def _on_up(self, up: Up, payload: bytes, now_ns: int) -> None:
+        session = self._session(up)
+        if session is None or self.state is None:
+            return
+        if len(session.inbox) + len(up.packets) > limits.INBOX_MESSAGES_MAX:
+            for _ in up.packets:
+                self.state.refuse("inbox_full")
+            return
+        session.inbox += up.packets
+
+    def _on_done(self, done: Done, payload: bytes, now_ns: int) -> None:
+        session = self._session(done)
+        if session is None or self._world is None or done.tick != session.go_tick:
+            self._repeated += 1
+            return
+        if done.name in self._world.waited:
+            self._world.waited.remove(done.name)
+            session.done = done
+
+    def _on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
+        """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
+        try:
+            pace = parse_pace(tempo.pace)
+        except Refused as error:
+            raise Malformed(str(error)) from None
+        factor = 0.0 if pace.kind == "fast" else float(pace.factor)
+        if factor != self._pace or tempo.paused != self._paused:
+            self._anchors.clear()
+        self._pace = factor
+        self._paused = tempo.paused
+
+    # --- time --------------------------------------------------------------------------------------------------------
+
+    def _progress(self, now_ns: int) -> None:
+        assert self.deployment is not None
+        self._want_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
+        self._want_ns = now_ns + self._want_after_ns
+
+    def _ask_again(self, now_ns: int) -> None:
+        assert self.state is not None
+        tick = self.state.closed + 1
+        kind = channels.SAMPLES.name if tick in self._commits else channels.COMMIT.name
+        if self._world is None:
+            want = Want(channels.VHUB, kind, tick, self._epoch)
+            self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
+        self._want_after_ns = min(2 * self._want_after_ns, limits.WANT_EVERY_NS_MAX)
+        self._want_ns = now_ns + self._want_after_ns
+
+    def _check_deadlines(self, now_ns: int) -> None:
+        assert self._world is not None
+        for name in self._world.waited:
+            session = self.sessions.by_name[name]
+            if self._paused:
+                session.deadline_ns = max(session.deadline_ns, now_ns + limits.WANT_EVERY_NS_MAX)
+            elif now_ns >= session.deadline_ns:
+                self._lose(name, f"no Done of tick {session.go_tick} within its deadline")
+
+    def _lose(self, name: str, why: str) -> None:
+        if not self.lost:
+            self.lost = f"{name}: {why}"
+            self.actions.append(Say("error", f"lost {self.lost}"))
+            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self._heartbeat())))
+
+    def _heartbeat(self) -> Heartbeat:
+        tick = 0 if self.state is None else self.state.closed + 1
+        return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, self._report())
+
+    def _report(self) -> bytes:
+        """Return the account for people: totals, refusals, and a line per link."""
+        if self.state is None:
+            return encode_json({})
+        packets = self.state.packets
+        return encode_json(
+            {
+                "packets": {
+                    "offered": packets.offered,
+                    "delivered": packets.delivered,
+                    "dropped": packets.dropped,
+                    "in_flight": packets.in_flight,
+                    "refused": packets.refused,
+                },
+                "refusals": self.state.refusals,
+                "links": [
+                    [*pair, s.offered, s.delivered, s.dropped, s.delay_ns // s.delivered if s.delivered else 0]
+                    for pair, s in sorted((pair, link.state) for pair, link in self.state.links.items())
+                ],
+                "clients": sorted(self.state.members),
+                "capture": self.capture,
+            }
+        )
+
+    # --- the end -----------------------------------------------------------------------------------------------------
+
+    def _on_end(self, end: End, payload: bytes, now_ns: int) -> None:
+        if self.ended is None:
+            self.ended = end
+            self._end_ns = now_ns + limits.DOWNLINK_KEPT_NS
+
+    def _finish(self, now_ns: int) -> None:
+        """Record the last frame and what is still in flight, tell the clients; the shell says farewell."""
+        assert self.state is not None and self.ended is not None
+        last = self._commits.get(self.ended.tick)
+        if last is None and self.state.closed + 1 >= self.ended.tick and now_ns < self._end_ns:
+            return
+        self.finished = True
+        committed = last or self._commits.get(self.state.closed + 1) or self._commits.get(self.state.closed)
+        if committed is not None:
+            _, commit, frame = committed
+            flights = self.state.in_flight()
+            for flight in flights:
+                flight.cause = IN_FLIGHT
+            final = Closing(frame, commit.digest, commit.edits, self.state.deliveries.get(frame.tick - 1, []))
+            final.fates = flights
+            final.wall_ns = now_ns
+            self.actions.append(Keep(final))
+        for name in self.sessions.by_name:
+            member = self.state.members.get(name)
+            number = 1 if member is None else member.downlink + 1
+            self.sessions.say_down(name, number, self.ended.tick, [], 0, ended=True)
+
+    def farewell(self) -> Publish:
+        """Return the hub's last message, once the shell has closed the capture."""
+        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, self._report())))

@@ -1,0 +1,53 @@
+"""A packet on its way through the pipeline, and what became of it.
+
+A flight is made when a packet is offered to one receiver; stages read it and write its due time, or name the one cause
+of its drop, with the inputs that led there. Neighbours: `links` walks the stages, `stages` are one file each.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+DELIVERED: Final = "delivered"
+DROPPED: Final = "dropped"
+IN_FLIGHT: Final = "in_flight"
+
+
+class Flight:
+    """One offered packet: from `source` to one receiver. Times are simulated nanoseconds."""
+
+    __slots__ = (
+        "arrival_tick",
+        "cause",
+        "channel",
+        "copy",
+        "destination",
+        "due_ns",
+        "payload",
+        "released_wall_ns",
+        "rule",
+        "sent_ns",
+        "sequence",
+        "source",
+        "stamp_ns",
+        "words",
+    )
+
+    def __init__(
+        self, source: str, destination: str, channel: str, sequence: int, sent_ns: int, stamp_ns: int, payload: bytes
+    ) -> None:
+        self.source = source
+        self.destination = destination
+        self.channel = channel
+        self.sequence = sequence
+        self.copy = 0
+        self.sent_ns = sent_ns
+        self.stamp_ns = stamp_ns
+        self.payload = payload
+        self.due_ns = sent_ns
+        self.arrival_tick = 0
+        self.cause = ""
+        self.rule = ""
+        self.words: tuple[int, ...] = ()
+        """The draws of the packet, when a stage asked for them: eight 64-bit words."""
+        self.released_wall_ns = 0

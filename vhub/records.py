@@ -1,0 +1,110 @@
+"""The vHub's journal: one record per closed tick, holding the inputs of the closing and what it gave.
+
+A fold of the records through the same state gives frames, fates, what is in flight and the next deliveries again, byte
+for byte. The first record of a file holds the whole state, so that older files can go. Neighbours: `state`, `core`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import msgspec
+
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.messages import Commit, Deliveries, Edit, RobotPacket, Samples, Sent
+from foosim.vhub.packet import Flight
+from foosim.vhub.state import HubState, Joining
+
+
+class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
+    """Where a journal file starts: the run, the state after the last closed tick, the layout's added entities."""
+
+    run: str
+    state: bytes
+    added: list[tuple[str, str]]
+
+
+class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbid_unknown_fields=True):
+    """One closed tick: the commit and samples as they came, what was admitted, who joined and left, and the result."""
+
+    tick: int
+    commit: bytes
+    samples: list[bytes]
+    admitted: list[tuple[str, list[Sent]]]
+    joins: list[Joining]
+    leaves: list[str]
+    deliveries: bytes
+
+
+HubRecord = HeadRecord | TickRecord
+
+
+@dataclass(slots=True)
+class Closing:
+    """Everything that came of closing one tick, for the capture. The last one of a run has a frame and no fates."""
+
+    frame: Frame
+    digest: bytes
+    edits: Sequence[Edit]
+    delivered: Sequence[object]
+    """What reached robots at the tick that led to this frame."""
+    joins: list[Joining] = field(default_factory=list)
+    leaves: list[str] = field(default_factory=list)
+    fates: list[Flight] = field(default_factory=list)
+    wall_ns: int = 0
+
+
+def world_packets(samples: Iterable[Samples], digest: bytes, layout: Layout) -> list[RobotPacket] | None:
+    """Return what the robots sent at a frame in (robot, index) order, or None while a robot's samples are missing."""
+    by_robot: dict[str, list[RobotPacket]] = {}
+    for message in samples:
+        if message.digest != digest:
+            continue
+        fresh = {robot for robot in message.robots if robot not in by_robot}
+        by_robot.update({robot: [] for robot in fresh})
+        for packet in message.packets:
+            if packet.robot in fresh:
+                by_robot[packet.robot].append(packet)
+    if len(by_robot) < len(layout.robots) or any(robot.name not in by_robot for robot in layout.robots):
+        return None
+    return [packet for robot in layout.robots for packet in by_robot[robot.name]]
+
+
+def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:
+    """Yield the state and the closing after every tick record; the first record is a head."""
+    iterator = iter(records)
+    head = decode(HubRecord, next(iterator))  # type: ignore[arg-type]
+    assert isinstance(head, HeadRecord), "a journal starts with its head"
+    state = HubState.restore(deployment, head.state)
+    layout = build_layout(deployment, head.added)
+    for raw in iterator:
+        record = decode(HubRecord, raw)  # type: ignore[arg-type]
+        if isinstance(record, HeadRecord):
+            continue
+        commit = decode(Commit, record.commit)
+        layout = layout_after(layout, commit.edits)
+        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        packets = world_packets([decode(Samples, samples) for samples in record.samples], commit.digest, layout)
+        assert packets is not None, "a record holds samples of every robot"
+        closing = Closing(
+            frame, commit.digest, commit.edits, state.deliveries.get(frame.tick - 1, []), record.joins, record.leaves
+        )
+        for name in record.leaves:
+            state.leave(name)
+        for joining in record.joins:
+            state.join(joining, record.tick)
+        released = state.close_world(frame, packets, closing.fates)
+        count_downlinks(state, frame.tick, released)
+        deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
+        assert encode(Deliveries(record.tick + 1, deliveries)) == record.deliveries, "a fold gives the same deliveries"
+        yield state, closing
+
+
+def count_downlinks(state: HubState, tick: int, released: dict[str, list[Flight]]) -> None:
+    """Number the messages to clients of one tick: a Go for each that is due, a Down for what is released else."""
+    for name in {*state.due_members(tick), *released}:
+        state.members[name].downlink += 1

@@ -1,0 +1,127 @@
+"""The clients' side of the hub: who is let in, what was said to each and is kept until answered.
+
+A lockstep client gets `Go(k)` and answers `Done(k)`, stop and wait; a free-running one gets numbered `Down`s. What is
+said to a client is numbered and kept. Sessions are about processes; what the world must remember of a client is in
+`state`. Neighbours: `core`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Action, Publish
+from foosim.protocol.codec import encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.messages import (
+    Build,
+    ClientHello,
+    ClientRefusal,
+    ClientWelcome,
+    Done,
+    Down,
+    Go,
+    Join,
+    Received,
+    Sent,
+)
+from foosim.protocol.names import nearest_name
+from foosim.vhub.state import HubState, Joining
+
+
+@dataclass(slots=True)
+class Session:
+    """One client's process: its boot, the Go that waits for its Done, what it sent between closings."""
+
+    name: str
+    boot: str
+    go: bytes = b""
+    go_tick: int = -1
+    again_ns: int = 0
+    again_after_ns: int = limits.WANT_AFTER_NS
+    deadline_ns: int = 0
+    done: Done | None = None
+    inbox: list[Sent] = field(default_factory=list)
+    queued_max: int = 0
+
+
+class Sessions:
+    """All clients of the hub. What it says goes to `actions`."""
+
+    def __init__(self, hub_boot: str, actions: list[Action]) -> None:
+        self.by_name: dict[str, Session] = {}
+        self.joins: dict[str, Joining] = {}
+        """Joins that wait for a tick, by client."""
+        self._hub_boot = hub_boot
+        self._actions = actions
+
+    def hello(self, hello: ClientHello, build: Build, deployment: Deployment, state: HubState) -> None:
+        """Let a client in, or say why not. A repeat gets the same answer."""
+        reason = self._reason_against(hello, deployment)
+        if reason:
+            refusal = encode(ClientRefusal(hello.name, hello.boot, reason))
+            self._actions.append(Publish(channels.CLIENT_REFUSAL, hello.name, refusal))
+            return
+        session = self.by_name.get(hello.name)
+        if session is None or session.boot != hello.boot:
+            self.by_name[hello.name] = Session(hello.name, hello.boot)
+        member = state.members.get(hello.name)
+        welcome = ClientWelcome(
+            hello.name,
+            hello.boot,
+            self._hub_boot,
+            0 if member is None else member.sequence,
+            0 if member is None else member.downlink,
+            build.deployment_name,
+            build.deployment,
+        )
+        self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
+
+    def _reason_against(self, hello: ClientHello, deployment: Deployment) -> str:
+        if hello.version != limits.PROTOCOL_VERSION:
+            return f"protocol version {hello.version}, this is {limits.PROTOCOL_VERSION}"
+        if hello.world not in ("", deployment.world):
+            return f"world {hello.world}, this is {deployment.world}"
+        declared = [*deployment.players, *deployment.clients]
+        if hello.name not in declared:
+            nearest = nearest_name(hello.name, declared)
+            hint = f", nearest is {nearest}" if nearest else ""
+            return f"no client {hello.name} is declared; declared are {', '.join(sorted(declared)) or 'none'}{hint}"
+        session = self.by_name.get(hello.name)
+        if session is not None and session.boot != hello.boot:
+            return f"a client {hello.name} is already here"
+        return ""
+
+    def join(self, join: Join) -> None:
+        """Note a join; it takes effect when the hub closes a tick that suits its period."""
+        subscriptions = [(wanted.robot, wanted.channel) for wanted in join.subscriptions]
+        self.joins[join.name] = Joining(join.name, join.period, sorted(set(subscriptions)))
+
+    def take_joins(self, tick: int) -> list[Joining]:
+        """Take the joins that take effect at `tick`, in name order."""
+        due = [name for name, j in sorted(self.joins.items()) if j.period == 0 or tick % j.period == 0]
+        return [self.joins.pop(name) for name in due]
+
+    def say_go(self, session: Session, number: int, tick: int, packets: Sequence[Received], acknowledged: int) -> None:
+        """Give a lockstep client its tick."""
+        session.go = encode(Go(number, tick, acknowledged, list(packets)))
+        session.go_tick = tick
+        session.done = None
+        self._actions.append(Publish(channels.DOWN, session.name, session.go))
+
+    def say_down(
+        self, name: str, number: int, tick: int, packets: Sequence[Received], acknowledged: int, ended: bool = False
+    ) -> None:
+        """Give a client what is released to it outside of lockstep, or the news of the end."""
+        payload = encode(Down(number, tick, acknowledged, list(packets), ended))
+        self._actions.append(Publish(channels.DOWN, name, payload))
+
+    def repeat(self, waited: Sequence[str], now_ns: int) -> None:
+        """Say a Go again to those who have not answered for long, the wait doubling."""
+        for name in waited:
+            session = self.by_name[name]
+            if now_ns >= session.again_ns:
+                self._actions.append(Publish(channels.DOWN, name, session.go))
+                session.again_after_ns = min(2 * session.again_after_ns, limits.WANT_EVERY_NS_MAX)
+                session.again_ns = now_ns + session.again_after_ns

@@ -1,0 +1,552 @@
+"""The hub's state as a value, and the closing of a tick as a function of it.
+
+Closing tick k has two phases. *World*: what robots sent at k is judged; the clients due get what has reached them.
+*Clients*: what clients sent is judged; the deliveries of tick k+1 are final. Fates know frames, times and draws, never
+nodes. The journal holds the inputs of every closing, so a fold of it through this same class gives the state again,
+byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `journal_records`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from foosim.protocol import limits
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.messages import Delivered, Received, RobotPacket, Sent
+from foosim.vhub.links import Link, LinkState
+from foosim.vhub.packet import Flight
+
+OUTBOX_SHIFT = 16
+"""A robot's sequence number is tick x 2^16 + index."""
+
+
+class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A client that joins (again): its period in ticks (0: free-running) and what it subscribes to."""
+
+    name: str
+    period: int
+    subscriptions: list[tuple[str, str]]
+
+
+@dataclass(slots=True)
+class Member:
+    """A client that takes part, as the state knows it: in ticks and numbers, without its session."""
+
+    period: int
+    subscriptions: tuple[tuple[str, str], ...]
+    joined_tick: int
+    sequence: int = 0
+    """Greatest sequence number that was admitted."""
+    downlink: int = 0
+    """Number of the last message to the client."""
+    active: bool = True
+
+    def is_due(self, tick: int) -> bool:
+        return self.active and self.period > 0 and tick % self.period == 0
+
+    def release_tick(self, tick: int) -> int:
+        """Return the first tick, from `tick` on, at which something can be released to the client."""
+        return tick if self.period == 0 else -(-tick // self.period) * self.period
+
+
+@dataclass(slots=True)
+class Packets:
+    """The account over all links: offered = delivered + dropped + in flight, at every tick."""
+
+    offered: int = 0
+    delivered: int = 0
+    dropped: int = 0
+    refused: int = 0
+
+    @property
+    def in_flight(self) -> int:
+        return self.offered - self.delivered - self.dropped
+
+
+class HubState:
+    """Links, members, what is in flight. All of it plain values; nothing here knows time but as ticks."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.deployment = deployment
+        self.tick_ns = deployment.tick_ns
+        self.closed = -1
+        """The last tick whose closing is complete."""
+        self.packets = Packets()
+        self.refusals: dict[str, int] = {}
+        self.members: dict[str, Member] = {}
+        self.links: dict[tuple[str, str], Link] = {}
+        self.deliveries: dict[int, list[Delivered]] = {-1: [], 0: []}
+        """What reaches robots at the last closed tick and at the next one."""
+        self._flights: dict[int, list[Flight]] = {}
+        """What is in flight, by the tick at which it arrives."""
+        self._endpoints = frozenset(deployment.endpoints())
+        self._robots = frozenset(deployment.robots)
+        self._receivers: dict[tuple[str, str], tuple[str, ...]] = {}
+
+    # --- joining -----------------------------------------------------------------------------------------------------
+
+    def join(self, joining: Joining, tick: int) -> None:
+        """Take a client in, from `tick` on; one that comes back keeps its numbers."""
+        known = self.members.get(joining.name)
+        subscriptions = tuple((robot, channel) for robot, channel in joining.subscriptions)
+        member = self.members[joining.name] = Member(joining.period, subscriptions, tick)
+        if known is not None:
+            member.sequence, member.downlink = known.sequence, known.downlink
+        self._receivers.clear()
+
+    def leave(self, name: str) -> None:
+        """Let a client go: nothing is offered to it any more."""
+        if name in self.members:
+            self.members[name].subscriptions = ()
+            self.members[name].active = False
+            self._receivers.clear()
+
+    def due_members(self, tick: int) -> list[str]:
+        """Return the lockstep clients that are due at `tick`, in name order."""
+        return [name for name in sorted(self.members) if self.members[name].is_due(tick)]
+
+    # --- closing a tick ----------------------------------------------------------------------------------------------
+
+    def close_world(self, frame: Frame, packets: Iterable[RobotPacket], fates: list[Flight]) -> dict[str, list[Flight]]:
+        """Phase one of closing the frame's tick; `packets` in (robot, index) order.
+
+        Append the packets whose fate is final to `fates` and return what is released, by client.
+        """
+        tick = frame.tick
+        assert tick == self.closed + 1, (tick, self.closed)
+        sent_ns = tick * self.tick_ns
+        for packet in packets:
+            sequence = (tick << OUTBOX_SHIFT) + packet.index
+            receivers: Sequence[str] = (
+                (packet.destination,) if packet.destination else self._subscribers(packet.robot, packet.channel)
+            )
+            for receiver in receivers:
+                if receiver not in self._endpoints:
+                    self.refuse("no_route")
+                    continue
+                flight = Flight(packet.robot, receiver, packet.channel, sequence, sent_ns, 0, packet.payload)
+                self._send(flight, tick, fates)
+        return self._arrive_at_clients(tick, fates)
+
+    def close_clients(
+        self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]
+    ) -> list[Delivered]:
+        """Phase two: judge what clients sent, in (source, sequence) order. Return the deliveries of the next tick."""
+        tick = frame.tick
+        sent_ns = tick * self.tick_ns
+        for source in sorted(admitted):
+            for sent in sorted(admitted[source], key=lambda packet: packet.sequence):
+                if self._admit(source, sent):
+                    flight = Flight(
+                        source, sent.destination, sent.channel, sent.sequence, sent_ns, sent.stamp_ns, sent.payload
+                    )
+                    self._send(flight, tick, fates)
+        self.closed = tick
+        deliveries = self._arrive_at_robots(tick + 1, frame, fates)
+        self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
+        return deliveries
+
+    def _admit(self, source: str, sent: Sent) -> bool:
+        """Refuse at the door what is no packet of this run: a repeat, or to nobody."""
+        member = self.members.get(source)
+        if member is None:
+            return self.refuse("unknown_source")
+        if sent.sequence <= member.sequence:
+            return self.refuse("duplicate")
+        member.sequence = sent.sequence
+        if sent.destination not in self._endpoints:
+            return self.refuse("no_route")
+        return True
+
+    def refuse(self, cause: str) -> bool:
+        """Count a packet that is refused at the door; it is in no link's account."""
+        self.packets.refused += 1
+        self.refusals[cause] = self.refusals.get(cause, 0) + 1
+        return False
+
+    def _subscribers(self, robot: str, channel: str) -> tuple[str, ...]:
+        """Return the clients that hear a robot's channel, in name order."""
+        receivers = self._receivers.get((robot, channel))
+        if receivers is None:
+            wanted = (robot, channel)
+            receivers = tuple(name for name in sorted(self.members) if wanted in self.members[name].subscriptions)
+            self._receivers[wanted] = receivers
+        return receivers
+
+    def _link(self, source: str, destination: str) -> Link:
+        link = self.links.get((source, destination))
+        if link is None:
+            link = Link(source, destination, self.deployment.network, self.deployment.seed, LinkState())
+            self.links[source, destination] = link
+        return link
+
+    def _send(self, flight: Flight, tick: int, fates: list[Flight]) -> None:
+        self.packets.offered += 1
+        if not self._link(flight.source, flight.destination).send(flight):
+            self.packets.dropped += 1
+            fates.append(flight)
+            return
+        member = self.members.get(flight.destination)
+        earliest = tick if member is not None and flight.source in self._robots else tick + 1
+        arrival = max(earliest, -(-flight.due_ns // self.tick_ns))
+        if member is not None:
+            arrival = member.release_tick(arrival)
+        flight.arrival_tick = arrival
+        flights = self._flights.get(arrival)
+        if flights is None:
+            self._flights[arrival] = [flight]
+        else:
+            flights.append(flight)
+
+    def _take_arrivals(self, tick: int, to_robots: bool) -> list[Flight]:
+        """Take out what arrives at `tick` at robots (or at clients), in (due, source, sequence, copy) order."""
+        flights = self._flights.pop(tick, None)
+        if not flights:
+            return []
+        robots = self._robots
+        taken = [flight for flight in flights if (flight.destination in robots) is to_robots]
+        rest = [flight for flight in flights if (flight.destination in robots) is not to_robots]
+        if rest:
+            self._flights[tick] = rest
+        taken.sort(key=_order)
+        return taken
+
+    def _arrive_at_clients(self, tick: int, fates: list[Flight]) -> dict[str, list[Flight]]:
+        released: dict[str, list[Flight]] = {}
+        for flight in self._take_arrivals(tick, to_robots=False):
+            member = self.members.get(flight.destination)
+            if member is not None and member.active and member.release_tick(tick) != tick:
+                flight.arrival_tick = member.release_tick(tick)
+                self._flights.setdefault(flight.arrival_tick, []).append(flight)
+                continue
+            down = member is None or not member.active
+            if self.links[flight.source, flight.destination].arrive(flight, receiver_down=down):
+                self.packets.delivered += 1
+                released.setdefault(flight.destination, []).append(flight)
+            else:
+                self.packets.dropped += 1
+            fates.append(flight)
+        return released
+
+    def _arrive_at_robots(self, tick: int, frame: Frame, fates: list[Flight]) -> list[Delivered]:
+        deliveries = []
+        for flight in self._take_arrivals(tick, to_robots=True):
+            down = flight.destination in frame.layout and frame.at(flight.destination, "down") != 0.0
+            fates.append(flight)
+            if not self.links[flight.source, flight.destination].arrive(flight, receiver_down=down):
+                self.packets.dropped += 1
+                continue
+            self.packets.delivered += 1
+            deliveries.append(
+                Delivered(
+                    flight.due_ns,
+                    flight.source,
+                    flight.sequence,
+                    flight.copy,
+                    flight.destination,
+                    flight.channel,
+                    flight.payload,
+                )
+            )
+        return deliveries
+
+    def in_flight(self) -> int:
+        return self.offered - self.delivered - self.dropped
+
+
+class HubState:
+    """Links, members, what is in flight. All of it plain values; nothing here knows time but as ticks."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.deployment = deployment
+        self.tick_ns = deployment.tick_ns
+        self.closed = -1
+        """The last tick whose closing is complete."""
+        self.packets = Packets()
+        self.refusals: dict[str, int] = {}
+        self.members: dict[str, Member] = {}
+        self.links: dict[tuple[str, str], Link] = {}
+        self.deliveries: dict[int, list[Delivered]] = {-1: [], 0: []}
+        """What reaches robots at the last closed tick and at the next one."""
+        self._flights: dict[int, list[Flight]] = {}
+        """What is in flight, by the tick at which it arrives."""
+        self._endpoints = frozenset(deployment.endpoints())
+        self._robots = frozenset(deployment.robots)
+        self._receivers: dict[tuple[str, str], tuple[str, ...]] = {}
+
+    # --- joining -----------------------------------------------------------------------------------------------------
+
+    def join(self, joining: Joining, tick: int) -> None:
+        """Take a client in, from `tick` on; one that comes back keeps its numbers."""
+        known = self.members.get(joining.name)
+        subscriptions = tuple((robot, channel) for robot, channel in joining.subscriptions)
+        member = self.members[joining.name] = Member(joining.period, subscriptions, tick)
+        if known is not None:
+            member.sequence, member.downlink = known.sequence, known.downlink
+        self._receivers.clear()
+
+    def leave(self, name: str) -> None:
+        """Let a client go: nothing is offered to it any more."""
+        if name in self.members:
+            self.members[name].subscriptions = ()
+            self.members[name].active = False
+            self._receivers.clear()
+
+    def due_members(self, tick: int) -> list[str]:
+        """Return the lockstep clients that are due at `tick`, in name order."""
+        return [name for name in sorted(self.members) if self.members[name].is_due(tick)]
+
+    # --- closing a tick ----------------------------------------------------------------------------------------------
+
+    def close_world(self, frame: Frame, packets: Iterable[RobotPacket], fates: list[Flight]) -> dict[str, list[Flight]]:
+        """Phase one of closing the frame's tick; `packets` in (robot, index) order.
+
+        Append the packets whose fate is final to `fates` and return what is released, by client.
+        """
+        tick = frame.tick
+        assert tick == self.closed + 1, (tick, self.closed)
+        sent_ns = tick * self.tick_ns
+        for packet in packets:
+            sequence = (tick << OUTBOX_SHIFT) + packet.index
+            receivers: Sequence[str] = (
+                (packet.destination,) if packet.destination else self._subscribers(packet.robot, packet.channel)
+            )
+            for receiver in receivers:
+                if receiver not in self._endpoints:
+                    self.refuse("no_route")
+                    continue
+                flight = Flight(packet.robot, receiver, packet.channel, sequence, sent_ns, 0, packet.payload)
+                self._send(flight, tick, fates)
+        return self._arrive_at_clients(tick, fates)
+
+    def close_clients(
+        self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]
+    ) -> list[Delivered]:
+        """Phase two: judge what clients sent, in (source, sequence) order. Return the deliveries of the next tick."""
+        tick = frame.tick
+        sent_ns = tick * self.tick_ns
+        for source in sorted(admitted):
+            for sent in sorted(admitted[source], key=lambda packet: packet.sequence):
+                if self._admit(source, sent):
+                    flight = Flight(
+                        source, sent.destination, sent.channel, sent.sequence, sent_ns, sent.stamp_ns, sent.payload
+                    )
+                    self._send(flight, tick, fates)
+        self.closed = tick
+        deliveries = self._arrive_at_robots(tick + 1, frame, fates)
+        self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
+        return deliveries
+
+    def _admit(self, source: str, sent: Sent) -> bool:
+        """Refuse at the door what is no packet of this run: a repeat, or to nobody."""
+        member = self.members.get(source)
+        if member is None:
+            return self.refuse("unknown_source")
+        if sent.sequence <= member.sequence:
+            return self.refuse("duplicate")
+        member.sequence = sent.sequence
+        if sent.destination not in self._endpoints:
+            return self.refuse("no_route")
+        return True
+
+    def refuse(self, cause: str) -> bool:
+        """Count a packet that is refused at the door; it is in no link's account."""
+        self.packets.refused += 1
+        self.refusals[cause] = self.refusals.get(cause, 0) + 1
+        return False
+
+    def _subscribers(self, robot: str, channel: str) -> tuple[str, ...]:
+        """Return the clients that hear a robot's channel, in name order."""
+        receivers = self._receivers.get((robot, channel))
+        if receivers is None:
+            wanted = (robot, channel)
+            receivers = tuple(name for name in sorted(self.members) if wanted in self.members[name].subscriptions)
+            self._receivers[wanted] = receivers
+        return receivers
+
+    def _link(self, source: str, destination: str) -> Link:
+        link = self.links.get((source, destination))
+        if link is None:
+            link = Link(source, destination, self.deployment.network, self.deployment.seed, LinkState())
+            self.links[source, destination] = link
+        return link
+
+    def _send(self, flight: Flight, tick: int, fates: list[Flight]) -> None:
+        self.packets.offered += 1
+        if not self._link(flight.source, flight.destination).send(flight):
+            self.packets.dropped += 1
+            fates.append(flight)
+            return
+        member = self.members.get(flight.destination)
+        earliest = tick if member is not None and flight.source in self._robots else tick + 1
+        arrival = max(earliest, -(-flight.due_ns // self.tick_ns))
+        if member is not None:
+            arrival = member.release_tick(arrival)
+        flight.arrival_tick = arrival
+        flights = self._flights.get(arrival)
+        if flights is None:
+            self._flights[arrival] = [flight]
+        else:
+            flights.append(flight)
+
+    def _take_arrivals(self, tick: int, to_robots: bool) -> list[Flight]:
+        """Take out what arrives at `tick` at robots (or at clients), in (due, source, sequence, copy) order."""
+        flights = self._flights.pop(tick, None)
+        if not flights:
+            return []
+        robots = self._robots
+        taken = [flight for flight in flights if (flight.destination in robots) is to_robots]
+        rest = [flight for flight in flights if (flight.destination in robots) is not to_robots]
+        if rest:
+            self._flights[tick] = rest
+        taken.sort(key=_order)
+        return taken
+
+    def _arrive_at_clients(self, tick: int, fates: list[Flight]) -> dict[str, list[Flight]]:
+        released: dict[str, list[Flight]] = {}
+        for flight in self._take_arrivals(tick, to_robots=False):
+            member = self.members.get(flight.destination)
+            if member is not None and member.active and member.release_tick(tick) != tick:
+                flight.arrival_tick = member.release_tick(tick)
+                self._flights.setdefault(flight.arrival_tick, []).append(flight)
+                continue
+            down = member is None or not member.active
+            if self.links[flight.source, flight.destination].arrive(flight, receiver_down=down):
+                self.packets.delivered += 1
+                released.setdefault(flight.destination, []).append(flight)
+            else:
+                self.packets.dropped += 1
+            fates.append(flight)
+        return released
+
+    def _arrive_at_robots(self, tick: int, frame: Frame, fates: list[Flight]) -> list[Delivered]:
+        deliveries = []
+        for flight in self._take_arrivals(tick, to_robots=True):
+            down = flight.destination in frame.layout and frame.at(flight.destination, "down") != 0.0
+            fates.append(flight)
+            if not self.links[flight.source, flight.destination].arrive(flight, receiver_down=down):
+                self.packets.dropped += 1
+                continue
+            self.packets.delivered += 1
+            deliveries.append(
+                Delivered(
+                    flight.due_ns,
+                    flight.source,
+                    flight.sequence,
+                    flight.copy,
+                    flight.destination,
+                    flight.channel,
+                    flight.payload,
+                )
+            )
+        return deliveries
+
+    def take_waiting(self, name: str) -> list[Received]:
+        """Take what has arrived at a client, for its Go or Down."""
+        member = self.members[name]
+        waiting, member.waiting = member.waiting, []
+        return [
+            Received(
+                flight.source,
+                flight.sequence,
+                flight.copy,
+                flight.channel,
+                flight.sent_ns,
+                flight.due_ns,
+                flight.payload,
+            )
+            for flight in waiting
+        ]
+
+    def in_flight(self) -> list[Flight]:
+        """Return what is on its way, in order of arrival."""
+        return [
+            flight for tick in sorted(self._flights) for flight in sorted(self._flights[tick], key=_order)
+        ]
+
+    # --- the state as bytes ------------------------------------------------------------------------------------------
+
+    def snapshot(self) -> bytes:
+        """Return the whole state as bytes: equal states give equal bytes."""
+        return msgspec.msgpack.encode(
+            {
+                "closed": self.closed,
+                "packets": [self.packets.offered, self.packets.delivered, self.packets.dropped, self.packets.refused],
+                "refusals": sorted(self.refusals.items()),
+                "members": [
+                    [name, m.period, m.subscriptions, m.joined_tick, m.sequence, m.downlink, m.active]
+                    for name, m in sorted(self.members.items())
+                ],
+                "links": [
+                    [*pair, s.last_due_ns, s.offered, s.delivered, s.dropped, s.delay_ns]
+                    for pair, s in sorted((pair, link.state) for pair, link in self.links.items())
+                ],
+                "deliveries": sorted(self.deliveries.items()),
+                "flights": [_pack(flight) for flight in self.in_flight()],
+            }
+        )
+
+    @classmethod
+    def restore(cls, deployment: Deployment, snapshot: bytes) -> HubState:
+        """Return the state that `snapshot` holds."""
+        content: dict[str, Any] = msgspec.msgpack.decode(snapshot)
+        state = cls(deployment)
+        state.closed = content["closed"]
+        state.packets = Packets(*content["packets"])
+        state.refusals = dict(content["refusals"])
+        for name, period, subscriptions, *rest in content["members"]:
+            state.members[name] = Member(period, tuple((robot, channel) for robot, channel in subscriptions), *rest)
+        for source, destination, *values in content["links"]:
+            link = Link(source, destination, deployment.network, deployment.seed, LinkState(*values))
+            state.links[source, destination] = link
+        state.deliveries = {
+            tick: msgspec.convert(packets, list[Delivered]) for tick, packets in content["deliveries"]
+        }
+        for packed in content["flights"]:
+            flight = _unpack(packed)
+            state._flights.setdefault(flight.arrival_tick, []).append(flight)
+        return state
+
+
+def received(flights: Iterable[Flight]) -> list[Received]:
+    """Return flights as a client gets them."""
+    return [
+        Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, f.payload) for f in flights
+    ]
+
+
+def _order(flight: Flight) -> tuple[int, str, int, int, str]:
+    """Where a packet stands among what arrives at one tick; the receiver tells copies of a broadcast apart."""
+    return flight.due_ns, flight.source, flight.sequence, flight.copy, flight.destination
+
+
+def _pack(flight: Flight) -> list[Any]:
+    return [
+        flight.source,
+        flight.destination,
+        flight.channel,
+        flight.sequence,
+        flight.sent_ns,
+        flight.stamp_ns,
+        flight.payload,
+        flight.copy,
+        flight.due_ns,
+        flight.arrival_tick,
+        flight.rule,
+        flight.words,
+    ]
+
+
+def _unpack(packed: list[Any]) -> Flight:
+    flight = Flight(*packed[:7])
+    flight.copy, flight.due_ns, flight.arrival_tick, flight.rule = packed[7:11]
+    flight.words = tuple(packed[11])
+    return flight
+
+
+assert limits.ROBOT_PACKETS_PER_TICK_MAX == 1 << OUTBOX_SHIFT
