@@ -109,6 +109,19 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     DOWN,
 )
 
+NODE_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
+    PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
+)))  # fmt: skip
+VHUB_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
+    EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
+)))  # fmt: skip
+SUPERVISOR_READS: Final = tuple((channel, False) for channel in (
+    HELLO, READY, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
+))  # fmt: skip
+CLIENT_READS: Final = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
+OPERATOR_READS: Final = ((ANSWER, True),)
+"""What each role reads: (channel, whether only what is addressed to it by name)."""
+
 ALIVE: Final = {
     Plane.SIMULATION: "foosim/simulation/alive/{name}",
     Plane.RADIO: "foosim/radio/alive/{name}",
