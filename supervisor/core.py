@@ -102,6 +102,8 @@ class SupervisorCore:
         self.solved_ticks: dict[str, int] = {}
         self.started_ns = self.committed_ns = 0
         self.ball_solver = ""
+        self.on_commit: Callable[[Frame], None] | None = None
+        """Told of every committed frame: a rehearsal's window on the run."""
         self._slots = Slots(self.frame.layout, self.owners)
         self._epoch_payload = b""
         self._orders: dict[int, tuple[bytes, list[Edit]]] = {}
@@ -281,6 +283,8 @@ class SupervisorCore:
         self.chain = chain_next(self.chain, frame.digest)
         self.committed_ns = now_ns
         self._say_commit(edits)
+        if self.on_commit is not None:
+            self.on_commit(frame)
         moved_ns = self.pacer.committed(frame.tick, now_ns)
         self.watch.committed(frame.tick, self.pacer.last_lag_ns, now_ns)
         if moved_ns:

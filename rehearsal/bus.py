@@ -1,0 +1,96 @@
+"""The in-memory bus of a rehearsal: messages by virtual time, routed by the table of channels.
+
+What the processes put on Zenoh goes here, the same bytes on the same keys. Delivery can be delayed, reordered and lost
+by seed; without such settings it takes no time and keeps order. Neighbours: `system` has the processes at its ends.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from foosim.protocol.channels import Channel
+from foosim.protocol.draws import draw_key, draw_words, unit_interval
+
+
+@dataclass(frozen=True, slots=True)
+class Weather:
+    """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`."""
+
+    seed: int = 0
+    delay_ns: int = 0
+    spread_ns: int = 0
+    loss: float = 0.0
+    repeat: float = 0.0
+
+
+CALM: Final = Weather()
+
+
+@dataclass(frozen=True, slots=True)
+class Traced:
+    """One thing that a process did, as a test wants to see it: `what` is journal, publish or receive."""
+
+    now_ns: int
+    process: str
+    what: str
+    channel: str
+    payload: bytes
+
+
+Message = tuple[int, int, str, Channel, str, bytes]
+
+
+class Bus:
+    """Messages in flight, by (time, number). Names of receivers come from subscriptions."""
+
+    def __init__(self, weather: Weather = CALM) -> None:
+        self.now_ns = 0
+        self.sent = 0
+        self.weather = weather
+        self._key = draw_key(weather.seed, "bus")
+        self._heap: list[Message] = []
+        self._readers: dict[tuple[str, str], list[str]] = {}
+
+    def subscribe(self, process: str, reads: Iterable[tuple[Channel, bool]]) -> None:
+        """Let a process read channels: all that comes on them, or only what is addressed to it."""
+        for channel, own in reads:
+            self._readers.setdefault((channel.name, channel.plane.name + (process if own else "")), []).append(process)
+
+    def put(self, sender: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
+        """Send a message at `at_ns`; every reader but the sender gets it."""
+        plane = channel.plane.name
+        for key in ((channel.name, plane), (channel.name, plane + name)):
+            for reader in self._readers.get(key, ()):
+                if reader != sender:
+                    self._push(reader, channel, name, payload, at_ns)
+
+    def _push(self, reader: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
+        self.sent += 1
+        weather = self.weather
+        if weather is not CALM:
+            words = draw_words(self._key, self.sent)
+            if unit_interval(words[0]) < weather.loss:
+                return
+            if unit_interval(words[3]) < weather.repeat:
+                late_ns = at_ns + weather.delay_ns + int(unit_interval(words[2]) * weather.spread_ns)
+                heapq.heappush(self._heap, (late_ns, self.sent, reader, channel, name, payload))
+                self.sent += 1
+            at_ns += weather.delay_ns + int(unit_interval(words[1]) * weather.spread_ns)
+        heapq.heappush(self._heap, (at_ns, self.sent, reader, channel, name, payload))
+
+    def hold(self, message: Message, until_ns: int) -> None:
+        """Put a message back for a receiver that is busy; it keeps its place among what waits."""
+        heapq.heappush(self._heap, (until_ns, message[1], *message[2:]))
+
+    def next_ns(self) -> int | None:
+        """Return when the next message arrives, or None."""
+        return self._heap[0][0] if self._heap else None
+
+    def pop(self) -> Message:
+        return heapq.heappop(self._heap)
+
+
+Observer = Callable[[Traced], None]

@@ -1,0 +1,88 @@
+"""Rehearse a deployment: the whole system, players included, in one process on virtual time, on any number of nodes.
+
+The typed function behind `foosim-rehearse`. Its result is that of `up`; its digests too, when all players are lockstep.
+Neighbours: `system` runs, `rehearse_command` is the terminal's side.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.messages import Answer
+from foosim.protocol.units import Pace
+from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.core import RunSettings
+from foosim.supervisor.status import result
+
+
+@dataclass(slots=True)
+class Rehearsed:
+    """What a rehearsal gave: the JSON object of `up`, and D(tick) for every tick from 1 on, as 32 bytes each."""
+
+    json: dict[str, Any]
+    digests: list[bytes] = field(default_factory=list)
+    answers: dict[str, Answer] = field(default_factory=dict)
+
+
+def deal_robots(deployment: Deployment, nodes: int) -> dict[str, list[str]]:
+    """Return the robots of n1 to nN: those with bodies dealt first, then those without, each in name order."""
+    bodies = sorted(name for name, robot in deployment.robots.items() if robot.model == "rod")
+    others = sorted(set(deployment.robots) - set(bodies))
+    dealt: dict[str, list[str]] = {f"n{number + 1}": [] for number in range(nodes)}
+    for place, name in enumerate([*bodies, *others]):
+        dealt[f"n{place % nodes + 1}"].append(name)
+    return dealt
+
+
+def with_nodes(text: str, name: str, nodes: int, sets: Sequence[str] = ()) -> str:
+    """Return a deployment text with its robots on nodes n1 to nN."""
+    dealt = deal_robots(load_deployment(text, name), nodes)
+    flow = ", ".join(f"{node}: {{robots: [{', '.join(robots)}]}}" for node, robots in dealt.items())
+    return apply_sets(text, name, [f"nodes={{{flow}}}", *sets])
+
+
+def rehearse(
+    text: str,
+    name: str,
+    ticks: int,
+    nodes: int | None = 1,
+    sets: Sequence[str] = (),
+    settings: Settings | None = None,
+    pace: Pace | None = None,
+    prepare: Any = None,
+) -> Rehearsed:
+    """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on those that it declares).
+
+    `prepare` is called with the built system before it runs: a test's or notebook's place to ask for things at ticks.
+    Raises DeploymentError for a bad text.
+    """
+    text = apply_sets(text, name, sets) if nodes is None else with_nodes(text, name, nodes, sets)
+    settings = settings or Settings()
+    rehearsed = Rehearsed({})
+    on_commit = settings.on_commit
+
+    def committed(frame: Frame) -> None:
+        rehearsed.digests.append(frame.digest)
+        if on_commit is not None:
+            on_commit(frame)
+
+    settings.on_commit = committed
+    system = System(RunSettings(settings.run, name, text, pace or Pace("fast"), ticks), settings)
+    if prepare is not None:
+        prepare(system)
+    begun_ns = time.perf_counter_ns()
+    try:
+        system.run()
+    finally:
+        system.close()
+    wall_ns = time.perf_counter_ns() - begun_ns
+    rehearsed.json = result(system.supervisor)
+    rehearsed.json["rtf"] = round(rehearsed.json["ticks"] * rehearsed.json["tick_ns"] / wall_ns, 3)
+    rehearsed.answers = system.answers
+    return rehearsed

@@ -1,0 +1,233 @@
+"""The whole system in one process on virtual time: the same cores, table of channels and codec as the processes.
+
+Supervisor, vHub, nodes and players take turns by what the bus brings and by their deadlines. A process may be slow on
+the virtual clock (`slow_ns`), may have its engines rebuilt, may be asked something at a tick. Neighbours: `bus`,
+`rehearse` (the command), `verify` (the same without players).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from foosim.client.core import ClientCore
+from foosim.client.player import PlayerLoop, load_player
+from foosim.node.core import NodeCore
+from foosim.node.engines.interface import EngineFactory
+from foosim.node.solver import Solver
+from foosim.protocol import channels
+from foosim.protocol.actions import Journal, Publish, Say
+from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.frame import Frame
+from foosim.protocol.messages import Answer, Request
+from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
+from foosim.supervisor.core import RunSettings, SupervisorCore
+from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.records import Closing
+
+OPERATOR: Final = "operator"
+IDLE_NS_MAX: Final = 60_000_000_000
+"""Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
+
+
+class Stuck(AssertionError):
+    """No commit for too long on the virtual clock."""
+
+
+@dataclass(slots=True)
+class Process:
+    """One process of the rehearsal: its core, and what a shell would know."""
+
+    name: str
+    core: Any
+    turn: Callable[[int], None]
+    slow_ns: int = 0
+    """Virtual time that each of its turns takes which says something."""
+    busy_until_ns: int = 0
+
+
+@dataclass(slots=True)
+class Settings:
+    """How to rehearse: everything beside the deployment. `slow_ns` is by process name."""
+
+    run: str = "rehearsal"
+    ticks: int = 0
+    weather: Weather = CALM
+    slow_ns: Mapping[str, int] = field(default_factory=dict)
+    factory: EngineFactory | None = None
+    observer: Observer | None = None
+    on_commit: Callable[[Frame], None] | None = None
+    on_closing: Callable[[Closing], None] | None = None
+    on_say: Callable[[str, str, str], None] | None = None
+    on_journal: Callable[[str, bytes], None] | None = None
+
+
+class System:
+    """All processes of one deployment. Build it, then `run`."""
+
+    def __init__(self, settings: RunSettings, rehearsal: Settings) -> None:
+        self.settings = rehearsal
+        self.bus = Bus(rehearsal.weather)
+        self.processes: dict[str, Process] = {}
+        self.solvers: dict[str, Solver] = {}
+        self.players: dict[str, PlayerLoop] = {}
+        self.answers: dict[str, Answer] = {}
+        self._requests = 0
+        self._at_tick: dict[int, list[Callable[[], None]]] = {}
+        fingerprint = library_fingerprint()
+        self.supervisor = SupervisorCore(settings, fingerprint, 0)
+        self.supervisor.on_commit = self._committed
+        self.hub = HubCore("boot", fingerprint, 0)
+        deployment = self.supervisor.deployment
+        self._enter(channels.SUPERVISOR, self.supervisor, self.supervisor.advance, channels.SUPERVISOR_READS)
+        self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
+        for name in sorted(deployment.nodes):
+            self._enter_node(name, fingerprint)
+        for name, player in sorted(deployment.players.items()):
+            assert player.lockstep, "a rehearsal has lockstep players only"
+            core = ClientCore(name, "boot", 0)
+            loop = self.players[name] = PlayerLoop(core, load_player)
+            self._enter(name, core, loop.step, channels.CLIENT_READS)
+        self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
+        self._last_commit_ns = 0
+
+    def _enter(self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]) -> None:
+        self.bus.subscribe(name, reads)
+        self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
+
+    def _enter_node(self, name: str, fingerprint: bytes) -> None:
+        core = NodeCore(name, "boot", fingerprint, 0)
+        solver = self.solvers[name] = Solver(core, self.settings.factory)
+
+        def turn(now_ns: int) -> None:
+            solver.build_wanted()
+            core.advance(now_ns)
+            while core.work is not None:
+                solver.solve(core.work)
+                core.advance(now_ns)
+
+        self._enter(name, core, turn, channels.NODE_READS)
+
+    # --- running -----------------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Run until the supervisor has finished."""
+        bus = self.bus
+        self._wake_all()
+        while not self.supervisor.finished:
+            arrival_ns = bus.next_ns()
+            if arrival_ns is not None and arrival_ns <= bus.now_ns:
+                self._deliver()
+                continue
+            deadline_ns = self._deadline_ns()
+            if arrival_ns is not None and arrival_ns <= deadline_ns:
+                bus.now_ns = arrival_ns
+                self._deliver()
+                continue
+            bus.now_ns = max(bus.now_ns, deadline_ns)
+            self._wake_all()
+            if bus.now_ns - self._last_commit_ns > IDLE_NS_MAX and not self.supervisor.pacer.paused:
+                raise Stuck(self._where())
+
+    def close(self) -> None:
+        """Free the engines."""
+        for solver in self.solvers.values():
+            solver.close()
+
+    def _deliver(self) -> None:
+        message = self.bus.pop()
+        _, _, receiver, channel, name, payload = message
+        process = self.processes.get(receiver)
+        now_ns = self.bus.now_ns
+        if process is None:
+            if receiver == OPERATOR:
+                self._answered(payload)
+            return
+        if process.busy_until_ns > now_ns:
+            self.bus.hold(message, process.busy_until_ns)
+            return
+        if self.settings.observer is not None:
+            self.settings.observer(Traced(now_ns, receiver, "receive", channel.name, payload))
+        process.core.receive(channel, name, payload, now_ns)
+        process.turn(now_ns)
+        self._perform(process)
+
+    def _wake_all(self) -> None:
+        now_ns = self.bus.now_ns
+        for process in list(self.processes.values()):
+            if process.busy_until_ns <= now_ns:
+                process.core.wake(now_ns)
+                process.turn(now_ns)
+                self._perform(process)
+
+    def _deadline_ns(self) -> int:
+        now_ns = self.bus.now_ns
+        deadlines = []
+        for process in self.processes.values():
+            core = process.core
+            deadline = core.deadline_ns(now_ns) if core is self.supervisor else core.deadline_ns()
+            deadlines.append(max(deadline, process.busy_until_ns, now_ns + 1))
+        return min(deadlines)
+
+    def _perform(self, process: Process) -> None:
+        """Perform what a core asked for, in order."""
+        actions = process.core.actions
+        if not actions:
+            return
+        observer = self.settings.observer
+        leaves_ns = self.bus.now_ns
+        if process.slow_ns and any(type(action) is Publish for action in actions):
+            leaves_ns += process.slow_ns
+            process.busy_until_ns = leaves_ns
+        for action in actions:
+            if type(action) is Publish:
+                if observer is not None:
+                    observer(Traced(leaves_ns, process.name, "publish", action.channel.name, action.payload))
+                self.bus.put(process.name, action.channel, action.name, action.payload, leaves_ns)
+            elif type(action) is Journal:
+                if observer is not None:
+                    observer(Traced(leaves_ns, process.name, "journal", "", action.record))
+                if self.settings.on_journal is not None:
+                    self.settings.on_journal(process.name, action.record)
+            elif type(action) is Keep:
+                if self.settings.on_closing is not None:
+                    self.settings.on_closing(action.closing)
+            elif type(action) is Say and self.settings.on_say is not None:
+                self.settings.on_say(process.name, action.level, action.text)
+        actions.clear()
+        if process.core is self.hub and self.hub.finished and process.name in self.processes:
+            farewell = self.hub.farewell()
+            self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
+            self.processes.pop(process.name)
+
+    def _committed(self, frame: Frame) -> None:
+        self._last_commit_ns = self.bus.now_ns
+        if self.settings.on_commit is not None:
+            self.settings.on_commit(frame)
+        for action in self._at_tick.pop(frame.tick, ()):
+            action()
+
+    def _where(self) -> str:
+        nodes = {name: process.core.waiting_for for name, process in self.processes.items() if name in self.solvers}
+        return f"stuck at tick {self.supervisor.frame.tick}: nodes wait for {nodes}, vHub for {self.hub.waiting_for!r}"
+
+    # --- from outside ------------------------------------------------------------------------------------------------
+
+    def at_tick(self, tick: int, action: Callable[[], None]) -> None:
+        """Call `action` when frame `tick` is committed."""
+        self._at_tick.setdefault(tick, []).append(action)
+
+    def request(self, verb: str, **arguments: Any) -> str:
+        """Ask the supervisor for something; return the request's id."""
+        self._requests += 1
+        identity = f"request-{self._requests}"
+        request = Request(OPERATOR, identity, verb, encode_json(arguments))
+        self.bus.put(OPERATOR, channels.REQUEST, OPERATOR, encode(request), self.bus.now_ns)
+        return identity
+
+    def _answered(self, payload: bytes) -> None:
+        answer = decode(Answer, payload)
+        self.answers[answer.id] = answer
