@@ -19,7 +19,13 @@ def _bullet(deployment: Deployment, layout: Layout) -> Engine:
     return BulletEngine(deployment, layout)
 
 
-ENGINES: Final[Mapping[str, EngineFactory]] = {"bullet": _bullet}
+def _pure(deployment: Deployment, layout: Layout) -> Engine:
+    from foosim.node.engines.pure import PureEngine
+
+    return PureEngine(deployment, layout)
+
+
+ENGINES: Final[Mapping[str, EngineFactory]] = {"bullet": _bullet, "pure": _pure}
 
 
 def make_engine(deployment: Deployment, layout: Layout) -> Engine:

@@ -32,6 +32,8 @@ PARKING_STEP_M: Final = 10.0
 REST: Final[Vector] = (0.0, 0.0, 0.0)
 SLIDE_SPIN: Final = (0, 1)
 """Joint indices of a rod."""
+BALL_FIELDS: Final = ("position", "orientation", "linear_velocity", "angular_velocity")
+NO_CONTACT: Final = (0.0, 0.0, -1.0)
 SPEED_MAX: Final = 1000.0
 """Bullet clamps each coordinate's velocity of a multibody at 100 by default: a ball could not roll above 1.75 m/s."""
 
@@ -64,8 +66,8 @@ class BulletEngine:
         self._loaded_rods: set[str] = set()
         self._loaded_balls: list[str] = []
         self._idle: set[str] = set()
-        self._logs: dict[str, list[float]] = {}
-        self._touching: dict[str, bool] = {}
+        self._logs: dict[str, tuple[float, float, float]] = {}
+        self._touching: set[str] = set()
         for name in self._rods:
             self._park_rod(name)
         self._wipe()
@@ -285,55 +287,52 @@ class BulletEngine:
 
     def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
         """Wipe what the engine remembers and set these bodies to their state; park all others."""
-        client = self._client
+        client, reset = self._client, p.resetJointState
         self._wipe()
-        rods = [entity for entity in entities if entity.model == "rod"]
-        balls = [entity for entity in entities if entity.model == "ball"]
-        wanted = {entity.name for entity in rods}
-        if wanted != self._loaded_rods:
-            self._change_rods(wanted)
-        self._idle = set(wanted)
-        for entity in rods:
-            body, at = self._ids[entity.name], entity.offsets["joint_positions"]
-            speed = entity.offsets["joint_velocities"]
-            p.resetJointState(body, 0, state[at], state[speed], physicsClientId=client)
-            p.resetJointState(body, 1, state[at + 1], state[speed + 1], physicsClientId=client)
-        self._load_balls(balls, state)
+        rods = {entity.name for entity in entities if entity.model == "rod"}
+        if rods != self._loaded_rods:
+            self._change_rods(rods)
+        self._idle = rods.copy()
+        self._loaded_balls = []
+        last = self._substeps - 1.0
         self._logs = {}
-        self._touching = {}
-        for entity in (*rods, *balls):
-            self._logs[entity.name] = [0.0, 0.0, -1.0]
-            self._touching[entity.name] = state[entity.offsets["contacts"] + 2] == self._substeps - 1.0
-
-    def _load_balls(self, balls: Sequence[Entity], state: Sequence[float]) -> None:
-        client = self._client
-        self._loaded_balls = [entity.name for entity in balls]
-        for entity in balls:
+        self._touching = set()
+        for entity in entities:
             body, offsets = self._ids[entity.name], entity.offsets
-            at, turned = offsets["position"], offsets["orientation"]
-            velocity, spin = offsets["linear_velocity"], offsets["angular_velocity"]
-            p.resetBasePositionAndOrientation(
-                body, state[at : at + 3], state[turned : turned + 4], physicsClientId=client
-            )
-            p.resetBaseVelocity(body, state[velocity : velocity + 3], state[spin : spin + 3], physicsClientId=client)
-        if len(balls) < len(self._balls):
+            if entity.model == "rod":
+                at, speed = offsets["joint_positions"], offsets["joint_velocities"]
+                reset(body, 0, state[at], state[speed], client)
+                reset(body, 1, state[at + 1], state[speed + 1], client)
+            elif entity.model == "ball":
+                self._load_ball(entity, state)
+            if state[offsets["contacts"] + 2] == last:
+                self._touching.add(entity.name)
+        if len(self._loaded_balls) < len(self._balls):
             for name in self._balls:
                 if name not in self._loaded_balls:  # it would fall faster and faster
-                    p.resetBaseVelocity(self._ids[name], REST, REST, physicsClientId=client)
+                    p.resetBaseVelocity(self._ids[name], REST, REST, client)
+
+    def _load_ball(self, entity: Entity, state: Sequence[float]) -> None:
+        body, offsets = self._ids[entity.name], entity.offsets
+        at, turned = offsets["position"], offsets["orientation"]
+        velocity, spin = offsets["linear_velocity"], offsets["angular_velocity"]
+        p.resetBasePositionAndOrientation(body, state[at : at + 3], state[turned : turned + 4], self._client)
+        p.resetBaseVelocity(body, state[velocity : velocity + 3], state[spin : spin + 3], self._client)
+        self._loaded_balls.append(entity.name)
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
         """Set the motors of these robots: for each joint the wanted speed and the greatest force (SI units).
 
         The two axes do not couple, so Bullet's unstable sorting of motors by island cannot reorder anything.
         """
-        client, mode = self._client, p.VELOCITY_CONTROL
-        for entity, (slide, spin) in zip(entities, commands, strict=True):
-            p.setJointMotorControlArray(
+        client, mode, drive = self._client, p.VELOCITY_CONTROL, p.setJointMotorControlArray
+        for entity, ((slide, force), (spin, torque)) in zip(entities, commands, strict=True):
+            drive(
                 self._ids[entity.name],
                 SLIDE_SPIN,
                 mode,
-                targetVelocities=(slide[0], spin[0]),
-                forces=(slide[1], spin[1]),
+                targetVelocities=(slide, spin),
+                forces=(force, torque),
                 physicsClientId=client,
             )
             self._idle.discard(entity.name)
@@ -345,21 +344,21 @@ class BulletEngine:
             self._motors_off(name)
         client = self._client
         for substep in range(substeps):
-            p.stepSimulation(physicsClientId=client)
+            p.stepSimulation(client)
             touched: dict[str, float] = {}
             for name in self._loaded_balls:
-                points = p.getContactPoints(self._ids[name], physicsClientId=client)
-                if points:
-                    self._collect(name, points, touched)
-            self._log(substep, touched)
+                self._collect(name, touched)
+            if touched:
+                self._log(substep, touched)
+            self._touching = set(touched)
 
-    def _collect(self, ball: str, points: Sequence[Sequence[Any]], touched: dict[str, float]) -> None:
+    def _collect(self, ball: str, touched: dict[str, float]) -> None:
         """Add the normal impulses of a ball's contacts to the ball and to the rods that it touches."""
         body = self._ids[ball]
-        for point in points:
+        for point in p.getContactPoints(body, physicsClientId=self._client):
             other = point[2] if point[1] == body else point[1]
             force = point[9]
-            if force <= 0.0 or other in self._silent:
+            if other in self._silent or force <= 0.0:
                 continue
             impulse = force * self._dt
             touched[ball] = touched.get(ball, 0.0) + impulse
@@ -370,38 +369,27 @@ class BulletEngine:
     def _log(self, substep: int, touched: dict[str, float]) -> None:
         """Count touches that begin, sum impulses, note the last substep."""
         for name, impulse in touched.items():
-            log = self._logs[name]
-            if not self._touching[name]:
-                log[0] += 1.0
-            log[1] += impulse
-            log[2] = float(substep)
-        if touched or any(self._touching.values()):
-            for name in self._touching:
-                self._touching[name] = name in touched
+            count, total, _ = self._logs.get(name, NO_CONTACT)
+            self._logs[name] = (count + (name not in self._touching), total + impulse, float(substep))
 
     def read(self, entities: Sequence[Entity], state: list[float]) -> None:
         """Write position, velocity and the tick's contact log of these bodies into `state`."""
-        client = self._client
+        client, joints = self._client, p.getJointStates
         for entity in entities:
             body, offsets = self._ids[entity.name], entity.offsets
             if entity.model == "rod":
-                slide, spin = p.getJointStates(body, SLIDE_SPIN, physicsClientId=client)
+                slide, spin = joints(body, SLIDE_SPIN, client)
                 at, speed = offsets["joint_positions"], offsets["joint_velocities"]
                 state[at], state[speed] = slide[0], slide[1]
                 state[at + 1], state[speed + 1] = spin[0], spin[1]
             else:
-                position, orientation = p.getBasePositionAndOrientation(body, physicsClientId=client)
-                velocity, turning = p.getBaseVelocity(body, physicsClientId=client)
-                at = offsets["position"]
-                state[at : at + 3] = position
-                at = offsets["orientation"]
-                state[at : at + 4] = orientation
-                at = offsets["linear_velocity"]
-                state[at : at + 3] = velocity
-                at = offsets["angular_velocity"]
-                state[at : at + 3] = turning
+                position, orientation = p.getBasePositionAndOrientation(body, client)
+                velocity, turning = p.getBaseVelocity(body, client)
+                for field, values in zip(BALL_FIELDS, (position, orientation, velocity, turning), strict=True):
+                    at = offsets[field]
+                    state[at : at + len(values)] = values
             at = offsets["contacts"]
-            state[at : at + 3] = self._logs[entity.name]
+            state[at : at + 3] = self._logs.get(entity.name, NO_CONTACT)
 
     def close(self) -> None:
         """Free the physics client."""
