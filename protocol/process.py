@@ -1,0 +1,73 @@
+"""What every process does around its loop: it dies with its parent, logs lines, and ends in order when told to.
+
+A child that its launcher started is told so in the environment. It asks the kernel to be killed when the launcher
+ends, and a thread watches a pipe that only the launcher can write: its end means the same where the kernel cannot be
+asked. Neighbours: `loop`, `supervisor.launcher` (the other side).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+PARENT_VARIABLE: Final = "FOOSIM_PARENT"
+"""Process id of the launcher and the number of the pipe's reading end, as `PID:FD`."""
+_PR_SET_PDEATHSIG: Final = 1
+
+
+def die_with_parent() -> None:
+    """Tie this process to the launcher that started it; nothing happens when none did."""
+    parent, _, pipe = os.environ.pop(PARENT_VARIABLE, "").partition(":")
+    if not parent:
+        return
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != int(parent):  # it ended before the kernel was asked
+        os._exit(1)
+    threading.Thread(target=_watch, args=(int(pipe),), name="parent", daemon=True).start()
+
+
+def _watch(pipe: int) -> None:
+    """Wait for the end of a pipe that nobody writes to."""
+    os.read(pipe, 1)
+    os._exit(1)
+
+
+def start_log(name: str) -> logging.Logger:
+    """Return the log of this process: lines with UTC time on standard error, which a launcher sends to a file."""
+    handler = logging.StreamHandler()
+    formatter = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)-7s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
+    formatter.converter = time.gmtime
+    handler.setFormatter(formatter)
+    logger = logging.getLogger(name)
+    logger.setLevel(logging.INFO)
+    logger.handlers = [handler]
+    logger.propagate = False
+    return logger
+
+
+def new_boot() -> str:
+    """Return a name for this start of this process; another start of it has another one."""
+    return f"b{os.urandom(8).hex()}"
+
+
+def on_signals(stop: Callable[[], None]) -> None:
+    """Call `stop` on the first SIGTERM, SIGINT or SIGHUP; a second SIGINT ends the process at once."""
+    seen: list[int] = []
+
+    def take(number: int, frame: object) -> None:
+        if seen and number == signal.SIGINT:
+            os._exit(130)
+        if not seen:
+            stop()
+        seen.append(number)
+
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, take)
