@@ -153,9 +153,9 @@ class NodeCore:
         self.work = None
         if work.islands:
             self._solved_ticks += 1
+        for slot in self._counters:
+            work.numbers[slot] += 1.0
         values = np.array(work.numbers)
-        if self._counters:
-            values[self._counters] += 1.0
         slots = self._barrier.slots
         part = Part(
             epoch=self.epoch,

@@ -19,7 +19,7 @@ from foosim.node.engines.interface import Engine
 from foosim.node.rules import TableRules
 from foosim.node.sensors import Sensor, make_sensor
 from foosim.protocol import limits
-from foosim.protocol.deployment import Deployment, period_ticks
+from foosim.protocol.deployment import Deployment, RodRobot, period_ticks
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.messages import Delivered, Edit, Name, Payload, RobotPacket
@@ -27,6 +27,9 @@ from foosim.protocol.messages import Delivered, Edit, Name, Payload, RobotPacket
 ECHO = "echo"
 ROD_SPEED_FACTOR = 1.5
 """A rod's declared speed limit is this many times its drive's: a ball may push it faster than its motor does."""
+
+STOP_DEPTH_M = 0.01
+"""How far a rod may be beyond its stroke: joint stops give way a little."""
 
 
 class OutboxPacket(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, gc=False):
@@ -73,36 +76,41 @@ class Stepper:
                 )
                 for channel, settings in sorted(deployment.robots[robot.name].sensors.items())
             ]
+        self._periods = sorted({period for sensors in self._sensors.values() for _, period, _, _ in sensors})
         drive = deployment.table.drive
-        self._rod_speed_max = (drive.slide.speed * ROD_SPEED_FACTOR, drive.spin.speed * ROD_SPEED_FACTOR)
+        self._slide_speed_max = drive.slide.speed * ROD_SPEED_FACTOR
+        self._spin_speed_max = drive.spin.speed * ROD_SPEED_FACTOR
         self._ball_speed_max = deployment.table.ball.speed_limit
         table = deployment.table
         margin = table.rules.out_margin
         self._x_max = table.field.length / 2 + margin
         self._y_max = table.field.width / 2 + margin
         self._z_min, self._z_max = -margin, table.walls.height + margin
-        self._slide_max = {
-            entity.index: deployment.table.lines[deployment.robots[entity.name].line].half_stroke + 0.01  # type: ignore[union-attr]
-            for entity in layout.rods
-        }
+        self._rods: dict[int, tuple[int, int, float]] = {}
+        for entity in layout.rods:
+            robot = deployment.robots[entity.name]
+            assert isinstance(robot, RodRobot)
+            self._rods[entity.index] = (
+                entity.offsets["joint_positions"],
+                entity.offsets["joint_velocities"],
+                table.lines[robot.line].half_stroke + STOP_DEPTH_M,
+            )
         self._ball_reach_m = self._ball_speed_max * deployment.tick_ns / 1e9
-
-    def due(self, robot: Entity, tick: int) -> list[tuple[str, int, Sensor]]:
-        """Return (channel, slot of its counter, sensor) of the sensors that sample at `tick`."""
-        return [
-            (channel, slot, sensor) for channel, period, slot, sensor in self._sensors[robot.name] if tick % period == 0
-        ]
 
     def sense(self, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], list[int]]:
         """Return what these robots send at the frame's tick, and the counters of the sensors that sampled."""
         packets: list[RobotPacket] = []
         counters: list[int] = []
+        tick, outboxes = frame.tick, frame.outboxes
+        if not outboxes and all(tick % period for period in self._periods):
+            return packets, counters
         for robot in robots:
             sends: list[tuple[str, str, bytes]] = []
-            for channel, slot, sensor in self.due(robot, frame.tick):
-                sends.append((channel, "", sensor.sample(frame.numbers, frame.tick)))
-                counters.append(slot)
-            waiting = frame.outboxes.get(robot.index)
+            for channel, period, slot, sensor in self._sensors[robot.name]:
+                if tick % period == 0:
+                    sends.append((channel, "", sensor.sample(frame.numbers, tick)))
+                    counters.append(slot)
+            waiting = outboxes.get(robot.index)
             if waiting:
                 sends += [
                     (packet.channel, packet.destination, packet.payload) for packet in _outbox_decoder.decode(waiting)
@@ -168,8 +176,17 @@ class Stepper:
     def _quarantine(self, work: Work, before: list[float]) -> None:
         """An island with a result that cannot be keeps its edited state; the bad entities are marked."""
         numbers = work.numbers
+        if isfinite(sum(numbers)) and all(
+            self._plausible(entity, numbers, before) for island in work.islands for entity in island
+        ):
+            return
         for island in work.islands:
-            bad = [entity for entity in island if not self._plausible(entity, numbers, before)]
+            bad = [
+                entity
+                for entity in island
+                if not isfinite(sum(numbers[entity.start : entity.split]))
+                or not self._plausible(entity, numbers, before)
+            ]
             if not bad:
                 continue
             for entity in island:
@@ -178,16 +195,14 @@ class Stepper:
                 numbers[entity.offsets["quarantined"]] = 1.0
 
     def _plausible(self, entity: Entity, numbers: list[float], before: list[float]) -> bool:
-        """Whether an entity's new state is finite, in the world, within its speed limit and its reach."""
-        if not isfinite(sum(numbers[entity.start : entity.split])):
-            return False
-        if entity.model == "rod":
-            slide = entity.offsets["joint_positions"]
-            speed = entity.offsets["joint_velocities"]
+        """Whether an entity's new, finite state is in the world, within its speed limit and its reach."""
+        rod = self._rods.get(entity.index)
+        if rod is not None:
+            slide, speed, slide_max = rod
             return (
-                abs(numbers[slide]) <= self._slide_max[entity.index]
-                and abs(numbers[speed]) <= self._rod_speed_max[0]
-                and abs(numbers[speed + 1]) <= self._rod_speed_max[1]
+                -slide_max <= numbers[slide] <= slide_max
+                and -self._slide_speed_max <= numbers[speed] <= self._slide_speed_max
+                and -self._spin_speed_max <= numbers[speed + 1] <= self._spin_speed_max
             )
         start = entity.offsets["position"]
         velocity = entity.offsets["linear_velocity"]

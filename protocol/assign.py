@@ -8,6 +8,7 @@ comparisons, so that all CPUs agree. Neighbours: `layout`, `barrier`; `step` kno
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot
@@ -21,10 +22,13 @@ MARGIN_M = 0.001
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Bounding volumes: `ball_m` is the radius of a grown ball; rods are (index, x, half width) and a band of z."""
+    """Bounding volumes: `ball_m` is the radius of a grown ball; rods are (index, name, x of the axis), in order of x,
+
+    with one half width and one band of z; `balls` are (index, start of the position)."""
 
     ball_m: float
     rods: tuple[tuple[int, str, float], ...]
+    axes: tuple[float, ...]
     half_width_m: float
     z_low_m: float
     z_high_m: float
@@ -64,9 +68,11 @@ def reach_of(deployment: Deployment, layout: Layout) -> Reach:
         robot = deployment.robots[entity.name]
         assert isinstance(robot, RodRobot)
         rods.append((entity.index, entity.name, line_x_m(deployment, robot)))
+    rods.sort(key=lambda rod: (rod[2], rod[1]))
     return Reach(
         ball_m=table.ball.radius + table.ball.speed_limit * tick_s + MARGIN_M,
         rods=tuple(rods),
+        axes=tuple(axis for _, _, axis in rods),
         half_width_m=corner + MARGIN_M,
         z_low_m=rod.axis_height - corner - MARGIN_M,
         z_high_m=rod.axis_height + corner + MARGIN_M,
@@ -74,52 +80,68 @@ def reach_of(deployment: Deployment, layout: Layout) -> Reach:
     )
 
 
-def _near_rods(numbers: Sequence[float], start: int, reach: Reach) -> list[tuple[float, str, int]]:
-    """Return (distance, name, index) of the rods that a ball could touch within the tick."""
-    x, z = numbers[start], numbers[start + 2]
-    ball = reach.ball_m
-    if z - ball > reach.z_high_m or z + ball < reach.z_low_m:
-        return []
-    limit = ball + reach.half_width_m
-    return [(abs(x - axis), name, index) for index, name, axis in reach.rods if abs(x - axis) <= limit]
+Near = tuple[int, int, str]
+"""Of one ball: the range of rods (in order of x) that it could touch within the tick, and the nearest one's name."""
+Touching = tuple[tuple[Near, ...], tuple[tuple[int, int], ...]]
+"""What islands follow from: `Near` of every ball, and the pairs of balls that could touch each other."""
 
 
-def _join(groups: list[tuple[set[int], list[tuple[float, str, int]]]]) -> list[tuple[set[int], list[tuple[float, str, int]]]]:
-    """Merge groups that share an entity."""
-    joined: list[tuple[set[int], list[tuple[float, str, int]]]] = []
-    for members, rods in groups:
-        rest = []
-        for other_members, other_rods in joined:
-            if members & other_members:
-                members, rods = members | other_members, rods + other_rods
-            else:
-                rest.append((other_members, other_rods))
-        joined = [*rest, (members, rods)]
-    return joined
+def touching_of(numbers: Sequence[float], reach: Reach) -> Touching:
+    """Return who could touch whom within the tick that starts from these edited numbers."""
+    near = []
+    limit = reach.ball_m + reach.half_width_m
+    for _, start in reach.balls:
+        x, z = numbers[start], numbers[start + 2]
+        first = last = 0
+        nearest, least = "", limit
+        if z - reach.ball_m <= reach.z_high_m and z + reach.ball_m >= reach.z_low_m:
+            first, last = bisect_left(reach.axes, x - limit), bisect_right(reach.axes, x + limit)
+            for _, name, axis in reach.rods[first:last]:
+                distance = abs(x - axis)
+                if not nearest or distance < least or (distance == least and name < nearest):
+                    nearest, least = name, distance
+        near.append((first, last, nearest))
+    pairs = []
+    for one, (_, start) in enumerate(reach.balls):
+        for other in range(one + 1, len(reach.balls)):
+            there = reach.balls[other][1]
+            if all(abs(numbers[start + axis] - numbers[there + axis]) <= 2 * reach.ball_m for axis in range(3)):
+                pairs.append((one, other))
+    return tuple(near), tuple(pairs)
 
 
-def islands_of(numbers: Sequence[float], layout: Layout, reach: Reach) -> tuple[Island, ...]:
-    """Return the islands of an edited frame's bodies, ordered by their first entity."""
-    groups: list[tuple[set[int], list[tuple[float, str, int]]]] = []
-    for index, start in reach.balls:
-        rods = _near_rods(numbers, start, reach)
-        members = {index, *(rod for _, _, rod in rods)}
-        for other, other_start in reach.balls:
-            gaps = [abs(numbers[start + axis] - numbers[other_start + axis]) for axis in range(3)]
-            if other != index and max(gaps) <= 2 * reach.ball_m:
-                members.add(other)
-        groups.append((members, rods))
+def islands_of(numbers: Sequence[float], reach: Reach, touching: Touching) -> tuple[Island, ...]:
+    """Return the islands of an edited frame's bodies, ordered by their first entity.
+
+    An island's nearest rod is the one with the least (distance, name) over its balls.
+    """
+    near, pairs = touching
+    group = list(range(len(near)))
+    links = list(pairs)
+    for one, (first, last, _) in enumerate(near):
+        links += [(one, other) for other in range(one) if max(first, near[other][0]) < min(last, near[other][1])]
+    for one, other in links:
+        low, high = sorted((group[one], group[other]))
+        group = [low if number == high else number for number in group]
     islands = []
     taken: set[int] = set()
-    for members, rods in _join(groups):
+    for number in sorted(set(group)):
+        balls = [ball for ball in range(len(near)) if group[ball] == number]
+        rods = {rod for ball in balls for rod in range(near[ball][0], near[ball][1])}
+        members = {reach.balls[ball][0] for ball in balls} | {reach.rods[rod][0] for rod in rods}
         taken |= members
-        islands.append(Island(tuple(sorted(members)), min(rods)[1] if rods else ""))
+        candidates = [
+            (abs(numbers[reach.balls[ball][1]] - reach.rods[rod][2]), reach.rods[rod][1])
+            for ball in balls
+            for rod in range(near[ball][0], near[ball][1])
+        ]
+        islands.append(Island(tuple(sorted(members)), min(candidates)[1] if candidates else ""))
     islands += [Island((index,), name) for index, name, _ in reach.rods if index not in taken]
     return tuple(sorted(islands, key=lambda island: island.entities))
 
 
 class Assignment:
-    """Shares by node, for one layout, roster and owners; equal islands give the same share object again."""
+    """Shares by node, for one layout, roster and owners; with one ball, equal neighbourhoods give the same shares again."""
 
     def __init__(self, layout: Layout, reach: Reach, roster: Sequence[str], owners: Mapping[str, str]) -> None:
         assert roster and list(roster) == sorted(roster), roster
@@ -127,7 +149,7 @@ class Assignment:
         self.reach = reach
         self.roster = tuple(roster)
         self.owners = dict(owners)
-        self._shares: dict[tuple[Island, ...], dict[str, Share]] = {}
+        self._shares: dict[Touching, dict[str, Share]] = {}
 
     def solver_of(self, island: Island) -> str:
         """Return the node that solves an island: the owner of its nearest rod, else the first node of the roster."""
@@ -135,10 +157,12 @@ class Assignment:
 
     def shares(self, numbers: Sequence[float]) -> dict[str, Share]:
         """Return every node's share of the tick that starts from these edited numbers."""
-        islands = islands_of(numbers, self.layout, self.reach)
-        shares = self._shares.get(islands)
+        touching = touching_of(numbers, self.reach)
+        if len(self.reach.balls) > 1:
+            return self._divide(islands_of(numbers, self.reach, touching))
+        shares = self._shares.get(touching)
         if shares is None:
-            shares = self._shares[islands] = self._divide(islands)
+            shares = self._shares[touching] = self._divide(islands_of(numbers, self.reach, touching))
         return shares
 
     def _divide(self, islands: tuple[Island, ...]) -> dict[str, Share]:

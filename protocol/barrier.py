@@ -8,6 +8,7 @@ Neighbours: `assign` decides who writes what, `frame` is the result.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +29,15 @@ class Slots:
         self.owners = dict(owners)
         self._solver: dict[tuple[int, ...], Indices] = {}
         self._owner: dict[str, Indices] = {}
+        self._whole: dict[tuple[tuple[str, tuple[int, ...]], ...], Indices] = {}
 
     def solver(self, solved: tuple[int, ...]) -> Indices:
-        """Return the positions of the solver's slots of these entities, in layout order."""
+        """Return the positions of the solver's slots of these entities; `Malformed` if they are not of the layout."""
         indices = self._solver.get(solved)
         if indices is None:
             entities = self.layout.entities
+            if list(solved) != sorted(set(solved)) or (solved and solved[-1] >= len(entities)):
+                raise Malformed(f"solved entities {list(solved)[:20]} are not ascending or not in the layout")
             runs = [np.arange(entities[index].start, entities[index].split) for index in solved]
             indices = self._solver[solved] = np.concatenate([np.arange(0), *runs])
         return indices
@@ -45,6 +49,24 @@ class Slots:
             robots = [entity for entity in self.layout.robots if self.owners.get(entity.name) == node]
             runs = [np.arange(entity.split, entity.stop) for entity in robots]
             indices = self._owner[node] = np.concatenate([np.arange(0), *runs])
+        return indices
+
+    def whole(self, shares: tuple[tuple[str, tuple[int, ...]], ...]) -> Indices:
+        """Return the positions of all numbers of these nodes' parts, solver's before owner's for each node.
+
+        Raises `Malformed` unless the nodes' solved entities are each entity of the layout once.
+        """
+        indices = self._whole.get(shares)
+        if indices is None:
+            claims: dict[int, list[str]] = {entity.index: [] for entity in self.layout.entities}
+            for node, solved in shares:
+                for index in solved:
+                    claims[index].append(node)
+            wrong = {self.layout.entities[i].name: nodes for i, nodes in claims.items() if len(nodes) != 1}
+            if wrong:
+                raise Malformed("; ".join(f"{name} solved by {nodes or 'nobody'}" for name, nodes in wrong.items()))
+            runs = [array for node, solved in shares for array in (self.solver(solved), self.owner(node))]
+            indices = self._whole[shares] = np.concatenate(runs)
         return indices
 
 
@@ -69,17 +91,16 @@ class Barrier:
             raise Malformed(f"a part of {part.node}, the roster is {', '.join(self.roster)}")
         if part.node in self.parts:
             return
-        solved = tuple(part.solved)
-        entities = self.slots.layout.entities
-        if list(solved) != sorted(set(solved)) or (solved and solved[-1] >= len(entities)):
-            raise Malformed(f"part of {part.node}: solved entities {list(solved)[:20]} not ascending or not in the layout")
-        expected = 8 * len(self.slots.solver(solved)), 8 * len(self.slots.owner(part.node))
+        try:
+            expected = 8 * len(self.slots.solver(tuple(part.solved))), 8 * len(self.slots.owner(part.node))
+        except Malformed as error:
+            raise Malformed(f"part of {part.node}: {error}") from None
         if (len(part.solver_values), len(part.owner_values)) != expected:
             raise Malformed(
                 f"part of {part.node}: {len(part.solver_values)} and {len(part.owner_values)} bytes of values, "
                 f"{expected[0]} and {expected[1]} expected"
             )
-        if any(outbox.index not in solved for outbox in part.outboxes):
+        if any(outbox.index not in part.solved for outbox in part.outboxes):
             raise Malformed(f"part of {part.node}: an outbox of an entity that it did not solve")
         self.parts[part.node] = part
 
@@ -90,25 +111,17 @@ class Barrier:
     def assemble(self) -> Frame:
         """Return the frame of all parts; raise `Malformed` when a slot is missing, doubled or not finite."""
         assert not self.missing
+        parts = [self.parts[node] for node in self.roster]
         layout = self.slots.layout
-        solved = [index for part in self.parts.values() for index in part.solved]
-        if len(solved) != len(layout.entities) or len(set(solved)) != len(solved):
-            raise Malformed(f"tick {self.tick}: {self._claims()}")
+        try:
+            indices = self.slots.whole(tuple((part.node, tuple(part.solved)) for part in parts))
+        except Malformed as error:
+            raise Malformed(f"tick {self.tick}: {error}") from None
         values = np.empty(layout.size)
-        outboxes: dict[int, bytes] = {}
-        for node in self.roster:
-            part = self.parts[node]
-            values[self.slots.solver(tuple(part.solved))] = np.frombuffer(part.solver_values)
-            values[self.slots.owner(node)] = np.frombuffer(part.owner_values)
-            for outbox in part.outboxes:
-                outboxes[outbox.index] = outbox.packets
-        if not np.isfinite(values).all():
+        values[indices] = np.frombuffer(
+            b"".join([raw for part in parts for raw in (part.solver_values, part.owner_values)])
+        )
+        if not isfinite(np.add.reduce(values)):
             raise Malformed(f"tick {self.tick}: numbers that are not finite")
+        outboxes = {outbox.index: outbox.packets for part in parts for outbox in part.outboxes}
         return Frame(self.tick, layout, values, outboxes)
-
-    def _claims(self) -> str:
-        claims = {
-            entity.name: [node for node, part in self.parts.items() if entity.index in part.solved]
-            for entity in self.slots.layout.entities
-        }
-        return "; ".join(f"{name} solved by {nodes or 'nobody'}" for name, nodes in claims.items() if len(nodes) != 1)

@@ -1,0 +1,95 @@
+"""The world computed again from orders and deliveries alone, on any number of nodes: what `verify` compares with.
+
+The nodes are those of a run, with their cores, parts and engines; supervisor and vHub are replaced by what the capture
+says they said. Neighbours: `verify` reads the capture, `system` is the whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from foosim.node.core import NodeCore
+from foosim.node.engines.interface import EngineFactory
+from foosim.node.solver import Solver
+from foosim.protocol import channels
+from foosim.protocol.actions import Publish
+from foosim.protocol.codec import encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.frame import Frame, layout_after
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.messages import AddedEntity, Build, Delivered, Deliveries, Edit, Epoch, Order, Prepare
+from foosim.protocol.start import initial_frame
+from foosim.rehearsal.bus import Bus
+
+EPOCH = 1
+SOURCE = "capture"
+
+
+class Replica:
+    """Nodes of a deployment, fed tick by tick. `frame` is the world so far."""
+
+    def __init__(self, text: str, name: str, deployment: Deployment, factory: EngineFactory | None = None) -> None:
+        self.frame: Frame = initial_frame(deployment)
+        self._deployment = deployment
+        self._base = build_layout(deployment)
+        self._bus = Bus()
+        self._nodes: dict[str, tuple[NodeCore, Solver]] = {}
+        for node in sorted(deployment.nodes):
+            core = NodeCore(node, "boot", library_fingerprint(), 0)
+            self._nodes[node] = core, Solver(core, factory)
+            self._bus.subscribe(node, channels.NODE_READS)
+        for node in self._nodes:
+            build = Build(node, "boot", SOURCE, name, text, "fast", [])
+            self._say(channels.BUILD, node, encode(build))
+        self._settle()
+        owners = sorted(deployment.owners().items())
+        epoch = Epoch(EPOCH, 0, self.frame.digest, sorted(deployment.nodes), owners, [])
+        self._say(channels.EPOCH, SOURCE, encode(epoch))
+        self._settle()
+
+    def step(self, edits: Sequence[Edit], delivered: Sequence[Delivered]) -> Frame:
+        """Compute the next frame from what the order and the vHub gave to this tick."""
+        tick = self.frame.tick
+        layout = layout_after(self.frame.layout, edits)
+        if layout is not self.frame.layout:
+            self._say(channels.PREPARE, SOURCE, encode(Prepare(self._added(layout))))
+            self._settle()
+        self._say(channels.ORDER, SOURCE, encode(Order(EPOCH, tick, list(edits))))
+        self._say(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered))))
+        self._settle()
+        core, _ = next(iter(self._nodes.values()))
+        assert core.frame is not None and core.frame.tick == tick + 1, "every node has its inputs"
+        self.frame = core.frame
+        return self.frame
+
+    def rebuild_engines(self) -> None:
+        """Replace all engines by new ones."""
+        for _, solver in self._nodes.values():
+            solver.rebuild()
+
+    def close(self) -> None:
+        for _, solver in self._nodes.values():
+            solver.close()
+
+    def _added(self, layout: Layout) -> list[AddedEntity]:
+        return [AddedEntity(e.name, e.model) for e in layout.entities if e.name not in self._base]
+
+    def _say(self, channel: channels.Channel, name: str, payload: bytes) -> None:
+        self._bus.put(SOURCE, channel, name, payload, 0)
+
+    def _settle(self) -> None:
+        """Let the nodes take turns until nobody has anything to say."""
+        while self._bus.next_ns() is not None:
+            _, _, receiver, channel, name, payload = self._bus.pop()
+            core, solver = self._nodes[receiver]
+            core.receive(channel, name, payload, 0)
+            solver.build_wanted()
+            core.advance(0)
+            while core.work is not None:
+                solver.solve(core.work)
+                core.advance(0)
+            for action in core.actions:
+                if isinstance(action, Publish):
+                    self._bus.put(receiver, action.channel, action.name, action.payload, 0)
+            core.actions.clear()

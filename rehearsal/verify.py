@@ -1,0 +1,77 @@
+"""Verify a capture: simulate it again from orders and deliveries, compare the digest of every tick.
+
+The typed function behind `foosim-replay verify`. It starts at frame 0, never from a later frame, on any number of
+nodes, and names the first tick and entity that differ. Neighbours: `replica` computes, `vhub.capture_reader` reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next
+from foosim.protocol.messages import Delivered, Edit
+from foosim.rehearsal.rehearse import with_nodes
+from foosim.rehearsal.replica import Replica
+
+
+@dataclass(frozen=True, slots=True)
+class CapturedTick:
+    """One tick as the capture has it: the frame's digests, and the inputs of the tick that led to it."""
+
+    tick: int
+    digest: bytes
+    entities: Sequence[bytes]
+    """64-bit digests, in name order; may be empty."""
+    edits: Sequence[Edit]
+    delivered: Sequence[Delivered]
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """What a verification found. `tick` is the first that differs, -1 if none does; `entities` are those that do."""
+
+    ticks: int
+    nodes: int
+    chain: bytes
+    tick: int = -1
+    entities: tuple[str, ...] = ()
+    missing_tick: int = -1
+    """The first tick that the capture lacks, -1 if it is whole."""
+
+    @property
+    def equal(self) -> bool:
+        return self.tick < 0 and self.missing_tick < 0
+
+
+def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1) -> Verified:
+    """Simulate again what `ticks` (from 0 on, in order) say, on `nodes` nodes, and compare."""
+    text = with_nodes(text, name, nodes)
+    replica = Replica(text, name, load_deployment(text, name))
+    chain = CHAIN_START
+    try:
+        for captured in ticks:
+            expected = replica.frame.tick + 1 if captured.tick > 0 else 0
+            if captured.tick != expected:
+                return Verified(replica.frame.tick, nodes, chain, missing_tick=expected)
+            frame = replica.frame if captured.tick == 0 else replica.step(captured.edits, captured.delivered)
+            if frame.digest != captured.digest:
+                return Verified(frame.tick, nodes, chain, frame.tick, _differing(frame, captured))
+            if frame.tick > 0:
+                chain = chain_next(chain, frame.digest)
+        return Verified(replica.frame.tick, nodes, chain)
+    finally:
+        replica.close()
+
+
+def _differing(frame: Frame, captured: CapturedTick) -> tuple[str, ...]:
+    """Return the names of the entities whose digests differ."""
+    entities = frame.layout.entities
+    if len(captured.entities) != len(entities):
+        return ("layout",)
+    return tuple(
+        entity.name
+        for entity, digest in zip(entities, captured.entities, strict=True)
+        if frame.entity_digest(entity) != digest
+    )

@@ -1,0 +1,100 @@
+"""Law 1: one node or many, any owner, any schedule of moves, any engine's past: equal digests at every tick.
+
+In rehearsal, each node with an engine of its own that steps only what it solves, engines rebuilt at random ticks. Every
+test asserts that there were contacts and hand-overs: without them nothing is proved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foosim.protocol.draws import draw_key, draw_words
+from foosim.protocol.frame import Frame
+from foosim.rehearsal.bus import Weather
+from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.system import Settings, System
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TICKS = 1500
+MOVES = 200
+REBUILDS = 40
+
+
+@dataclass
+class Contacts:
+    """Counts ticks in which a rod touched a ball."""
+
+    count: int = 0
+    frames: list[Frame] = field(default_factory=list)
+
+    def __call__(self, frame: Frame) -> None:
+        if any(frame.numbers[rod.offsets["contacts"]] for rod in frame.layout.rods):
+            self.count += 1
+
+
+def shuffle(system: System, seed: int, moves: int = MOVES, rebuilds: int = REBUILDS) -> None:
+    """Move random robots to random nodes and rebuild random engines, at ticks drawn by the seed."""
+    robots = sorted(system.supervisor.owners)
+    nodes = sorted(system.solvers)
+    key = draw_key(seed, "moves")
+    for number in range(moves):
+        words = draw_words(key, number)
+        robot, node = robots[words[0] % len(robots)], nodes[words[1] % len(nodes)]
+
+        def move(robot: str = robot, node: str = node) -> None:
+            system.request("move", robot=robot, node=node)
+
+        system.at_tick(1 + words[2] % (TICKS - 10), move)
+    key = draw_key(seed, "rebuilds")
+    for number in range(rebuilds):
+        words = draw_words(key, number)
+        system.at_tick(1 + words[0] % (TICKS - 10), system.solvers[nodes[words[1] % len(nodes)]].rebuild)
+
+
+def run(engine: str, seed: int, nodes: int, shuffled: bool, weather: Weather | None = None) -> tuple[Rehearsed, int]:
+    """Rehearse the table; return the result and the ticks with a rod's contact."""
+    contacts = Contacts()
+    rehearsal = Settings(on_commit=contacts)
+    if weather is not None:
+        rehearsal.weather = weather
+    prepare = (lambda system: shuffle(system, seed)) if shuffled else None
+    sets = [f"engine={engine}", f"seed={seed}", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=2 m/s"]
+    result = rehearse(TABLE.read_text(), TABLE.name, TICKS, nodes, sets, rehearsal, prepare=prepare)
+    assert result.json["ticks"] == TICKS
+    return result, contacts.count
+
+
+def first_difference(one: Rehearsed, other: Rehearsed) -> int | None:
+    return next((i + 1 for i, (a, b) in enumerate(zip(one.digests, other.digests, strict=True)) if a != b), None)
+
+
+@settings(max_examples=2)
+@given(seed=st.integers(0, 2**31))
+@pytest.mark.parametrize("engine", ["bullet", "pure"])
+def test_nodes_owners_moves_and_rebuilds_change_nothing(engine: str, seed: int) -> None:
+    alone, contacts = run(engine, seed, 1, shuffled=False)
+    assert contacts > 0
+    handovers = 0
+    for nodes in (1, 2, 3, 8):
+        many, _ = run(engine, seed, nodes, shuffled=True)
+        assert first_difference(alone, many) is None, f"seed {seed}, {nodes} nodes"
+        assert many.json["digest"] == alone.json["digest"]
+        handovers += many.json["handovers"]
+        assert nodes == 1 or many.json["moves"] > MOVES / 2
+    assert handovers > 0
+
+
+@settings(max_examples=2)
+@given(seed=st.integers(0, 2**31))
+def test_a_bad_bus_changes_nothing(seed: int) -> None:
+    """Messages late, reordered, repeated and lost: what is missing is asked for again, and the world is the same."""
+    alone, contacts = run("pure", seed, 1, shuffled=False)
+    weather = Weather(seed, delay_ns=100_000, spread_ns=3_000_000, loss=0.02, repeat=0.05)
+    many, _ = run("pure", seed, 3, shuffled=True, weather=weather)
+    assert contacts > 0 and many.json["handovers"] > 0
+    assert first_difference(alone, many) is None, f"seed {seed}"
