@@ -1,0 +1,318 @@
+"""Journals: append-only files of framed records, which a process writes before it speaks.
+
+One record is one `write`: its length, a CRC of length and payload, the payload. A killed process loses nothing that
+was appended; a dead machine at most what `fdatasync`, called each second in a thread, had not reached. A file starts
+with a signature, then with the record that its writer gives as head, so that older files can go. `flock` keeps a second
+writer out. What a record means is its writer's matter: `vhub.records`, `supervisor.records`.
+
+When a file is full, `append` does not turn to the next one by itself: the head holds the writer's state, which is the
+state after the last appended record only when nothing that was decided still waits to be appended. The shell knows
+when that is, and calls `rotate_if_full`.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import struct
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+from zlib import crc32
+
+from foosim.protocol import limits
+from foosim.protocol.errors import Refused
+
+SIGNATURE: Final = b"foosim journal 1\n"
+_FRAMING: Final = struct.Struct("<II")
+_LENGTH: Final = struct.Struct("<I")
+_SERIAL: Final = re.compile(r"(\d{6,})\.journal")
+
+
+class JournalError(Refused):
+    """A journal cannot be written or read: the file, and what is wrong with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class JournalStatistics:
+    """What a journal has written since it was opened, and how many of its files there are."""
+
+    records: int
+    bytes: int
+    files: int
+    syncs: int
+
+
+def journal_files(folder: Path, stem: str) -> list[Path]:
+    """Return the files of a journal, oldest first; none is no error."""
+    return [path for _, path in _numbered(folder, stem)]
+
+
+def _numbered(folder: Path, stem: str) -> list[tuple[int, Path]]:
+    found = []
+    for path in folder.glob(f"{stem}-*.journal"):
+        match = _SERIAL.fullmatch(path.name.removeprefix(f"{stem}-"))
+        if match is not None:
+            found.append((int(match[1]), path))
+    return sorted(found)
+
+
+class Records(Iterator[bytes]):
+    """The records of one file, in order, up to the first that is torn or corrupt.
+
+    After the last one `left_bytes` is how many bytes of the file are no record: 0 in a whole file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.valid_bytes = 0
+        """Where the next record starts."""
+        try:
+            self._file = path.open("rb")
+            self._size = os.fstat(self._file.fileno()).st_size
+            start = self._file.read(len(SIGNATURE))
+        except OSError as error:
+            raise JournalError(f"{path}: cannot be read, {error.strerror}") from None
+        if start == SIGNATURE:
+            self.valid_bytes = len(SIGNATURE)
+        elif not SIGNATURE.startswith(start):
+            self._file.close()
+            raise JournalError(f"{path}: no journal of this version, its first bytes are {start!r}, not {SIGNATURE!r}")
+
+    @property
+    def left_bytes(self) -> int:
+        return self._size - self.valid_bytes
+
+    def __next__(self) -> bytes:
+        record = None if self._file.closed else self._read()
+        if record is None:
+            self._file.close()
+            raise StopIteration
+        return record
+
+    def _read(self) -> bytes | None:
+        """Return the next whole record; a length beyond the file's end is never allocated."""
+        framing = self._file.read(_FRAMING.size)
+        if len(framing) < _FRAMING.size or self.valid_bytes == 0:
+            return None
+        length, checksum = _FRAMING.unpack(framing)
+        if length > self.left_bytes - _FRAMING.size:
+            return None
+        payload = self._file.read(length)
+        if len(payload) < length or _checksum(payload) != checksum:
+            return None
+        self.valid_bytes += _FRAMING.size + length
+        return payload
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._file.close()
+
+
+def read_records(path: Path) -> Records:
+    """Read one file of a journal. A torn tail is what a killed machine leaves, and no error: see `left_bytes`."""
+    return Records(path)
+
+
+def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
+    """Yield the records of all files of a journal, in order; each file but the first starts with its head again."""
+    for path in journal_files(folder, stem):
+        yield from read_records(path)
+
+
+def _checksum(payload: bytes) -> int:
+    """CRC of length and payload: a run of zeros, as some file systems leave after a crash, is no record."""
+    return crc32(payload, crc32(_LENGTH.pack(len(payload))))
+
+
+class Journal:
+    """The one writer of a journal: files `STEM-000001.journal`, ... in `folder`; a new one at every opening.
+
+    Raises JournalError when another process writes it or the disk refuses; after a failed write every further one
+    fails too, since a record that is missing in the middle would be worse than an end.
+    """
+
+    def __init__(
+        self, folder: Path, stem: str, bytes_max: int = limits.JOURNAL_BYTES_MAX, sync_every_s: float = 1.0
+    ) -> None:
+        self.folder = folder
+        self.stem = stem
+        self._bytes_max = bytes_max
+        self._sync_every_s = sync_every_s
+        self._records = self._bytes = self._syncs = 0
+        self._error: JournalError | None = None
+        self._lock_file = self._lock()
+        self._closed_files: list[tuple[int, int]] = []
+        """Serial and last tick of files that are full, oldest first."""
+        self._serial = max((serial for serial, _ in _numbered(folder, stem)), default=0)
+        self._mutex = threading.Lock()
+        """Guards what the syncing thread shares: `_file`, `_retired`, what is dirty, `_syncs`."""
+        self._retired: list[int] = []
+        self._dirty = self._folder_dirty = False
+        self._file = self._size = 0
+        self._begin_file()
+        self._stop = threading.Event()
+        self._syncer = threading.Thread(target=self._sync_each_interval, name=f"sync-{stem}", daemon=True)
+        self._syncer.start()
+
+    # --- writing -----------------------------------------------------------------------------------------------------
+
+    def append(self, record: bytes) -> None:
+        """Write one record; when this returns, a killed process does not lose it."""
+        if self._error is not None:
+            raise self._error
+        assert len(record) <= limits.JOURNAL_BYTES_MAX, "a record larger than a journal file may be"
+        framing = _FRAMING.pack(len(record), _checksum(record))
+        self._write(framing + record if self._size else SIGNATURE + framing + record)
+        self._records += 1
+
+    def rotate_if_full(self, head: Callable[[], bytes], tick: int) -> bool:
+        """Begin a new file with the record `head()` when this one is full; return whether that was so.
+
+        To be called when everything that was decided is appended. `tick` is the last one that the files so far hold.
+        """
+        if self._size < self._bytes_max:
+            return False
+        if self._error is not None:
+            raise self._error
+        first_record = head()
+        self._closed_files.append((self._serial, tick))
+        self._begin_file()
+        self.append(first_record)
+        return True
+
+    def forget_before(self, tick: int) -> None:
+        """Remove the files that hold nothing from `tick` on: the capture is synced up to there."""
+        done = [serial for serial, last_tick in self._closed_files if last_tick < tick]
+        if not done:
+            return
+        self._closed_files = self._closed_files[len(done) :]
+        try:
+            for serial, path in _numbered(self.folder, self.stem):
+                if serial <= done[-1]:
+                    path.unlink(missing_ok=True)
+        except OSError as error:
+            raise self._failed("cannot remove a file that is done with", error) from None
+
+    def statistics(self) -> JournalStatistics:
+        with self._mutex:
+            syncs = self._syncs
+        return JournalStatistics(self._records, self._bytes, len(journal_files(self.folder, self.stem)), syncs)
+
+    @property
+    def path(self) -> Path:
+        """The file that is written."""
+        return self.folder / f"{self.stem}-{self._serial:06d}.journal"
+
+    def close(self) -> None:
+        """Sync what is written and let go of the files; a second call does nothing."""
+        if self._stop.is_set():
+            return
+        self._stop.set()
+        self._syncer.join()
+        with self._mutex:
+            self._retired.append(self._file)
+        self._sync()
+        os.close(self._lock_file)
+        if self._error is not None:
+            raise self._error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # --- files -------------------------------------------------------------------------------------------------------
+
+    def _lock(self) -> int:
+        """Take the lock that is held as long as the journal is open; the kernel frees it when the process ends."""
+        path = self.folder / f"{self.stem}.lock"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise JournalError(f"{path}: cannot be opened, {error.strerror}") from None
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = os.pread(lock, 20, 0).decode(errors="replace").strip()
+            os.close(lock)
+            raise JournalError(f"{path}: the journal is being written by another process ({holder})") from None
+        except OSError as error:
+            os.close(lock)
+            raise JournalError(f"{path}: cannot be locked, {error.strerror}") from None
+        os.ftruncate(lock, 0)
+        os.pwrite(lock, f"pid {os.getpid()}\n".encode(), 0)
+        return lock
+
+    def _begin_file(self) -> None:
+        """Turn to a new file, which must not exist yet; the one before goes to the syncing thread."""
+        self._serial += 1
+        try:
+            file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise self._failed("cannot be created", error) from None
+        with self._mutex:
+            if self._file:
+                self._retired.append(self._file)
+            self._file = file
+            self._folder_dirty = True
+        self._size = 0
+
+    def _write(self, content: bytes) -> None:
+        """Append by one `write`, more of them only when a disk that gets full takes a part; that part is cut off."""
+        written = 0
+        try:
+            while written < len(content):
+                written += os.write(self._file, content[written:] if written else content)
+        except OSError as error:
+            failure = self._failed("cannot be written", error)
+            with suppress(OSError):
+                os.ftruncate(self._file, self._size)
+            raise failure from None
+        self._size += written
+        self._bytes += written
+        self._dirty = True
+
+    def _failed(self, what: str, error: OSError) -> JournalError:
+        failure = JournalError(f"{self.path}: {what}, {error.strerror}")
+        self._error = self._error or failure
+        return failure
+
+    # --- syncing -----------------------------------------------------------------------------------------------------
+
+    def _sync_each_interval(self) -> None:
+        while not self._stop.wait(self._sync_every_s):
+            self._sync()
+
+    def _sync(self) -> None:
+        """Bring to the disk what was written, and the names of new files; files that are full are let go of."""
+        with self._mutex:
+            retired, self._retired = self._retired, []
+            dirty = retired if not self._dirty or self._file in retired else [*retired, self._file]
+            folder_dirty, self._dirty, self._folder_dirty = self._folder_dirty, False, False
+            self._syncs += 1 if dirty else 0
+        try:
+            for file in dirty:
+                os.fdatasync(file)
+            if folder_dirty:
+                self._sync_folder()
+        except OSError as error:
+            self._failed("cannot be synced", error)
+        for file in retired:
+            os.close(file)
+
+    def _sync_folder(self) -> None:
+        folder = os.open(self.folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
