@@ -148,7 +148,10 @@ class Part(Message, frozen=True):
 
 
 class Commit(Message, frozen=True):
-    """Frame `tick` as the supervisor assembled it, with the order that led to it (none for frame 0)."""
+    """Frame `tick` as the supervisor assembled it, with the order that led to it (none for frame 0).
+
+    `last` says that the run ends with this frame: its tick is not closed.
+    """
 
     epoch: Counter
     tick: Counter
@@ -156,6 +159,7 @@ class Commit(Message, frozen=True):
     values: Numbers
     outboxes: Outboxes
     edits: Edits
+    last: bool
 
 
 class Want(Message, frozen=True):

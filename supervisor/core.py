@@ -295,8 +295,9 @@ class SupervisorCore:
     def _say_commit(self, edits: list[Edit]) -> None:
         """Journal a frame, then publish it to the vHub."""
         frame = self.frame
+        last = self.stop_at > 0 and frame.tick >= self.stop_at
         commit = Commit(
-            self.epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, edits
+            self.epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, edits, last
         )
         payload = encode(commit)
         self._commits[frame.tick] = payload
@@ -392,7 +393,9 @@ class SupervisorCore:
         process.heartbeat = heartbeat
         report = decode_json(heartbeat.report)
         process.report = report if isinstance(report, dict) else {}
-        if self.epoch > 0 and heartbeat.epoch < self.epoch and self.end is None:
+        if self.end is not None:
+            self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+        elif self.epoch > 0 and heartbeat.epoch < self.epoch:
             self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
             if heartbeat.sender == channels.VHUB:
                 self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))

@@ -166,7 +166,7 @@ class HubCore:
         if self._world is not None and self._world.waited:
             self.sessions.repeat(self._world.waited, now_ns)
             self._check_deadlines(now_ns)
-        if now_ns >= self._want_ns and self._epoch > 0 and not self.finished:
+        if now_ns >= self._want_ns and self._epoch > 0 and self.ended is None:
             self._ask_again(now_ns)
         self._release(now_ns)
         if self.ended is not None and not self.finished and now_ns >= self._end_ns:
@@ -233,7 +233,9 @@ class HubCore:
         committed = self._commits.get(tick)
         if committed is None:
             return False
-        raw, commit, frame = committed
+        _, commit, frame = committed
+        if commit.last:
+            return False
         packets = self._packets_of(tick, commit, frame)
         if packets is None:
             return False
