@@ -439,7 +439,8 @@ class NodeCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = self.frame.tick if self.frame is not None else 0
-        return Heartbeat(self.name, tick, self.epoch, self.waiting_for, "", self.busy, encode_json({"solved_ticks": self._solved_ticks}))
+        report = encode_json({"solved_ticks": self._solved_ticks})
+        return Heartbeat(self.name, tick, self.epoch, self.waiting_for, "", self.busy, report)
 
 
 def _moved_counters(counters: list[int], old: Layout, new: Layout) -> list[int]:

@@ -19,7 +19,7 @@ from foosim.node.engines.interface import Engine
 from foosim.node.rules import TableRules
 from foosim.node.sensors import Sensor, make_sensor
 from foosim.protocol import limits
-from foosim.protocol.deployment import Deployment, RodRobot, period_ticks
+from foosim.protocol.deployment import BallSensor, Deployment, RodRobot, RodSensor, period_ticks
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.messages import Delivered, Edit, Name, Payload, RobotPacket
@@ -74,7 +74,7 @@ class Stepper:
                     robot.offsets[f"sampled.{channel}"],
                     make_sensor(settings, layout, robot, channel, deployment.seed),
                 )
-                for channel, settings in sorted(deployment.robots[robot.name].sensors.items())
+                for channel, settings in _sensors_of(deployment, robot.name)
             ]
         self._periods = sorted({period for sensors in self._sensors.values() for _, period, _, _ in sensors})
         drive = deployment.table.drive
@@ -88,12 +88,12 @@ class Stepper:
         self._z_min, self._z_max = -margin, table.walls.height + margin
         self._rods: dict[int, tuple[int, int, float]] = {}
         for entity in layout.rods:
-            robot = deployment.robots[entity.name]
-            assert isinstance(robot, RodRobot)
+            spec = deployment.robots[entity.name]
+            assert isinstance(spec, RodRobot)
             self._rods[entity.index] = (
                 entity.offsets["joint_positions"],
                 entity.offsets["joint_velocities"],
-                table.lines[robot.line].half_stroke + STOP_DEPTH_M,
+                table.lines[spec.line].half_stroke + STOP_DEPTH_M,
             )
         self._ball_reach_m = self._ball_speed_max * deployment.tick_ns / 1e9
 
@@ -216,3 +216,8 @@ class Stepper:
             and vx * vx + vy * vy + vz * vz <= self._ball_speed_max * self._ball_speed_max
             and dx * dx + dy * dy + dz * dz <= self._ball_reach_m * self._ball_reach_m
         )
+
+
+def _sensors_of(deployment: Deployment, robot: str) -> list[tuple[str, RodSensor | BallSensor]]:
+    """Return (channel, settings) of a robot's sensors, in channel order."""
+    return sorted(deployment.robots[robot].sensors.items(), key=lambda item: item[0])

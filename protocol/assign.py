@@ -22,8 +22,7 @@ MARGIN_M = 0.001
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Bounding volumes: `ball_m` is the radius of a grown ball; rods are (index, name, x of the axis), in order of x,
-
+    """Bounding volumes. `ball_m` is the radius of a grown ball; `rods` are (index, name, x of the axis) in order of x,
     with one half width and one band of z; `balls` are (index, start of the position)."""
 
     ball_m: float
@@ -141,7 +140,7 @@ def islands_of(numbers: Sequence[float], reach: Reach, touching: Touching) -> tu
 
 
 class Assignment:
-    """Shares by node, for one layout, roster and owners; with one ball, equal neighbourhoods give the same shares again."""
+    """Shares by node, for one layout, roster and owners; with one ball, equal neighbourhoods give equal shares."""
 
     def __init__(self, layout: Layout, reach: Reach, roster: Sequence[str], owners: Mapping[str, str]) -> None:
         assert roster and list(roster) == sorted(roster), roster

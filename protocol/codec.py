@@ -7,6 +7,7 @@ in one payload. Neighbours: `messages` has the schema, `channels` which type a k
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from functools import cache
 from typing import Any, TypeVar
 
@@ -43,7 +44,7 @@ def decode_json(payload: bytes) -> Any:
 
 
 @cache
-def _decoder(kind: Any) -> msgspec.msgpack.Decoder[Any]:
+def _decoder(kind: Hashable) -> msgspec.msgpack.Decoder[Any]:
     return msgspec.msgpack.Decoder(kind)
 
 
@@ -51,11 +52,16 @@ def decode(kind: type[T], payload: bytes, bytes_max: int = limits.MESSAGE_BYTES_
     """Return the message of type `kind` that `payload` holds, or raise `Malformed`."""
     if len(payload) > bytes_max:
         raise Malformed(f"{len(payload)} bytes, at most {bytes_max} are allowed")
+    message: T = decode_any(kind, payload)
+    return message
+
+
+def decode_any(kind: Any, payload: bytes) -> Any:
+    """Return the message of `kind`, which may be a union of types; for payloads whose size is bounded already."""
     try:
-        message: T = _decoder(kind).decode(payload)
+        return _decoder(kind).decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise Malformed(_reason(payload, error)) from None
-    return message
 
 
 def _reason(payload: bytes, error: Exception) -> str:

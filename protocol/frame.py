@@ -47,7 +47,7 @@ class Frame:
         """D(tick): BLAKE2b, 32 bytes, of tick, layout and the bytes as they are."""
         hasher = blake2b(_TICK.pack(self.tick), digest_size=32)
         hasher.update(self.layout.digest)
-        hasher.update(self.values)
+        hasher.update(self.values.data)
         for index, packets in self.outboxes.items():
             hasher.update(_OUTBOX.pack(index, len(packets)) + packets)
         return hasher.digest()
@@ -69,7 +69,7 @@ class Frame:
 
     def entity_digest(self, entity: Entity) -> bytes:
         """Return a digest of 8 bytes of one entity's slots and outbox: it tells which entity differs."""
-        hasher = blake2b(self.values[entity.start : entity.stop], digest_size=8)
+        hasher = blake2b(self.values[entity.start : entity.stop].data, digest_size=8)
         hasher.update(self.outboxes.get(entity.index, b""))
         return hasher.digest()
 

@@ -94,7 +94,9 @@ class System:
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
         self._last_commit_ns = 0
 
-    def _enter(self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]) -> None:
+    def _enter(
+        self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
+    ) -> None:
         self.bus.subscribe(name, reads)
         self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
 
@@ -149,8 +151,7 @@ class System:
         if process.busy_until_ns > now_ns:
             self.bus.hold(message, process.busy_until_ns)
             return
-        if self.settings.observer is not None:
-            self.settings.observer(Traced(now_ns, receiver, "receive", channel.name, payload))
+        self._trace(now_ns, process, "receive", channel.name, payload)
         process.core.receive(channel, name, payload, now_ns)
         process.turn(now_ns)
         self._perform(process)
@@ -177,31 +178,38 @@ class System:
         actions = process.core.actions
         if not actions:
             return
-        observer = self.settings.observer
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
             process.busy_until_ns = leaves_ns
         for action in actions:
             if type(action) is Publish:
-                if observer is not None:
-                    observer(Traced(leaves_ns, process.name, "publish", action.channel.name, action.payload))
+                self._trace(leaves_ns, process, "publish", action.channel.name, action.payload)
                 self.bus.put(process.name, action.channel, action.name, action.payload, leaves_ns)
-            elif type(action) is Journal:
-                if observer is not None:
-                    observer(Traced(leaves_ns, process.name, "journal", "", action.record))
-                if self.settings.on_journal is not None:
-                    self.settings.on_journal(process.name, action.record)
-            elif type(action) is Keep:
-                if self.settings.on_closing is not None:
-                    self.settings.on_closing(action.closing)
-            elif type(action) is Say and self.settings.on_say is not None:
-                self.settings.on_say(process.name, action.level, action.text)
+            else:
+                self._keep(leaves_ns, process, action)
         actions.clear()
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             farewell = self.hub.farewell()
             self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
             self.processes.pop(process.name)
+
+    def _keep(self, now_ns: int, process: Process, action: Any) -> None:
+        """Hand what is written or said to those who asked for it."""
+        settings = self.settings
+        if isinstance(action, Journal):
+            self._trace(now_ns, process, "journal", "", action.record)
+            if settings.on_journal is not None:
+                settings.on_journal(process.name, action.record)
+        elif isinstance(action, Keep):
+            if settings.on_closing is not None:
+                settings.on_closing(action.closing)
+        elif isinstance(action, Say) and settings.on_say is not None:
+            settings.on_say(process.name, action.level, action.text)
+
+    def _trace(self, now_ns: int, process: Process, what: str, channel: str, payload: bytes) -> None:
+        if self.settings.observer is not None:
+            self.settings.observer(Traced(now_ns, process.name, what, channel, payload))
 
     def _committed(self, frame: Frame) -> None:
         self._last_commit_ns = self.bus.now_ns

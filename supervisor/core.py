@@ -121,7 +121,8 @@ class SupervisorCore:
             Request: self.requests.take,
             Farewell: self._on_farewell,
         }
-        self.actions.append(Journal(encode(RunRecord(settings.run, settings.deployment_name, settings.deployment_text))))
+        run = RunRecord(settings.run, settings.deployment_name, settings.deployment_text)
+        self.actions.append(Journal(encode(run)))
 
     # --- what the shell calls --------------------------------------------------------------------------------------
 
@@ -132,9 +133,9 @@ class SupervisorCore:
             reader = self._readers.get(type(message))
             if reader is None:
                 raise Malformed(f"the supervisor does not read the channel {channel.name}")
-            sender = getattr(message, "sender", None) or getattr(message, "node", None) or getattr(message, "name", name)
-            if sender != name:
-                raise Malformed(f"a message on the key of {name} that names {sender}")
+            for field in ("sender", "node", "name"):
+                if getattr(message, field, name) != name:
+                    raise Malformed(f"a message on the key of {name} that names {getattr(message, field)}")
             reader(message, payload, now_ns)
         except Malformed as error:
             self._refused += 1

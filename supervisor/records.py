@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from foosim.protocol.codec import decode
+from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
 from foosim.protocol.messages import Answer, Commit, Edit, Epoch
@@ -52,12 +52,12 @@ class History:
 def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
     """Return what the records of a journal, in order, say about the run."""
     iterator = iter(records)
-    run = decode(Record, next(iterator))  # type: ignore[arg-type]
+    run = decode_any(Record, next(iterator))
     assert isinstance(run, RunRecord), "a journal starts with its run"
     history = History(run, initial_frame(deployment))
     layout = history.frame.layout
     for raw in iterator:
-        record = decode(Record, raw)  # type: ignore[arg-type]
+        record = decode_any(Record, raw)
         if isinstance(record, Commit):
             layout = layout_after(layout, record.edits)
             history.frame = frame_from_bytes(record.tick, layout, record.values, record.outboxes)

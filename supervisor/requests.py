@@ -197,7 +197,8 @@ class Requests:
         balls = [ball.name for ball in self._next_layout().balls]
         if name not in balls:
             nearest = nearest_name(name, balls)
-            raise Refused(f"no free body {name!r}; there are {', '.join(balls)}" + (f", nearest is {nearest}" if nearest else ""))
+            hint = f", nearest is {nearest}" if nearest else ""
+            raise Refused(f"no free body {name!r}; there are {', '.join(balls)}{hint}")
         impulse = _vector(arguments, "impulse", None)
         if sum(value * value for value in impulse) > IMPULSE_MAX**2:
             raise Refused(f"impulse {impulse} is above {IMPULSE_MAX} N s")

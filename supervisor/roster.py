@@ -1,7 +1,7 @@
 """Who takes part: the handshake as the supervisor sees it, and who is heard of.
 
 A hello is checked (protocol version, world, a free and declared name, the arithmetic fingerprint) and answered with a
-build or a refusal that says why. Neighbours: `protocol.member` is the other side, `core` opens epochs with who is ready.
+build or a refusal that says why. Neighbours: `protocol.member` is the other side, `core` opens epochs.
 """
 
 from __future__ import annotations

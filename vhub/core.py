@@ -8,15 +8,14 @@ Neighbours: `state` (what a closing does), `sessions` (clients), `records` (jour
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
@@ -43,10 +42,10 @@ from foosim.protocol.messages import (
 from foosim.protocol.units import parse_pace
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.records import Closing, HeadRecord, TickRecord, world_packets
+from foosim.vhub.release import Releases
+from foosim.vhub.report import HubStatistics, report, statistics
 from foosim.vhub.sessions import Session, Sessions
 from foosim.vhub.state import HubState, received
-
-ANCHOR_WINDOW_NS: Final = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,20 +53,6 @@ class Keep:
     """Rows for the capture, behind the journal: what one closing gave."""
 
     closing: Closing
-
-
-@dataclass(frozen=True, slots=True)
-class HubStatistics:
-    """The hub's account so far."""
-
-    closed: int
-    offered: int
-    delivered: int
-    dropped: int
-    in_flight: int
-    refused: int
-    malformed: int
-    repeated: int
 
 
 HubAction = Action | Keep
@@ -92,6 +77,7 @@ class HubCore:
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
+        self.releases: Releases | None = None
         self.ended: End | None = None
         self.finished = False
         self.lost = ""
@@ -99,16 +85,12 @@ class HubCore:
         self.capture = ""
         self._layout: Layout | None = None
         self._epoch = 0
-        self._pace = 0.0
-        self._paused = False
         self._commits: dict[int, tuple[bytes, Commit, Frame]] = {}
         self._next_commit = 0
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
         self._leaves: list[str] = []
-        self._anchors: deque[tuple[int, int]] = deque()
-        self._releases: list[tuple[int, str, int, list[Flight]]] = []
         self._want_after_ns = limits.WANT_AFTER_NS
         self._want_ns = now_ns
         self._end_ns = 0
@@ -177,8 +159,8 @@ class HubCore:
         deadline = self.member.deadline_ns
         if self._epoch > 0 and not self.finished:
             deadline = min(deadline, self._want_ns)
-        if self._releases:
-            deadline = min(deadline, self._releases[0][0])
+        if self.releases is not None and self.releases.deadline_ns is not None:
+            deadline = min(deadline, self.releases.deadline_ns)
         if self._world is not None:
             for name in self._world.waited:
                 deadline = min(deadline, self.sessions.by_name[name].again_ns)
@@ -196,19 +178,7 @@ class HubCore:
             self._leaves.append(name)
 
     def statistics(self) -> HubStatistics:
-        if self.state is None:
-            return HubStatistics(-1, 0, 0, 0, 0, 0, self._malformed, self._repeated)
-        packets = self.state.packets
-        return HubStatistics(
-            self.state.closed,
-            packets.offered,
-            packets.delivered,
-            packets.dropped,
-            packets.in_flight,
-            packets.refused,
-            self._malformed,
-            self._repeated,
-        )
+        return statistics(self.state, self._malformed, self._repeated)
 
     @property
     def waiting_for(self) -> str:
@@ -222,6 +192,10 @@ class HubCore:
             return f"Done of {', '.join(self._world.waited)}" if self._world.waited else ""
         tick = self.state.closed + 1
         return "samples" if tick in self._commits else "commit"
+
+    @property
+    def _is_paced(self) -> bool:
+        return self.releases is not None and self.releases.factor > 0.0
 
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
@@ -268,7 +242,8 @@ class HubCore:
             return
         self.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
         deadlines = self.deployment.deadlines
-        session.deadline_ns = now_ns + (deadlines.lockstep_realtime_ns if self._pace else deadlines.lockstep_fast_ns)
+        allowed_ns = deadlines.lockstep_realtime_ns if self._is_paced else deadlines.lockstep_fast_ns
+        session.deadline_ns = now_ns + allowed_ns
         session.again_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
         session.again_ns = now_ns + session.again_after_ns
 
@@ -296,8 +271,10 @@ class HubCore:
         self._sent[tick + 1] = payload
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
+        assert self.releases is not None
         for name, flights in world.free.items():
-            self._release_later(name, tick, flights, now_ns)
+            self.releases.add(name, state.members[name].downlink, tick, flights, now_ns)
+        self._release(now_ns)
         self.actions.append(Keep(world.closing))
         self._world = None
         self._commits.pop(tick - limits.KEPT_TICKS, None)
@@ -326,36 +303,17 @@ class HubCore:
         added = [(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
         return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added))
 
-    # --- releasing to free-running clients ---------------------------------------------------------------------------
-
-    def _release_later(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
-        """In realtime a packet leaves at anchor + due, never before its tick is closed; else at once."""
-        assert self.state is not None
-        number = self.state.members[name].downlink
-        if not self._pace or not self._anchors:
-            self._say_down(name, number, tick, flights, now_ns)
-            return
-        due_ns = max(flight.due_ns for flight in flights)
-        at_ns = self._anchor_ns() + int(due_ns / self._pace)
-        if at_ns <= now_ns:
-            self._say_down(name, number, tick, flights, now_ns)
-        else:
-            self._releases.append((at_ns, name, number, flights))
-            self._releases.sort(key=lambda release: release[:3])
-
     def _release(self, now_ns: int) -> None:
-        while self._releases and self._releases[0][0] <= now_ns:
-            _, name, number, flights = self._releases.pop(0)
-            self._say_down(name, number, flights[0].arrival_tick, flights, now_ns)
-
-    def _say_down(self, name: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
-        assert self.state is not None
-        for flight in flights:
-            flight.released_wall_ns = now_ns
-        self.sessions.say_down(name, number, tick, received(flights), self.state.members[name].sequence)
-
-    def _anchor_ns(self) -> int:
-        return min(anchor for _, anchor in self._anchors)
+        """Say what is released to free-running clients by now."""
+        if self.releases is None or self.state is None:
+            return
+        for release in self.releases.take(now_ns):
+            for flight in release.flights:
+                flight.released_wall_ns = now_ns
+            member = self.state.members[release.client]
+            self.sessions.say_down(
+                release.client, release.number, release.tick, received(release.flights), member.sequence
+            )
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
@@ -366,15 +324,16 @@ class HubCore:
         assert deployment is not None
         self._layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
         self.state = HubState(deployment)
+        self.releases = Releases(deployment.tick_ns)
         self.actions.append(Journal(self.head()))
         self._ready_if_complete()
 
     def _missing_clients(self) -> list[str]:
         assert self.deployment is not None
-        declared = {**self.deployment.players, **self.deployment.clients}
-        return [
-            name for name, client in sorted(declared.items()) if client.lockstep and name not in self.sessions.joins
-        ]
+        players, clients = self.deployment.players, self.deployment.clients
+        lockstep = [name for name, player in players.items() if player.lockstep]
+        lockstep += [name for name, client in clients.items() if client.lockstep]
+        return [name for name in sorted(lockstep) if name not in self.sessions.joins]
 
     def _ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined."""
@@ -402,11 +361,8 @@ class HubCore:
         self._layout = layout
         self._next_commit += 1
         self._commits[commit.tick] = payload, commit, frame
-        if self._pace and self.deployment is not None:
-            anchor = now_ns - int(commit.tick * self.deployment.tick_ns / self._pace)
-            self._anchors.append((now_ns, anchor))
-            while self._anchors[0][0] < now_ns - ANCHOR_WINDOW_NS:
-                self._anchors.popleft()
+        if self.releases is not None:
+            self.releases.committed(commit.tick, now_ns)
 
     def _on_samples(self, samples: Samples, payload: bytes, now_ns: int) -> None:
         if self.state is None or not self.state.closed < samples.tick <= self.state.closed + limits.KEPT_TICKS:
@@ -469,11 +425,8 @@ class HubCore:
             pace = parse_pace(tempo.pace)
         except Refused as error:
             raise Malformed(str(error)) from None
-        factor = 0.0 if pace.kind == "fast" else float(pace.factor)
-        if factor != self._pace or tempo.paused != self._paused:
-            self._anchors.clear()
-        self._pace = factor
-        self._paused = tempo.paused
+        if self.releases is not None:
+            self.releases.set_tempo(0.0 if pace.kind == "fast" else float(pace.factor), tempo.paused)
 
     # --- time --------------------------------------------------------------------------------------------------------
 
@@ -496,7 +449,7 @@ class HubCore:
         assert self._world is not None
         for name in self._world.waited:
             session = self.sessions.by_name[name]
-            if self._paused:
+            if self.releases is not None and self.releases.paused:
                 session.deadline_ns = max(session.deadline_ns, now_ns + limits.WANT_EVERY_NS_MAX)
             elif now_ns >= session.deadline_ns:
                 self._lose(name, f"no Done of tick {session.go_tick} within its deadline")
@@ -512,28 +465,7 @@ class HubCore:
         return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, self._report())
 
     def _report(self) -> bytes:
-        """Return the account for people: totals, refusals, and a line per link."""
-        if self.state is None:
-            return encode_json({})
-        packets = self.state.packets
-        return encode_json(
-            {
-                "packets": {
-                    "offered": packets.offered,
-                    "delivered": packets.delivered,
-                    "dropped": packets.dropped,
-                    "in_flight": packets.in_flight,
-                    "refused": packets.refused,
-                },
-                "refusals": self.state.refusals,
-                "links": [
-                    [*pair, s.offered, s.delivered, s.dropped, s.delay_ns // s.delivered if s.delivered else 0]
-                    for pair, s in sorted((pair, link.state) for pair, link in self.state.links.items())
-                ],
-                "clients": sorted(self.state.members),
-                "capture": self.capture,
-            }
-        )
+        return report(self.state, self.capture)
 
     # --- the end -----------------------------------------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """Quantiles of jitter: a table of 4,096 per shape, built by a fixed routine and interpolated to whole nanoseconds.
 
-The routine uses only + - x / of IEEE doubles (its own exponential and logarithm), so that the table is the same on every
-machine, whatever its mathematical library. Source of the series: Abramowitz and Stegun, Handbook of Mathematical
+The routine uses only + - x / of IEEE doubles (its own exponential and logarithm), so that the table is the same on
+every machine, whatever its mathematical library. Source of the series: Abramowitz and Stegun, Handbook of Mathematical
 Functions, 6.5.29 (incomplete gamma) and 6.1.41 (Stirling's series of ln gamma).
 """
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from foosim.protocol.codec import decode, encode
+from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Commit, Deliveries, Edit, RobotPacket, Samples, Sent
+from foosim.protocol.messages import Commit, Delivered, Deliveries, Edit, RobotPacket, Samples, Sent
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState, Joining
 
@@ -50,7 +50,7 @@ class Closing:
     frame: Frame
     digest: bytes
     edits: Sequence[Edit]
-    delivered: Sequence[object]
+    delivered: Sequence[Delivered]
     """What reached robots at the tick that led to this frame."""
     joins: list[Joining] = field(default_factory=list)
     leaves: list[str] = field(default_factory=list)
@@ -77,12 +77,12 @@ def world_packets(samples: Iterable[Samples], digest: bytes, layout: Layout) -> 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:
     """Yield the state and the closing after every tick record; the first record is a head."""
     iterator = iter(records)
-    head = decode(HubRecord, next(iterator))  # type: ignore[arg-type]
+    head = decode_any(HubRecord, next(iterator))
     assert isinstance(head, HeadRecord), "a journal starts with its head"
     state = HubState.restore(deployment, head.state)
     layout = build_layout(deployment, head.added)
     for raw in iterator:
-        record = decode(HubRecord, raw)  # type: ignore[arg-type]
+        record = decode_any(HubRecord, raw)
         if isinstance(record, HeadRecord):
             continue
         commit = decode(Commit, record.commit)

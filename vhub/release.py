@@ -1,0 +1,71 @@
+"""When what is due leaves for a free-running client: in realtime at anchor + due, in fast in tick order, at once.
+
+The anchor is the least of (arrival of Commit(k) - k T) over the last second, on the hub's own clock: the best estimate
+of wall time 0 that late commits do not spoil. Neighbours: `core` says what is released, `sessions` speaks.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from foosim.vhub.packet import Flight
+
+ANCHOR_WINDOW_NS: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Flights that leave together for one client, as its downlink `number`, at wall time `at_ns`."""
+
+    at_ns: int
+    client: str
+    number: int
+    tick: int
+    flights: list[Flight]
+
+
+class Releases:
+    """What waits to be released, by wall time. `factor` is simulated over wall time; 0 in fast."""
+
+    def __init__(self, tick_ns: int) -> None:
+        self.factor = 0.0
+        self.paused = False
+        self._tick_ns = tick_ns
+        self._anchors: deque[tuple[int, int]] = deque()
+        self._waiting: list[Release] = []
+
+    def set_tempo(self, factor: float, paused: bool) -> None:
+        """Take a new pace: the anchor is learnt anew."""
+        if factor != self.factor or paused != self.paused:
+            self._anchors.clear()
+        self.factor = factor
+        self.paused = paused
+
+    def committed(self, tick: int, now_ns: int) -> None:
+        """Learn from the arrival of a commit."""
+        if not self.factor:
+            return
+        self._anchors.append((now_ns, now_ns - int(tick * self._tick_ns / self.factor)))
+        while self._anchors[0][0] < now_ns - ANCHOR_WINDOW_NS:
+            self._anchors.popleft()
+
+    def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
+        """Take what a closed tick releases to a client."""
+        at_ns = now_ns
+        if self.factor and self._anchors:
+            anchor_ns = min(anchor for _, anchor in self._anchors)
+            at_ns = max(now_ns, anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor))
+        self._waiting.append(Release(at_ns, client, number, tick, flights))
+        self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
+
+    def take(self, now_ns: int) -> list[Release]:
+        """Take what is due by now, in order."""
+        due = [release for release in self._waiting if release.at_ns <= now_ns]
+        self._waiting = self._waiting[len(due) :]
+        return due
+
+    @property
+    def deadline_ns(self) -> int | None:
+        return self._waiting[0].at_ns if self._waiting else None

@@ -1,0 +1,60 @@
+"""What the vHub reports of itself in heartbeats and its farewell, as JSON: totals, refusals, a line per link.
+
+Neighbours: `core` sends it, `supervisor.status` shows it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from foosim.protocol.codec import encode_json
+from foosim.vhub.state import HubState
+
+
+@dataclass(frozen=True, slots=True)
+class HubStatistics:
+    """The hub's account so far."""
+
+    closed: int
+    offered: int
+    delivered: int
+    dropped: int
+    in_flight: int
+    refused: int
+    malformed: int
+    repeated: int
+
+
+def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStatistics:
+    """Return the account so far as a frozen value."""
+    if state is None:
+        return HubStatistics(-1, 0, 0, 0, 0, 0, malformed, repeated)
+    p = state.packets
+    return HubStatistics(
+        state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated
+    )
+
+
+def report(state: HubState | None, capture: str) -> bytes:
+    """Return the account so far. `links` are [from, to, offered, delivered, dropped, mean delay in ns]."""
+    if state is None:
+        return encode_json({})
+    packets = state.packets
+    return encode_json(
+        {
+            "packets": {
+                "offered": packets.offered,
+                "delivered": packets.delivered,
+                "dropped": packets.dropped,
+                "in_flight": packets.in_flight,
+                "refused": packets.refused,
+            },
+            "refusals": state.refusals,
+            "links": [
+                [*pair, s.offered, s.delivered, s.dropped, s.delay_ns // s.delivered if s.delivered else 0]
+                for pair, s in sorted((pair, link.state) for pair, link in state.links.items())
+            ],
+            "clients": sorted(state.members),
+            "capture": capture,
+        }
+    )
