@@ -45,7 +45,8 @@ class Flight:
         self.stamp_ns = stamp_ns
         self.payload = payload
         self.due_ns = sent_ns
-        self.arrival_tick = 0
+        self.arrival_tick = -1
+        """-1 until it is on its way; a packet that is dropped at sending never is."""
         self.cause = ""
         self.rule = ""
         self.words: tuple[int, ...] = ()

@@ -1,0 +1,352 @@
+"""The rows of a capture: what is kept of every closed tick, as types of their own, and how a closing becomes rows.
+
+A row is a JSON object; its JSON Schema is generated from its type. Viewers (Foxglove, Lichtblick) parse only a part of
+JSON Schema: objects of numbers, strings, booleans, objects and lists of these; no null, no choice between types, no
+reference, no list in a list. So a row has every field always, and -1 or an empty text where there is nothing to say.
+Fields that come from a clock of the real world have names that start with `wall_`: two runs differ in them.
+`rows_of` is pure, so what the writer missed can be made again from a fold of the journal (`records.fold`).
+Neighbours: `capture_writer`, `capture_reader`, `viewing` (what is looked at).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import msgspec
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.draws import Slot
+from foosim.protocol.errors import Refused
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.messages import Add, Delivered, Edit, Push, Remove, Stop
+from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
+from foosim.vhub.records import Closing
+
+FORMAT: Final = 1
+"""Version of the rows and of the capture's metadata; a reader refuses another one."""
+PROFILE: Final = "foosim"
+
+Fate = Literal["delivered", "dropped", "in_flight"]
+
+
+class CaptureError(Refused):
+    """A capture cannot be written or read: the file, the place in it, and what is wrong."""
+
+
+class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
+    """What every row shares: an object with all its fields, none unknown."""
+
+
+class EditRow(Row, frozen=True):
+    """A change of the world by an order. Lists are x, y, z in the world frame, empty where the kind has none."""
+
+    kind: Literal["add", "remove", "push", "stop"]
+    name: str = ""
+    model: str = ""
+    position: list[float] = []
+    velocity: list[float] = []
+    impulse: list[float] = []
+    reason: str = ""
+
+
+class DeliveredRow(Row, frozen=True):
+    """A packet that reached a robot."""
+
+    due_ns: int
+    source: str
+    sequence: int
+    copy: int
+    destination: str
+    channel: str
+    payload: bytes
+
+
+class TickRow(Row, frozen=True):
+    """Frame `tick`: its digest D(tick), a 64-bit digest per entity in name order (all in hex), and what it came from:
+    edits and deliveries of tick - 1. `wall_closed_ns` is the vHub's monotonic clock."""
+
+    tick: int
+    digest: str
+    entities: list[str]
+    edits: list[EditRow]
+    deliveries: list[DeliveredRow]
+    wall_closed_ns: int
+
+
+class EntityRow(Row, frozen=True):
+    """One entity of a layout: its slots are `start` to `stop` of the frame's values, from `split` on its owner's."""
+
+    name: str
+    model: str
+    start: int
+    split: int
+    stop: int
+
+
+class AddedRow(Row, frozen=True):
+    """An entity that is not in the deployment."""
+
+    name: str
+    model: str
+
+
+class LayoutRow(Row, frozen=True):
+    """The layout of frames from `tick` on."""
+
+    tick: int
+    digest: str
+    size: int
+    entities: list[EntityRow]
+    added: list[AddedRow]
+
+
+class OutboxRow(Row, frozen=True):
+    """The outbox of the entity at `index` of the layout."""
+
+    index: int
+    packets: bytes
+
+
+class FrameRow(Row, frozen=True):
+    """Frame `tick` itself: its values as little-endian float64, its outboxes that are not empty."""
+
+    tick: int
+    values: bytes
+    outboxes: list[OutboxRow]
+
+
+class PacketRow(Row, frozen=True):
+    """One offered packet and its fate, with the cause of a drop and what the verdict came from.
+
+    `due_ns` and `arrival_tick` are -1 when it was dropped at sending. The words are the 64-bit draws that were used,
+    in hex. `stamp_ns` is the sender's own; `wall_released_ns` the vHub's monotonic clock, 0 when not known.
+    """
+
+    source: str
+    sequence: int
+    copy: int
+    destination: str
+    channel: str
+    sent_ns: int
+    stamp_ns: int
+    due_ns: int
+    arrival_tick: int
+    fate: Fate
+    cause: str
+    rule: str
+    loss_word: str
+    jitter_word: str
+    size: int
+    payload: bytes
+    wall_released_ns: int
+
+
+class SubscriptionRow(Row, frozen=True):
+    """A robot's channel that a client hears."""
+
+    robot: str
+    channel: str
+
+
+class ClientRow(Row, frozen=True):
+    """A client that joins or leaves at `tick`; `period` is in ticks (0: free-running)."""
+
+    tick: int
+    client: str
+    event: Literal["joins", "leaves"]
+    period: int
+    subscriptions: list[SubscriptionRow]
+
+
+TICK: Final = "/tick"
+LAYOUT: Final = "/layout"
+FRAME: Final = "/frame"
+PACKETS: Final = "/packets"
+CLIENTS: Final = "/clients"
+
+ROW_TYPES: Final[Mapping[str, type[Row]]] = {
+    LAYOUT: LayoutRow,
+    CLIENTS: ClientRow,
+    TICK: TickRow,
+    FRAME: FrameRow,
+    PACKETS: PacketRow,
+}
+"""The type of the rows of each topic."""
+
+Entry = tuple[str, int, int, int, Row]
+"""A row with its place: topic, log time and publish time (simulated ns), sequence number."""
+
+
+def row_schema(kind: type[Row]) -> dict[str, Any]:
+    """Return the JSON Schema of a row, in the part of JSON Schema that viewers parse: everything in its place."""
+    schema = msgspec.json.schema(kind)
+    definitions: dict[str, Any] = schema["$defs"]
+    content: dict[str, Any] = _in_place(schema, definitions)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **content}
+
+
+def _in_place(schema: Any, definitions: Mapping[str, Any]) -> Any:
+    """Return a schema with references replaced by what they name, and the type said of every list of choices."""
+    if isinstance(schema, list):
+        return [_in_place(item, definitions) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    if "$ref" in schema:
+        return _in_place(definitions[schema["$ref"].rpartition("/")[2]], definitions)
+    typed = {"type": "string", **schema} if "enum" in schema else schema
+    return {key: _in_place(value, definitions) for key, value in typed.items() if key != "$defs"}
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What decides how a closing becomes rows: a function of the deployment."""
+
+    tick_ns: int
+    frames_every: int
+    base: Layout
+    draws: Mapping[str, tuple[bool, bool]]
+    """Whether the rule of that name uses the draw for loss, and for jitter."""
+
+
+def plan_of(deployment: Deployment) -> Plan:
+    """Return the plan of a deployment's captures."""
+    draws = {rule.id: (rule.loss > 0.0, rule.jitter is not None) for rule in deployment.network.links}
+    return Plan(deployment.tick_ns, deployment.capture.frames_every, build_layout(deployment), draws)
+
+
+def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
+    """Return the rows of one closing, in the order in which they are written.
+
+    `known` is the frame of the closing before, None at the start. The last closing of a run may bring a frame that is
+    known already: then its packets alone are new.
+    """
+    frame = closing.frame
+    at_ns = frame.tick * plan.tick_ns
+    mark = frame.tick & 0xFFFF_FFFF
+    entries: list[Entry] = []
+    if known is None or known.tick != frame.tick:
+        if known is None or known.layout.digest != frame.layout.digest:
+            entries.append((LAYOUT, at_ns, at_ns, mark, layout_row(frame, plan.base)))
+        entries += [(CLIENTS, at_ns, at_ns, mark, row) for row in _client_rows(closing)]
+        entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
+        if known is None or frame.tick % plan.frames_every == 0:
+            entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
+    draws = plan.draws
+    for flight in closing.fates:
+        sent_ns = flight.sent_ns
+        entries.append(
+            (
+                PACKETS,
+                sent_ns,
+                flight.stamp_ns or sent_ns,
+                flight.sequence & 0xFFFF_FFFF,
+                _packet_row(flight, draws.get(flight.rule, _NO_DRAWS)),
+            )
+        )
+    return entries
+
+
+_NO_DRAWS: Final = (False, False)
+_FATES: Final[Mapping[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
+
+
+def _packet_row(flight: Flight, draws: tuple[bool, bool]) -> PacketRow:
+    words = flight.words
+    fate = _FATES.get(flight.cause, DROPPED)
+    on_its_way = flight.arrival_tick >= 0
+    return PacketRow(
+        flight.source,
+        flight.sequence,
+        flight.copy,
+        flight.destination,
+        flight.channel,
+        flight.sent_ns,
+        flight.stamp_ns,
+        flight.due_ns if on_its_way else -1,
+        flight.arrival_tick,
+        fate,
+        flight.cause if fate is DROPPED else "",
+        flight.rule,
+        f"{words[Slot.LOSS]:016x}" if words and draws[0] else "",
+        f"{words[Slot.JITTER]:016x}" if words and draws[1] and on_its_way else "",
+        len(flight.payload),
+        flight.payload,
+        flight.released_wall_ns,
+    )
+
+
+def _tick_row(closing: Closing) -> TickRow:
+    frame = closing.frame
+    return TickRow(
+        frame.tick,
+        closing.digest.hex(),
+        [frame.entity_digest(entity).hex() for entity in frame.layout.entities],
+        [edit_row(edit) for edit in closing.edits],
+        [
+            DeliveredRow(d.due_ns, d.source, d.sequence, d.copy, d.destination, d.channel, d.payload)
+            for d in closing.delivered
+        ],
+        closing.wall_ns,
+    )
+
+
+def layout_row(frame: Frame, base: Layout) -> LayoutRow:
+    """Return the row of a frame's layout; `base` is the deployment's own."""
+    layout = frame.layout
+    return LayoutRow(
+        frame.tick,
+        layout.digest.hex(),
+        layout.size,
+        [EntityRow(e.name, e.model, e.start, e.split, e.stop) for e in layout.entities],
+        [AddedRow(e.name, e.model) for e in layout.entities if e.name not in base],
+    )
+
+
+def frame_row(frame: Frame) -> FrameRow:
+    """Return the row of a frame."""
+    return FrameRow(frame.tick, frame.values.tobytes(), [OutboxRow(*item) for item in frame.outboxes.items()])
+
+
+def _client_rows(closing: Closing) -> list[ClientRow]:
+    tick = closing.frame.tick
+    rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
+    for joining in closing.joins:
+        subscriptions = [SubscriptionRow(robot, channel) for robot, channel in joining.subscriptions]
+        rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions))
+    return rows
+
+
+def edit_row(edit: Edit) -> EditRow:
+    """Return the row of an edit."""
+    if isinstance(edit, Add):
+        return EditRow("add", edit.name, edit.model, position=list(edit.position), velocity=list(edit.velocity))
+    if isinstance(edit, Remove):
+        return EditRow("remove", edit.name)
+    if isinstance(edit, Push):
+        return EditRow("push", edit.name, impulse=list(edit.impulse))
+    return EditRow("stop", reason=edit.reason)
+
+
+def edit_of(row: EditRow) -> Edit:
+    """Return the edit that a row tells; the inverse of `edit_row`."""
+    if row.kind == "add":
+        return Add(row.name, row.model, _vector(row.position), _vector(row.velocity))
+    if row.kind == "remove":
+        return Remove(row.name)
+    if row.kind == "push":
+        return Push(row.name, _vector(row.impulse))
+    return Stop(row.reason)
+
+
+def delivered_of(row: DeliveredRow) -> Delivered:
+    """Return the delivery that a row tells."""
+    return Delivered(row.due_ns, row.source, row.sequence, row.copy, row.destination, row.channel, row.payload)
+
+
+def _vector(numbers: list[float]) -> tuple[float, float, float]:
+    if len(numbers) != 3:
+        raise CaptureError(f"an edit with a vector of {len(numbers)} numbers, it has 3")
+    return numbers[0], numbers[1], numbers[2]
