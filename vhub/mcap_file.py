@@ -1,0 +1,391 @@
+"""The MCAP container: chunks of messages written quickly, records read with bounded memory.
+
+The format is https://mcap.dev/spec. The `mcap` library serialises here whatever is rare (schemas, channels, indexes,
+summary); messages and chunks are packed by this module, since the library's `add_message` costs several times what a
+hub has for a packet. A file that ends in the middle of a record is an unfinished one, and everything before is read.
+Neither half opens files. Neighbours: `capture_writer`, `capture_reader`.
+"""
+
+from __future__ import annotations
+
+import struct
+import sys
+from array import array
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from io import BytesIO
+from typing import BinaryIO, Final, Protocol
+from zlib import crc32
+
+import zstandard
+from mcap import records
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+
+from foosim.vhub.rows import CaptureError
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+CHUNK_BYTES_MAX: Final = 64 * 1024 * 1024
+"""A reader refuses a larger chunk, or any larger record: its memory is bounded by one of them."""
+COMPRESSION: Final = "zstd"
+COMPRESSION_LEVEL: Final = 1
+_MESSAGE: Final = struct.Struct("<BQHIQQ")
+_MESSAGE_FIELDS: Final = struct.Struct("<HIQQ")
+_RECORD: Final = struct.Struct("<BQ")
+_INDEX: Final = struct.Struct("<BQHI")
+_CHUNK: Final = struct.Struct("<BQQQQII4sQ")
+_CHUNK_FIELDS: Final = struct.Struct("<QQQII")
+_FOOTER_START: Final = struct.Struct("<BQQQ")
+_U64: Final = struct.Struct("<Q")
+
+assert sys.byteorder == "little", "indexes are written as the machine has them"
+
+
+class Record(Protocol):
+    """A record that the library serialises."""
+
+    def write(self, stream: RecordBuilder) -> None: ...
+
+
+# --- writing ---------------------------------------------------------------------------------------------------------
+
+
+class McapWriter:
+    """Packs an MCAP file; `write` takes the bytes, in order. Messages are collected until `end_chunk`."""
+
+    def __init__(self, write: Callable[[bytes], None], profile: str) -> None:
+        self._write = write
+        self._offset = 0
+        self._schemas: list[records.Schema] = []
+        self._channels: list[records.Channel] = []
+        self._chunks: list[records.ChunkIndex] = []
+        self._attachments: list[records.AttachmentIndex] = []
+        self._metadata: list[records.MetadataIndex] = []
+        self._counts: dict[int, int] = {}
+        self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
+        self._chunk = bytearray()
+        self._index: dict[int, array[int]] = {}
+        self._first_ns, self._last_ns = sys.maxsize, 0
+        """Times of the messages in the chunk."""
+        self._start_ns, self._end_ns = sys.maxsize, 0
+        """Times of the messages in the file."""
+        self._put(MAGIC)
+        self._put_record(records.Header(profile, f"foosim {version('foosim')}, mcap {version('mcap')}"))
+
+    @property
+    def chunk_bytes(self) -> int:
+        """How large the chunk is that is being collected."""
+        return len(self._chunk)
+
+    @property
+    def offset(self) -> int:
+        """How many bytes the file has."""
+        return self._offset
+
+    @property
+    def messages(self) -> int:
+        """How many messages are in chunks that have ended."""
+        return sum(self._counts.values())
+
+    def add_channel(self, topic: str, message_encoding: str, schema: tuple[str, str, bytes]) -> int:
+        """Declare a topic with its schema (name, encoding, data) and return the channel's number."""
+        number = len(self._channels) + 1
+        name, encoding, data = schema
+        self._schemas.append(records.Schema(id=number, name=name, encoding=encoding, data=data))
+        self._channels.append(
+            records.Channel(id=number, topic=topic, message_encoding=message_encoding, schema_id=number, metadata={})
+        )
+        self._put_record(self._schemas[-1])
+        self._put_record(self._channels[-1])
+        self._index[number] = array("Q")
+        self._counts[number] = 0
+        return number
+
+    def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
+        """Attach a file; it has no times, so that equal runs attach equally."""
+        offset = self._offset
+        length = self._put_record(
+            records.Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+        )
+        self._attachments.append(
+            records.AttachmentIndex(
+                offset=offset,
+                length=length,
+                create_time=0,
+                log_time=0,
+                data_size=len(data),
+                name=name,
+                media_type=media_type,
+            )
+        )
+
+    def add_metadata(self, name: str, content: Mapping[str, str]) -> None:
+        """Add a table of texts."""
+        offset = self._offset
+        length = self._put_record(records.Metadata(name=name, metadata=dict(content)))
+        self._metadata.append(records.MetadataIndex(offset=offset, length=length, name=name))
+
+    def add_message(self, channel: int, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
+        """Add a message to the chunk. The hot path: see the bench before changing it."""
+        chunk = self._chunk
+        self._index[channel].extend((log_ns, len(chunk)))
+        chunk += _MESSAGE.pack(Opcode.MESSAGE, 22 + len(data), channel, sequence, log_ns, publish_ns)
+        chunk += data
+        self._first_ns = min(self._first_ns, log_ns)
+        self._last_ns = max(self._last_ns, log_ns)
+
+    def end_chunk(self) -> None:
+        """Compress and write what is collected, with its indexes; nothing if it is empty."""
+        if not self._chunk:
+            return
+        chunk, size, offset = bytes(self._chunk), len(self._chunk), self._offset
+        data = self._compressor.compress(chunk)
+        name = COMPRESSION.encode()
+        head = _CHUNK.pack(
+            Opcode.CHUNK,
+            _CHUNK.size - _RECORD.size + len(data),
+            self._first_ns,
+            self._last_ns,
+            size,
+            crc32(chunk),
+            len(name),
+            name,
+            len(data),
+        )
+        indexes, offsets = self._message_indexes(offset + len(head) + len(data))
+        self._put(head + data + indexes)
+        self._chunks.append(
+            records.ChunkIndex(
+                chunk_start_offset=offset,
+                chunk_length=len(head) + len(data),
+                compression=COMPRESSION,
+                compressed_size=len(data),
+                uncompressed_size=size,
+                message_start_time=self._first_ns,
+                message_end_time=self._last_ns,
+                message_index_offsets=offsets,
+                message_index_length=len(indexes),
+            )
+        )
+        self._start_ns = min(self._start_ns, self._first_ns)
+        self._end_ns = max(self._end_ns, self._last_ns)
+        self._chunk.clear()
+        self._first_ns, self._last_ns = sys.maxsize, 0
+
+    def _message_indexes(self, offset: int) -> tuple[bytes, dict[int, int]]:
+        """Return the chunk's message index records, to be written at `offset`, and where each channel's is."""
+        parts: list[bytes] = []
+        offsets = {}
+        for channel, entries in self._index.items():
+            if entries:
+                offsets[channel] = offset
+                content = entries.tobytes()
+                parts.append(_INDEX.pack(Opcode.MESSAGE_INDEX, 6 + len(content), channel, len(content)) + content)
+                offset += len(parts[-1])
+                self._counts[channel] += len(entries) // 2
+                del entries[:]
+        return b"".join(parts), offsets
+
+    def finish(self) -> None:
+        """Write the last chunk and the summary, which makes the file whole."""
+        self.end_chunk()
+        self._put_record(records.DataEnd(0))
+        summary_start = self._offset
+        groups: tuple[tuple[Opcode, list[Record]], ...] = (
+            (Opcode.SCHEMA, [*self._schemas]),
+            (Opcode.CHANNEL, [*self._channels]),
+            (Opcode.STATISTICS, [self._statistics()]),
+            (Opcode.CHUNK_INDEX, [*self._chunks]),
+            (Opcode.ATTACHMENT_INDEX, [*self._attachments]),
+            (Opcode.METADATA_INDEX, [*self._metadata]),
+        )
+        summary = b""
+        offsets: list[Record] = []
+        for opcode, group in groups:
+            content = b"".join(map(_serialised, group))
+            if content:
+                offsets.append(records.SummaryOffset(opcode, summary_start + len(summary), len(content)))
+            summary += content
+        offset_start = summary_start + len(summary)
+        summary += b"".join(map(_serialised, offsets))
+        checksum = crc32(_FOOTER_START.pack(Opcode.FOOTER, 20, summary_start, offset_start), crc32(summary))
+        self._put(summary)
+        self._put_record(records.Footer(summary_start, offset_start, checksum))
+        self._put(MAGIC)
+
+    def _statistics(self) -> records.Statistics:
+        return records.Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self._chunks),
+            message_count=self.messages,
+            message_start_time=self._start_ns if self._chunks else 0,
+            message_end_time=self._end_ns,
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
+
+    def _put_record(self, record: Record) -> int:
+        content = _serialised(record)
+        self._put(content)
+        return len(content)
+
+    def _put(self, content: bytes) -> None:
+        self._write(content)
+        self._offset += len(content)
+
+
+def _serialised(record: Record) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    content: bytes = builder.end()  # type: ignore[no-untyped-call]
+    return content
+
+
+# --- reading ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message of a topic."""
+
+    topic: str
+    log_ns: int
+    publish_ns: int
+    sequence: int
+    data: bytes
+
+
+Content = Message | records.Metadata | records.Attachment
+
+
+class McapFile:
+    """Reads an MCAP file from start to end. What is read of a file without an end stands in `unfinished_bytes`."""
+
+    def __init__(self, stream: BinaryIO, size: int, name: str) -> None:
+        self._stream = stream
+        self._size = size
+        self._name = name
+        self._at = 0
+        self._topics: dict[int, str] = {}
+        self.profile = ""
+        self.library = ""
+        self.finished = False
+        """Whether the file's end was reached, and was an end."""
+        self.unfinished_bytes = 0
+        """Bytes behind the last whole record of an unfinished file."""
+
+    def contents(self) -> Iterator[Content]:
+        """Yield messages, metadata and attachments in the order of the file."""
+        if self._stream.read(len(MAGIC)) != MAGIC:
+            raise CaptureError(f"{self._name}: no MCAP file, it does not start with {MAGIC!r}")
+        self._at = len(MAGIC)
+        while not self.finished:
+            record = self._next_record()
+            if record is None:
+                self._end_unfinished()
+                return
+            opcode, content = record
+            try:
+                yield from self._read(opcode, content)
+            except (EndOfFile, struct.error, ValueError, zstandard.ZstdError) as error:
+                raise self._damaged(str(error) or "it is too short") from None
+            self._at += _RECORD.size + len(content)
+
+    def _damaged(self, what: str) -> CaptureError:
+        return CaptureError(f"{self._name}: byte {self._at}: a damaged record, {what}")
+
+    def _end_unfinished(self) -> None:
+        """Stop at a record that the file does not hold; a file with an end has no such record."""
+        self.unfinished_bytes = self._size - self._at
+        self._stream.seek(max(0, self._size - len(MAGIC)))
+        if self._stream.read(len(MAGIC)) == MAGIC and self.unfinished_bytes:
+            raise self._damaged("it is longer than the file")
+
+    def _next_record(self) -> tuple[int, bytes] | None:
+        """Return opcode and content of the next record, None where the file ends within it."""
+        head = self._stream.read(_RECORD.size)
+        if len(head) < _RECORD.size:
+            return None
+        opcode, length = _RECORD.unpack(head)
+        if length > self._size - self._at - _RECORD.size:
+            return None
+        if length > CHUNK_BYTES_MAX:
+            raise CaptureError(
+                f"{self._name}: byte {self._at}: a record of {length} bytes, at most {CHUNK_BYTES_MAX} are read"
+            )
+        content = self._stream.read(length)
+        return (opcode, content) if len(content) == length else None
+
+    def _read(self, opcode: int, content: bytes) -> Iterator[Content]:
+        if opcode == Opcode.CHUNK:
+            yield from self._messages(self._chunk_content(content))
+        elif opcode == Opcode.MESSAGE:
+            yield self._message(content, 0, len(content))
+        elif opcode == Opcode.CHANNEL:
+            self._declare(content)
+        elif opcode == Opcode.METADATA:
+            yield records.Metadata.read(_stream(content))
+        elif opcode == Opcode.ATTACHMENT:
+            yield records.Attachment.read(_stream(content))
+        elif opcode == Opcode.HEADER:
+            header = records.Header.read(_stream(content))
+            self.profile, self.library = header.profile, header.library
+        elif opcode == Opcode.FOOTER:
+            if self._stream.read(len(MAGIC) + 1) != MAGIC:
+                raise ValueError("the file does not end behind its footer")
+            self.finished = True
+
+    def _declare(self, content: bytes) -> None:
+        channel = records.Channel.read(_stream(content))
+        self._topics[channel.id] = channel.topic
+
+    def _chunk_content(self, content: bytes) -> bytes:
+        """Return the records of a chunk; what it would unpack to is bounded before it is unpacked."""
+        _, _, size, checksum, name_length = _CHUNK_FIELDS.unpack_from(content)
+        at = _CHUNK_FIELDS.size + name_length
+        compression = content[_CHUNK_FIELDS.size : at].decode()
+        (length,) = _U64.unpack_from(content, at)
+        data = content[at + _U64.size :]
+        if size > CHUNK_BYTES_MAX:
+            raise CaptureError(
+                f"{self._name}: byte {self._at}: a chunk of {size} bytes, at most {CHUNK_BYTES_MAX} are read"
+            )
+        if length != len(data):
+            raise ValueError(f"a chunk of {length} bytes in a record with room for {len(data)}")
+        if compression == COMPRESSION:
+            data = zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
+        elif compression:
+            raise ValueError(f"compression {compression!r}, read are {COMPRESSION!r} and none")
+        if len(data) != size:
+            raise ValueError(f"a chunk that unpacks to {len(data)} bytes or more instead of {size}")
+        if checksum and crc32(data) != checksum:
+            raise ValueError("a chunk whose checksum is wrong")
+        return data
+
+    def _messages(self, chunk: bytes) -> Iterator[Message]:
+        at, end = 0, len(chunk)
+        while at < end:
+            opcode, length = _RECORD.unpack_from(chunk, at)
+            at += _RECORD.size
+            if length > end - at:
+                raise ValueError(f"a record of {length} bytes in a chunk with {end - at} left")
+            if opcode == Opcode.MESSAGE:
+                yield self._message(chunk, at, at + length)
+            elif opcode == Opcode.CHANNEL:
+                self._declare(chunk[at : at + length])
+            at += length
+
+    def _message(self, content: bytes, start: int, stop: int) -> Message:
+        channel, sequence, log_ns, publish_ns = _MESSAGE_FIELDS.unpack_from(content, start)
+        topic = self._topics.get(channel)
+        if topic is None:
+            raise ValueError(f"a message of channel {channel}, which is not declared")
+        return Message(topic, log_ns, publish_ns, sequence, content[start + _MESSAGE_FIELDS.size : stop])
+
+
+def _stream(content: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(content))
