@@ -6,10 +6,14 @@ choices, so that it can be shown to a person as it is. Each part of the project 
 """
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 
 class Refused(Exception):
     """Something from outside is not accepted; the text says what, where, and what would be."""
+
+    exit_code: ClassVar[int] = 3
+    """What a command exits with that it ends: 1 failed, 2 bad input, 3 refused."""
 
     def __init__(self, what: str) -> None:
         super().__init__(what)
@@ -18,6 +22,8 @@ class Refused(Exception):
 
 class BadValue(Refused):
     """A value that is not valid: what is wrong with it, the value as it was given, the nearest valid one if any."""
+
+    exit_code = 2
 
     def __init__(self, what: str, value: object, nearest: str | None = None) -> None:
         super().__init__(describe(what, value, nearest))
@@ -28,6 +34,8 @@ class BadValue(Refused):
 
 class DeploymentError(Refused):
     """A deployment file with problems, all of them, one a line: `file:line:column: what, value, nearest name`."""
+
+    exit_code = 2
 
     def __init__(self, problems: Sequence[str]) -> None:
         assert problems, "an error without a problem"
