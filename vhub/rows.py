@@ -12,16 +12,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
+from msgspec import Meta
 
+from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import Slot
 from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Delivered, Edit, Push, Remove, Stop
+from foosim.protocol.messages import Add, Counter, Delivered, Edit, Push, Remove, Stop
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
 from foosim.vhub.records import Closing
 
@@ -29,6 +31,11 @@ FORMAT: Final = 1
 """Version of the rows and of the capture's metadata; a reader refuses another one."""
 PROFILE: Final = "foosim"
 
+CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
+"""-1 where there is nothing to say."""
+DigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+EntityDigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{16}$")]
+WordHex = Annotated[str, Meta(pattern="^([0-9a-f]{16})?$")]
 Fate = Literal["delivered", "dropped", "in_flight"]
 
 
@@ -55,10 +62,10 @@ class EditRow(Row, frozen=True):
 class DeliveredRow(Row, frozen=True):
     """A packet that reached a robot."""
 
-    due_ns: int
+    due_ns: Counter
     source: str
-    sequence: int
-    copy: int
+    sequence: Counter
+    copy: Counter
     destination: str
     channel: str
     payload: bytes
@@ -68,12 +75,12 @@ class TickRow(Row, frozen=True):
     """Frame `tick`: its digest D(tick), a 64-bit digest per entity in name order (all in hex), and what it came from:
     edits and deliveries of tick - 1. `wall_closed_ns` is the vHub's monotonic clock."""
 
-    tick: int
-    digest: str
-    entities: list[str]
+    tick: Counter
+    digest: DigestHex
+    entities: list[EntityDigestHex]
     edits: list[EditRow]
     deliveries: list[DeliveredRow]
-    wall_closed_ns: int
+    wall_closed_ns: Counter
 
 
 class EntityRow(Row, frozen=True):
@@ -81,9 +88,9 @@ class EntityRow(Row, frozen=True):
 
     name: str
     model: str
-    start: int
-    split: int
-    stop: int
+    start: Counter
+    split: Counter
+    stop: Counter
 
 
 class AddedRow(Row, frozen=True):
@@ -96,9 +103,9 @@ class AddedRow(Row, frozen=True):
 class LayoutRow(Row, frozen=True):
     """The layout of frames from `tick` on."""
 
-    tick: int
-    digest: str
-    size: int
+    tick: Counter
+    digest: DigestHex
+    size: Counter
     entities: list[EntityRow]
     added: list[AddedRow]
 
@@ -106,14 +113,14 @@ class LayoutRow(Row, frozen=True):
 class OutboxRow(Row, frozen=True):
     """The outbox of the entity at `index` of the layout."""
 
-    index: int
+    index: Counter
     packets: bytes
 
 
 class FrameRow(Row, frozen=True):
     """Frame `tick` itself: its values as little-endian float64, its outboxes that are not empty."""
 
-    tick: int
+    tick: Counter
     values: bytes
     outboxes: list[OutboxRow]
 
@@ -126,22 +133,22 @@ class PacketRow(Row, frozen=True):
     """
 
     source: str
-    sequence: int
-    copy: int
+    sequence: Counter
+    copy: Counter
     destination: str
     channel: str
-    sent_ns: int
-    stamp_ns: int
-    due_ns: int
-    arrival_tick: int
+    sent_ns: Counter
+    stamp_ns: Counter
+    due_ns: CounterOrNone
+    arrival_tick: CounterOrNone
     fate: Fate
     cause: str
     rule: str
-    loss_word: str
-    jitter_word: str
-    size: int
+    loss_word: WordHex
+    jitter_word: WordHex
+    size: Counter
     payload: bytes
-    wall_released_ns: int
+    wall_released_ns: Counter
 
 
 class SubscriptionRow(Row, frozen=True):
@@ -154,10 +161,10 @@ class SubscriptionRow(Row, frozen=True):
 class ClientRow(Row, frozen=True):
     """A client that joins or leaves at `tick`; `period` is in ticks (0: free-running)."""
 
-    tick: int
+    tick: Counter
     client: str
     event: Literal["joins", "leaves"]
-    period: int
+    period: Counter
     subscriptions: list[SubscriptionRow]
 
 

@@ -1,0 +1,144 @@
+"""What a capture gives as numpy arrays: packets, frames, poses. Plain data, made by `capture_reader`."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from sys import intern
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout
+from foosim.protocol.scene import Body, forward_kinematics
+from foosim.vhub.rows import FrameRow, PacketRow
+
+Integers = NDArray[np.int64]
+Numbers = NDArray[np.float64]
+Objects = NDArray[np.object_]
+
+
+@dataclass(frozen=True, slots=True)
+class Packets:
+    """All packets of a capture as columns, in the order in which their fates became final.
+
+    Texts and payloads are object arrays (`packets.source == "camera"` gives a mask), the rest int64. `due_ns` and
+    `arrival_tick` are -1 for what was dropped at sending; a word is the 64-bit draw that was used, or None.
+    """
+
+    source: Objects
+    sequence: Integers
+    copy: Integers
+    destination: Objects
+    channel: Objects
+    sent_ns: Integers
+    stamp_ns: Integers
+    due_ns: Integers
+    arrival_tick: Integers
+    fate: Objects
+    cause: Objects
+    rule: Objects
+    loss_word: Objects
+    jitter_word: Objects
+    size: Integers
+    payload: Objects
+    wall_released_ns: Integers
+
+    def __len__(self) -> int:
+        return len(self.sequence)
+
+    def where(self, mask: NDArray[np.bool_]) -> Packets:
+        """Return the packets for which the mask is true."""
+        return Packets(*(getattr(self, field.name)[mask] for field in fields(self)))
+
+
+_WORDS: Final = frozenset({"loss_word", "jitter_word"})
+_TEXTS: Final = frozenset({"source", "destination", "channel", "fate", "cause", "rule"})
+
+
+def packet_columns(rows: Iterable[PacketRow]) -> Packets:
+    """Return rows as columns; equal texts are stored once."""
+    integers: dict[str, array[int]] = {}
+    objects: dict[str, list[Any]] = {}
+    for field in fields(Packets):
+        if field.type == "Integers":
+            integers[field.name] = array("q")
+        else:
+            objects[field.name] = []
+    for row in rows:
+        for name, numbers in integers.items():
+            numbers.append(getattr(row, name))
+        for name, values in objects.items():
+            value = getattr(row, name)
+            if name in _TEXTS:
+                value = intern(value)
+            elif name in _WORDS:
+                value = int(value, 16) if value else None
+            values.append(value)
+    columns: list[Any] = [
+        np.frombuffer(integers[field.name], dtype=np.int64) if field.name in integers else _objects(objects[field.name])
+        for field in fields(Packets)
+    ]
+    return Packets(*columns)
+
+
+def _objects(values: Sequence[Any]) -> Objects:
+    column = np.empty(len(values), dtype=np.object_)
+    column[:] = values
+    return column
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """Captured frames of one layout: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index."""
+
+    layout: Layout
+    ticks: Integers
+    values: Numbers
+    outboxes: tuple[Mapping[int, bytes], ...]
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    def frame(self, index: int) -> Frame:
+        """Return one of them as a frame, from which a world can go on."""
+        return Frame(int(self.ticks[index]), self.layout, np.array(self.values[index]), self.outboxes[index])
+
+    def column(self, entity: str, field: str, count: int = 1) -> Numbers:
+        """Return one field of an entity over time: (n,), or (n, count) for a field of several numbers."""
+        start = self.layout[entity].offsets[field]
+        return self.values[:, start] if count == 1 else self.values[:, start : start + count]
+
+
+def frames_of(layout: Layout, rows: Sequence[FrameRow]) -> Frames:
+    """Return the rows of one layout's frames as arrays; their sizes are the layout's."""
+    ticks = np.array([row.tick for row in rows], dtype=np.int64)
+    values = np.frombuffer(b"".join(row.values for row in rows), dtype=np.float64).reshape(len(rows), layout.size)
+    outboxes = tuple({outbox.index: outbox.packets for outbox in row.outboxes} for row in rows)
+    return Frames(layout, ticks, values, outboxes)
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """The pose of one link over time, in the world frame: metres, quaternions x, y, z, w."""
+
+    ticks: Integers
+    positions: Numbers
+    orientations: Numbers
+
+
+def poses_of(blocks: Iterable[tuple[Frames, Body]], link: str) -> Poses:
+    """Return a link's poses over frames of one or more layouts, by the one forward kinematics."""
+    ticks: list[int] = []
+    poses: list[tuple[float, ...]] = []
+    for frames, body in blocks:
+        entity = frames.layout[body.name]
+        ticks += frames.ticks.tolist()
+        for values in frames.values:
+            placed = {name: (*at, *turn) for name, at, turn in forward_kinematics(body, entity, values.tolist())}
+            poses.append(placed[link])
+    table = np.array(poses, dtype=np.float64).reshape(len(ticks), 7)
+    return Poses(np.array(ticks, dtype=np.int64), table[:, :3], table[:, 3:])

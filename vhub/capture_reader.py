@@ -1,0 +1,357 @@
+"""The reader of captures: a finished or an unfinished file as numpy arrays, and what a re-simulation is fed with.
+
+A file is read from start to end, with no more of it in memory than a chunk and the columns that are asked for. What is
+damaged or is no capture raises `CaptureError`; a file whose writer was killed gives everything up to its last whole
+chunk, and says so. Neighbours: `rows`, `capture_columns`, `mcap_file`, `capture_writer`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+from mcap import records
+from numpy.typing import NDArray
+
+from foosim.protocol.codec import decode_json
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.frame import CHAIN_START, chain_next
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.messages import Delivered, Edit
+from foosim.protocol.names import nearest_name
+from foosim.protocol.scene import Body
+from foosim.protocol.table_scene import build_scene
+from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
+from foosim.vhub.capture_writer import DEPLOYMENT, END_METADATA, METADATA, VERSIONS
+from foosim.vhub.mcap_file import McapFile, Message
+from foosim.vhub.rows import (
+    CLIENTS,
+    FORMAT,
+    FRAME,
+    LAYOUT,
+    PACKETS,
+    PROFILE,
+    ROW_TYPES,
+    TICK,
+    CaptureError,
+    ClientRow,
+    FrameRow,
+    LayoutRow,
+    PacketRow,
+    Row,
+    TickRow,
+    delivered_of,
+    edit_of,
+)
+
+_DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
+
+
+class _TickHead(msgspec.Struct, gc=False):
+    """The part of a tick's row that is looked at when all are counted."""
+
+    tick: int
+    digest: str
+
+
+_TICK_HEAD: Final = msgspec.json.Decoder(_TickHead)
+
+
+@dataclass(frozen=True, slots=True)
+class CapturedTick:
+    """One tick as the capture has it: the frame's digests, and the inputs of the tick that led to it."""
+
+    tick: int
+    digest: bytes
+    entities: tuple[bytes, ...]
+    """64-bit digests, in name order."""
+    edits: list[Edit]
+    delivered: list[Delivered]
+
+
+@dataclass(slots=True)
+class About:
+    """What a capture says about itself, beside its rows."""
+
+    path: Path
+    library: str = ""
+    metadata: dict[str, str] = field(default_factory=dict)
+    end: dict[str, str] = field(default_factory=dict)
+    deployment_text: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+    finished: bool = False
+    unfinished_bytes: int = 0
+
+    @property
+    def deployment_name(self) -> str:
+        return self.metadata["deployment"]
+
+
+class _Scan:
+    """One pass over a file: it yields the messages of some topics and gathers what stands beside them."""
+
+    def __init__(self, path: Path) -> None:
+        self.about = About(path)
+        self._path = path
+
+    def messages(self) -> Iterator[Message]:
+        """Yield all messages, from the first on behind the checked metadata."""
+        try:
+            with self._path.open("rb") as stream:
+                file = McapFile(stream, self._path.stat().st_size, str(self._path))
+                checked = False
+                for content in file.contents():
+                    if isinstance(content, Message):
+                        if not checked:
+                            self._check(file.profile)
+                            checked = True
+                        yield content
+                    else:
+                        self._take(content)
+        except OSError as error:
+            raise CaptureError(f"{self._path}: cannot be read, {error.strerror}") from None
+        self._check(file.profile)
+        self.about.library = file.library
+        self.about.finished, self.about.unfinished_bytes = file.finished, file.unfinished_bytes
+
+    def rows(self, topics: frozenset[str]) -> Iterator[tuple[str, Row]]:
+        """Yield the rows of some topics."""
+        for message in self.messages():
+            if message.topic in topics:
+                yield message.topic, self.decode(_DECODERS[message.topic], message)
+
+    def decode(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
+        """Return the row that a message holds."""
+        try:
+            return decoder.decode(message.data)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise CaptureError(f"{self._path}: {message.topic} at {message.log_ns} ns: {error}") from None
+
+    def _check(self, profile: str) -> None:
+        """Refuse what is no capture, or one of another version, before its rows are looked at."""
+        if profile != PROFILE or not self.about.metadata:
+            raise CaptureError(f"{self._path}: no capture of foosim, its profile is {profile!r}, not {PROFILE!r}")
+        version = self.about.metadata.get("format", "")
+        if version != str(FORMAT):
+            raise CaptureError(f"{self._path}: format {version!r} of a capture, this reads {FORMAT}")
+        if not self.about.deployment_text or "deployment" not in self.about.metadata:
+            raise CaptureError(f"{self._path}: the capture has no deployment")
+
+    def _take(self, content: records.Metadata | records.Attachment) -> None:
+        about = self.about
+        if isinstance(content, records.Metadata):
+            if content.name == METADATA:
+                about.metadata = content.metadata
+            elif content.name == END_METADATA:
+                about.end = content.metadata
+            return
+        try:
+            if content.name == DEPLOYMENT:
+                about.deployment_text = content.data.decode()
+            elif content.name == VERSIONS:
+                about.versions = msgspec.convert(decode_json(content.data), dict[str, str])
+        except (Malformed, UnicodeDecodeError, msgspec.ValidationError) as error:
+            raise CaptureError(f"{self._path}: attachment {content.name}: {error}") from None
+
+
+@dataclass(frozen=True)
+class CaptureData:
+    """A capture, opened. Packets are read when they are asked for, the inputs of ticks each time from the file."""
+
+    about: About
+    deployment: Deployment
+    ticks: Integers
+    """Ticks of the frames whose digests are there, ascending; all from 0 on in a whole capture."""
+    digests: NDArray[np.uint8]
+    """D(tick) of each, (n, 32)."""
+    frame_blocks: tuple[Frames, ...]
+    """Captured frames, a block for each layout."""
+    clients: tuple[ClientRow, ...]
+
+    @property
+    def path(self) -> Path:
+        return self.about.path
+
+    @property
+    def finished(self) -> bool:
+        return self.about.finished
+
+    @property
+    def frames(self) -> Frames:
+        """The captured frames of a run whose layout never changed; `frame_blocks` has those of any run."""
+        if len(self.frame_blocks) != 1:
+            ticks = ", ".join(str(block.ticks[0]) for block in self.frame_blocks if len(block))
+            raise CaptureError(f"{self.path}: frames of {len(self.frame_blocks)} layouts (from {ticks}): frame_blocks")
+        return self.frame_blocks[0]
+
+    @cached_property
+    def packets(self) -> Packets:
+        """All packets with their fates."""
+        return packet_columns(row for row in self.rows(PACKETS) if isinstance(row, PacketRow))
+
+    def rows(self, topic: str) -> Iterator[Row]:
+        """Yield the rows of a topic, in the order of the file."""
+        if topic not in ROW_TYPES:
+            raise CaptureError(f"{self.path}: no rows of {topic!r}, there are {', '.join(sorted(ROW_TYPES))}")
+        for _, row in _Scan(self.path).rows(frozenset({topic})):
+            yield row
+
+    def captured_ticks(self) -> Iterator[CapturedTick]:
+        """Yield what a re-simulation needs, tick by tick."""
+        for row in self.rows(TICK):
+            assert isinstance(row, TickRow)
+            yield CapturedTick(
+                row.tick,
+                bytes.fromhex(row.digest),
+                tuple(bytes.fromhex(digest) for digest in row.entities),
+                [edit_of(edit) for edit in row.edits],
+                [delivered_of(delivered) for delivered in row.deliveries],
+            )
+
+    def poses(self, name: str) -> Poses:
+        """Return the poses of a link (`red.goal/slide`), or of an entity's last link (`ball`, `red.goal`)."""
+        found: list[tuple[Frames, Body]] = []
+        link = ""
+        names: set[str] = set()
+        for frames in self.frame_blocks:
+            for body in build_scene(self.deployment, frames.layout).bodies.values():
+                links = [part.name for part in body.links]
+                names.update((body.name, *links))
+                if name == body.name or name in links:
+                    link = name if name in links else links[-1]
+                    found.append((frames, body))
+        if not found:
+            nearest = nearest_name(name, sorted(names))
+            hint = f", nearest is {nearest}" if nearest else ""
+            raise CaptureError(f"{self.path}: nothing with a body is called {name!r}{hint}")
+        return poses_of(found, link)
+
+
+def open_capture(path: Path | str) -> CaptureData:
+    """Open a capture, also an unfinished one. Raises CaptureError when it is none, or damaged."""
+    scan = _Scan(Path(path))
+    ticks: list[int] = []
+    digests: list[bytes] = []
+    layouts: list[LayoutRow] = []
+    frames: list[list[FrameRow]] = []
+    clients: list[ClientRow] = []
+    for message in scan.messages():
+        if message.topic == TICK:
+            head = scan.decode(_DECODERS[TICK], message)
+            ticks.append(head.tick)
+            digests.append(bytes.fromhex(head.digest))
+        elif message.topic == LAYOUT:
+            layouts.append(scan.decode(_DECODERS[LAYOUT], message))
+            frames.append([])
+        elif message.topic == FRAME:
+            if not frames:
+                raise CaptureError(f"{path}: a frame without a layout before it")
+            frames[-1].append(scan.decode(_DECODERS[FRAME], message))
+        elif message.topic == CLIENTS:
+            clients.append(scan.decode(_DECODERS[CLIENTS], message))
+    for before, after in pairwise(ticks):
+        if after <= before:
+            raise CaptureError(f"{path}: tick {after} comes behind tick {before}")
+    deployment = _deployment_of(scan.about)
+    blocks = []
+    for layout_row, rows in zip(layouts, frames, strict=True):
+        layout = _layout_of(scan.about, deployment, layout_row)
+        for row in rows:
+            if len(row.values) != 8 * layout.size or any(o.index >= len(layout.entities) for o in row.outboxes):
+                raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
+        blocks.append(frames_of(layout, rows))
+    return CaptureData(
+        scan.about,
+        deployment,
+        np.array(ticks, dtype=np.int64),
+        np.frombuffer(b"".join(digests), dtype=np.uint8).reshape(len(digests), 32),
+        tuple(blocks),
+        tuple(clients),
+    )
+
+
+def _deployment_of(about: About) -> Deployment:
+    try:
+        return load_deployment(about.deployment_text, about.deployment_name)
+    except Refused as error:
+        raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
+
+
+def _layout_of(about: About, deployment: Deployment, row: LayoutRow) -> Layout:
+    """Build the layout that a row names, and compare: what the numbers of its frames mean depends on it."""
+    try:
+        layout = build_layout(deployment, [(added.name, added.model) for added in row.added])
+    except KeyError as error:
+        raise CaptureError(f"{about.path}: the layout at tick {row.tick} has an unknown model {error}") from None
+    if layout.digest.hex() != row.digest or layout.size != row.size:
+        raise CaptureError(f"{about.path}: the layout at tick {row.tick} is not what this version builds")
+    return layout
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureInfo:
+    """A capture in short, for people and scripts. Digests are hex; `packets` counts fates."""
+
+    path: str
+    bytes: int
+    finished: bool
+    unfinished_bytes: int
+    library: str
+    metadata: Mapping[str, str]
+    end: Mapping[str, str]
+    versions: Mapping[str, str]
+    ticks: int
+    tick_ns: int
+    duration_ns: int
+    digest: str
+    chain: str
+    packets: Mapping[str, int]
+    topics: Mapping[str, int]
+
+
+def capture_info(path: Path | str) -> CaptureInfo:
+    """Return a capture in short, by one pass over the file."""
+    path = Path(path)
+    scan = _Scan(path)
+    topics: Counter[str] = Counter()
+    fates: Counter[str] = Counter()
+    tick, digest, chain = 0, b"", CHAIN_START
+    for message in scan.messages():
+        topics[message.topic] += 1
+        if message.topic == TICK:
+            head = scan.decode(_TICK_HEAD, message)
+            try:
+                tick, digest = head.tick, bytes.fromhex(head.digest)
+            except ValueError:
+                raise CaptureError(f"{path}: {TICK} at {message.log_ns} ns: {head.digest!r} is no digest") from None
+            chain = chain_next(chain, digest) if tick > 0 else chain
+        elif message.topic == PACKETS:
+            fates[scan.decode(_DECODERS[PACKETS], message).fate] += 1
+    about = scan.about
+    tick_ns = _deployment_of(about).tick_ns
+    return CaptureInfo(
+        str(path),
+        path.stat().st_size,
+        about.finished,
+        about.unfinished_bytes,
+        about.library,
+        about.metadata,
+        about.end,
+        about.versions,
+        tick,
+        tick_ns,
+        tick * tick_ns,
+        digest.hex(),
+        chain.hex(),
+        {"offered": fates.total(), **{fate: fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
+        dict(sorted(topics.items())),
+    )
