@@ -57,6 +57,7 @@ class Member:
             return False
         self.build = build
         self.deployment = load_deployment(build.deployment, build.deployment_name)
+        self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's says where clients find it
         self._world = self.deployment.world
         return True
 
@@ -87,7 +88,10 @@ class Member:
 
     def wake(self, now_ns: int, heartbeat: Callable[[], Heartbeat]) -> None:
         """Say hello or ready again and the heartbeat, each when it is due."""
-        if now_ns < self.deadline_ns or self.refusal:
+        if now_ns < self.deadline_ns:
+            return
+        if self.refusal:
+            self.deadline_ns = now_ns + AGAIN_NS
             return
         if self.build is None:
             hello = Hello(self.role, self.name, self.boot, limits.PROTOCOL_VERSION, self._world, self._fingerprint)

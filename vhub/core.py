@@ -80,9 +80,8 @@ class HubCore:
         self.releases: Releases | None = None
         self.ended: End | None = None
         self.finished = False
-        self.lost = ""
+        self.lost = self.capture = self.radio_address = ""
         self.busy = 0.0
-        self.capture = ""
         self._layout: Layout | None = None
         self._epoch = 0
         self._commits: dict[int, tuple[bytes, Commit, Frame]] = {}
@@ -158,7 +157,7 @@ class HubCore:
         """When `wake` has something to do next."""
         deadline = self.member.deadline_ns
         if self._epoch > 0 and not self.finished:
-            deadline = min(deadline, self._want_ns)
+            deadline = min(deadline, self._want_ns if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
         if self._world is not None:
@@ -465,7 +464,7 @@ class HubCore:
         return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, self._report())
 
     def _report(self) -> bytes:
-        return report(self.state, self.capture)
+        return report(self.state, self.capture, self.radio_address)
 
     # --- the end -----------------------------------------------------------------------------------------------------
 

@@ -35,8 +35,8 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
     )
 
 
-def report(state: HubState | None, capture: str) -> bytes:
-    """Return the account so far. `links` are [from, to, offered, delivered, dropped, mean delay in ns]."""
+def report(state: HubState | None, capture: str, radio_address: str) -> bytes:
+    """Return the account so far, and where the radio plane and the capture are. `links` are [from, to, offered, delivered, dropped, mean delay in ns]."""
     if state is None:
         return encode_json({})
     packets = state.packets
@@ -56,5 +56,6 @@ def report(state: HubState | None, capture: str) -> bytes:
             ],
             "clients": sorted(state.members),
             "capture": capture,
+            "radio_address": radio_address,
         }
     )
