@@ -126,7 +126,7 @@ class HubCore:
         except Malformed as error:
             self._malformed += 1
             if channel.plane is channels.Plane.RADIO and self.state is not None:
-                self.state.refuse("malformed")
+                self.state.refuse_at_door("malformed")
             if self._malformed <= 3:
                 self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
 
@@ -193,8 +193,8 @@ class HubCore:
         return "samples" if tick in self._commits else "commit"
 
     @property
-    def _is_paced(self) -> bool:
-        return self.releases is not None and self.releases.factor > 0.0
+    def is_between_ticks(self) -> bool:
+        return self._world is None
 
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
@@ -207,9 +207,7 @@ class HubCore:
         if committed is None:
             return False
         _, commit, frame = committed
-        if commit.last:
-            return False
-        packets = self._packets_of(tick, commit, frame)
+        packets = None if commit.last else self._packets_of(tick, commit, frame)
         if packets is None:
             return False
         leaves, self._leaves = self._leaves, []
@@ -233,7 +231,7 @@ class HubCore:
         return None if samples is None else world_packets((s for _, s in samples), commit.digest, frame.layout)
 
     def _go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
-        assert self.state is not None and self.deployment is not None
+        assert self.state is not None and self.deployment is not None and self.releases is not None
         member = self.state.members[name]
         member.downlink += 1
         session = self.sessions.by_name.get(name)
@@ -241,7 +239,7 @@ class HubCore:
             return
         self.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
         deadlines = self.deployment.deadlines
-        allowed_ns = deadlines.lockstep_realtime_ns if self._is_paced else deadlines.lockstep_fast_ns
+        allowed_ns = deadlines.lockstep_realtime_ns if self.releases.factor else deadlines.lockstep_fast_ns
         session.deadline_ns = now_ns + allowed_ns
         session.again_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
         session.again_ns = now_ns + session.again_after_ns
@@ -290,6 +288,7 @@ class HubCore:
             sorted(admitted.items()),
             world.closing.joins,
             world.closing.leaves,
+            self.state.refused_at_door,
             deliveries,
         )
         self.actions.append(Journal(encode(record)))
@@ -404,8 +403,7 @@ class HubCore:
         if session is None or self.state is None:
             return
         if len(session.inbox) + len(up.packets) > limits.INBOX_MESSAGES_MAX:
-            for _ in up.packets:
-                self.state.refuse("inbox_full")
+            self.state.refuse_at_door("inbox_full", len(up.packets))
             return
         session.inbox += up.packets
 
@@ -486,9 +484,8 @@ class HubCore:
             flights = self.state.in_flight()
             for flight in flights:
                 flight.cause = IN_FLIGHT
-            final = Closing(frame, commit.digest, commit.edits, self.state.deliveries.get(frame.tick - 1, []))
-            final.fates = flights
-            final.wall_ns = now_ns
+            delivered = self.state.deliveries.get(frame.tick - 1, [])
+            final = Closing(frame, commit.digest, commit.edits, delivered, fates=flights, wall_ns=now_ns)
             self.actions.append(Keep(final))
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
