@@ -32,7 +32,6 @@ from foosim.protocol.messages import (
     Farewell,
     Heartbeat,
     Join,
-    RobotPacket,
     Samples,
     Sent,
     Tempo,
@@ -207,8 +206,8 @@ class HubCore:
         if committed is None:
             return False
         _, commit, frame = committed
-        packets = None if commit.last else self._packets_of(tick, commit, frame)
-        if packets is None:
+        packets = world_packets((s for _, s in self._samples.get(tick, ())), commit.digest, frame.layout)
+        if packets is None or commit.last:
             return False
         leaves, self._leaves = self._leaves, []
         joins = self.sessions.take_joins(tick)
@@ -225,10 +224,6 @@ class HubCore:
             self._go(name, tick, released.pop(name, []), now_ns)
         self._world = _World(frame, closing, [name for name in due if name in self.sessions.by_name], released)
         return True
-
-    def _packets_of(self, tick: int, commit: Commit, frame: Frame) -> list[RobotPacket] | None:
-        samples = self._samples.get(tick)
-        return None if samples is None else world_packets((s for _, s in samples), commit.digest, frame.layout)
 
     def _go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
         assert self.state is not None and self.deployment is not None and self.releases is not None
@@ -280,6 +275,7 @@ class HubCore:
         return True
 
     def _write(self, tick: int, world: _World, admitted: dict[str, list[Sent]], deliveries: bytes) -> None:
+        assert self.state is not None
         samples = [raw for raw, message in self._samples[tick] if message.digest == world.closing.digest]
         record = TickRecord(
             tick,

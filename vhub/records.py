@@ -13,6 +13,7 @@ import msgspec
 
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Commit, Delivered, Deliveries, Edit, RobotPacket, Samples, Sent
@@ -29,7 +30,10 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
 
 
 class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbid_unknown_fields=True):
-    """One closed tick: the commit and samples as they came, what was admitted, who joined and left, and the result."""
+    """One closed tick: the commit and samples as they came, what was admitted, who joined and left, and the result.
+
+    `refused` counts by cause what was refused at the door since the tick before.
+    """
 
     tick: int
     commit: bytes
@@ -37,6 +41,7 @@ class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbi
     admitted: list[tuple[str, list[Sent]]]
     joins: list[Joining]
     leaves: list[str]
+    refused: list[tuple[str, int]]
     deliveries: bytes
 
 
@@ -75,10 +80,14 @@ def world_packets(samples: Iterable[Samples], digest: bytes, layout: Layout) -> 
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:
-    """Yield the state and the closing after every tick record; the first record is a head."""
+    """Yield the state and the closing after every tick record; the first record is a head.
+
+    Raises Malformed when the records are not those of one run of this version.
+    """
     iterator = iter(records)
-    head = decode_any(HubRecord, next(iterator))
-    assert isinstance(head, HeadRecord), "a journal starts with its head"
+    head = decode_any(HubRecord, next(iterator, b""))
+    if not isinstance(head, HeadRecord):
+        raise Malformed("a journal of the vHub that does not start with its head")
     state = HubState.restore(deployment, head.state)
     layout = build_layout(deployment, head.added)
     for raw in iterator:
@@ -89,7 +98,8 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[Hub
         layout = layout_after(layout, commit.edits)
         frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
         packets = world_packets([decode(Samples, samples) for samples in record.samples], commit.digest, layout)
-        assert packets is not None, "a record holds samples of every robot"
+        if packets is None or frame.tick != state.closed + 1 or record.tick != frame.tick:
+            raise Malformed(f"record {record.tick} of the vHub's journal does not follow on tick {state.closed}")
         closing = Closing(
             frame, commit.digest, commit.edits, state.deliveries.get(frame.tick - 1, []), record.joins, record.leaves
         )
@@ -99,12 +109,14 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[Hub
             state.join(joining, record.tick)
         released = state.close_world(frame, packets, closing.fates)
         count_downlinks(state, frame.tick, released)
+        state.at_door = dict(record.refused)
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
-        assert encode(Deliveries(record.tick + 1, deliveries)) == record.deliveries, "a fold gives the same deliveries"
+        if encode(Deliveries(record.tick + 1, deliveries)) != record.deliveries:
+            raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
         yield state, closing
 
 
 def count_downlinks(state: HubState, tick: int, released: dict[str, list[Flight]]) -> None:
     """Number the messages to clients of one tick: a Go for each that is due, a Down for what is released else."""
-    for name in {*state.due_members(tick), *released}:
+    for name in sorted({*state.due_members(tick), *released}):
         state.members[name].downlink += 1

@@ -82,6 +82,10 @@ class HubState:
         self.links: dict[tuple[str, str], Link] = {}
         self.deliveries: dict[int, list[Delivered]] = {-1: [], 0: []}
         """What reaches robots at the last closed tick and at the next one."""
+        self.at_door: dict[str, int] = {}
+        """Refusals since the last closing by cause, of what never got as far as the state: counted by the next one."""
+        self.refused_at_door: list[tuple[str, int]] = []
+        """Those that the last closing counted: an input of it, which the journal keeps."""
         self._flights: dict[int, list[Flight]] = {}
         """What is in flight, by the tick at which it arrives."""
         self._endpoints = frozenset(deployment.endpoints())
@@ -139,6 +143,9 @@ class HubState:
         """Phase two: judge what clients sent, in (source, sequence) order. Return the deliveries of the next tick."""
         tick = frame.tick
         sent_ns = tick * self.tick_ns
+        self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
+        for cause, count in self.refused_at_door:
+            self.refuse(cause, count)
         for source in sorted(admitted):
             for sent in sorted(admitted[source], key=lambda packet: packet.sequence):
                 if self._admit(source, sent):
@@ -163,11 +170,15 @@ class HubState:
             return self.refuse("no_route")
         return True
 
-    def refuse(self, cause: str) -> bool:
-        """Count a packet that is refused at the door; it is in no link's account."""
-        self.packets.refused += 1
-        self.refusals[cause] = self.refusals.get(cause, 0) + 1
+    def refuse(self, cause: str, count: int = 1) -> bool:
+        """Count packets that are refused; they are in no link's account."""
+        self.packets.refused += count
+        self.refusals[cause] = self.refusals.get(cause, 0) + count
         return False
+
+    def refuse_at_door(self, cause: str, count: int = 1) -> None:
+        """Note packets that are refused between closings; the next closing counts them."""
+        self.at_door[cause] = self.at_door.get(cause, 0) + count
 
     def _subscribers(self, robot: str, channel: str) -> tuple[str, ...]:
         """Return the clients that hear a robot's channel, in name order."""
@@ -257,9 +268,7 @@ class HubState:
 
     def in_flight(self) -> list[Flight]:
         """Return what is on its way, in order of arrival."""
-        return [
-            flight for tick in sorted(self._flights) for flight in sorted(self._flights[tick], key=_order)
-        ]
+        return [flight for tick in sorted(self._flights) for flight in sorted(self._flights[tick], key=_order)]
 
     # --- the state as bytes ------------------------------------------------------------------------------------------
 
@@ -296,9 +305,7 @@ class HubState:
         for source, destination, *values in content["links"]:
             link = Link(source, destination, deployment.network, deployment.seed, LinkState(*values))
             state.links[source, destination] = link
-        state.deliveries = {
-            tick: msgspec.convert(packets, list[Delivered]) for tick, packets in content["deliveries"]
-        }
+        state.deliveries = {tick: msgspec.convert(packets, list[Delivered]) for tick, packets in content["deliveries"]}
         for packed in content["flights"]:
             flight = _unpack(packed)
             state._flights.setdefault(flight.arrival_tick, []).append(flight)
@@ -307,9 +314,7 @@ class HubState:
 
 def received(flights: Iterable[Flight]) -> list[Received]:
     """Return flights as a client gets them."""
-    return [
-        Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, f.payload) for f in flights
-    ]
+    return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, f.payload) for f in flights]
 
 
 def _order(flight: Flight) -> tuple[int, str, int, int, str]:
