@@ -1,8 +1,8 @@
 """The Bullet engine: rules under which each tick starts from the frame completely, whatever this engine did before.
 
 Bullet keeps more than positions and velocities: contact points of pairs, search axes, orders of pairs and islands. The
-rules below each undo one of these memories; tests/laws/test_engine_partition.py breaks each rule in turn and sees the
-laws fail. Small methods (`_settings`, `_build_order`, `_make_ball`, `_make_scenery`, `_wipe`) exist so that it can.
+rules below each undo one of these memories; tests/laws/test_engine_partition.py breaks each in turn and sees law 1
+fail, for which the small methods (`_settings`, `_build_order`, `_make_ball`, `_make_scenery`, `_end_pairs`) are there.
 This is the only file that imports pybullet. Neighbours: `interface` (what an engine does), `protocol.scene` (what is
 built).
 """
@@ -10,7 +10,7 @@ built).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
+from math import fsum, sqrt
 from typing import Any, Final
 
 import pybullet as p
@@ -95,14 +95,8 @@ class BulletEngine:
         """Return the order in which bodies are made: by name, since it sorts pairs and islands."""
         return sorted(names)
 
-    def _make_scenery(self, shape: Shape) -> int:
+    def _make_scenery(self, shape: Shape, rigid: bool = True) -> int:
         """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""
-        body = self._make_static(shape, rigid=True)
-        p.setCollisionFilterGroupMask(body, -1, SCENERY_GROUP, BALL_GROUP, physicsClientId=self._client)
-        self._make_surface(body, -1, shape.surface)
-        return body
-
-    def _make_static(self, shape: Shape, rigid: bool) -> int:
         body: int = p.createMultiBody(
             baseMass=0.0,
             baseCollisionShapeIndex=self._make_shape((shape,), placed=False),
@@ -111,6 +105,8 @@ class BulletEngine:
             useMaximalCoordinates=rigid,
             physicsClientId=self._client,
         )
+        p.setCollisionFilterGroupMask(body, -1, SCENERY_GROUP, BALL_GROUP, physicsClientId=self._client)
+        self._make_surface(body, -1, shape.surface)
         return body
 
     def _make_ball(self, body: Body, rigid: bool = False) -> int:
@@ -266,10 +262,16 @@ class BulletEngine:
     def _wipe(self) -> None:
         """Forget all contacts: of every pair that can touch one is a ball, and balls far away end their pairs."""
         for name in self._balls:
-            p.resetBasePositionAndOrientation(
-                self._ids[name], self._parking[name], UPRIGHT, physicsClientId=self._client
-            )
+            p.resetBasePositionAndOrientation(self._ids[name], self._parking[name], UPRIGHT, self._client)
+        self._end_pairs()
+
+    def _end_pairs(self) -> None:
+        """Let Bullet notice which pairs are no more."""
         p.performCollisionDetection(physicsClientId=self._client)
+
+    def _wake_fetched(self) -> None:
+        """Step once: Bullet notices at the end of a step that a body woke, and lets it stand still until then."""
+        p.stepSimulation(physicsClientId=self._client)
 
     def _change_rods(self, wanted: set[str]) -> None:
         """Park and fetch rods until `wanted` are on the table. All balls are parked."""
@@ -279,8 +281,7 @@ class BulletEngine:
         for name in fetched:
             self._fetch_rod(name)
         if fetched:
-            # Bullet notices at the end of a step that a body woke; in its first step it would stand still.
-            p.stepSimulation(physicsClientId=self._client)
+            self._wake_fetched()
         self._loaded_rods = wanted
 
     # --- the tick ----------------------------------------------------------------------------------------------------
@@ -345,14 +346,14 @@ class BulletEngine:
         client = self._client
         for substep in range(substeps):
             p.stepSimulation(client)
-            touched: dict[str, float] = {}
+            touched: dict[str, list[float]] = {}
             for name in self._loaded_balls:
                 self._collect(name, touched)
             if touched:
                 self._log(substep, touched)
             self._touching = set(touched)
 
-    def _collect(self, ball: str, touched: dict[str, float]) -> None:
+    def _collect(self, ball: str, touched: dict[str, list[float]]) -> None:
         """Add the normal impulses of a ball's contacts to the ball and to the rods that it touches."""
         body = self._ids[ball]
         for point in p.getContactPoints(body, physicsClientId=self._client):
@@ -361,16 +362,19 @@ class BulletEngine:
             if other in self._silent or force <= 0.0:
                 continue
             impulse = force * self._dt
-            touched[ball] = touched.get(ball, 0.0) + impulse
+            touched.setdefault(ball, []).append(impulse)
             rod = self._rod_of_id.get(other)
             if rod is not None:
-                touched[rod] = touched.get(rod, 0.0) + impulse
+                touched.setdefault(rod, []).append(impulse)
 
-    def _log(self, substep: int, touched: dict[str, float]) -> None:
-        """Count touches that begin, sum impulses, note the last substep."""
-        for name, impulse in touched.items():
+    def _log(self, substep: int, touched: dict[str, list[float]]) -> None:
+        """Count touches that begin, sum impulses, note the last substep.
+
+        Bullet lists contacts in an order that depends on its past; `fsum` gives the same bits in any order.
+        """
+        for name, impulses in touched.items():
             count, total, _ = self._logs.get(name, NO_CONTACT)
-            self._logs[name] = (count + (name not in self._touching), total + impulse, float(substep))
+            self._logs[name] = (count + (name not in self._touching), total + fsum(impulses), float(substep))
 
     def read(self, entities: Sequence[Entity], state: list[float]) -> None:
         """Write position, velocity and the tick's contact log of these bodies into `state`."""

@@ -1,0 +1,122 @@
+"""What both engines promise to a node, beyond physics: the contact log, motors, and independence of what is parked."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from foosim.node.engines import ENGINES, make_engine
+from foosim.node.engines.interface import Engine
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.start import initial_numbers, place_ball
+
+TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
+TABLE = load_deployment(TEXT, "table.yaml")
+LAYOUT = build_layout(TABLE)
+BALL, ROD = LAYOUT["ball"], LAYOUT["red.goal"]
+OFF = ((0.0, 0.0), (0.0, 0.0))
+
+
+@pytest.fixture(params=sorted(ENGINES))
+def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
+    settings = apply_sets(TEXT, "table.yaml", [f"engine={request.param}", "table.contact_erp=0"])
+    made = make_engine(load_deployment(settings, "table.yaml"), LAYOUT)
+    yield made
+    made.close()
+
+
+def tick(engine: Engine, layout: Layout, numbers: list[float], *rods: str) -> None:
+    bodies = [layout["ball"], *(layout[name] for name in rods)]
+    engine.load(bodies, numbers)
+    engine.command(bodies[1:], [OFF for _ in rods])
+    engine.step(TABLE.substeps)
+    engine.read(bodies, numbers)
+
+
+def contacts(numbers: list[float], name: str = "ball") -> list[float]:
+    start = LAYOUT[name].offsets["contacts"]
+    return numbers[start : start + 3]
+
+
+def test_engines_are_those_of_the_deployment() -> None:
+    assert sorted(ENGINES) == ["bullet", "pure"]
+
+
+def test_a_bounce_is_logged_once_with_its_impulse(engine: Engine) -> None:
+    numbers = initial_numbers(TABLE, LAYOUT)
+    place_ball(numbers, BALL, (0.0, 0.3, 0.1), (0.0, 3.0, 0.0))
+    logs = []
+    for _ in range(20):
+        tick(engine, LAYOUT, numbers)
+        logs.append(contacts(numbers))
+    touched = [log for log in logs if log != [0.0, 0.0, -1.0]]
+    assert len(touched) == 1
+    count, impulse, last = touched[0]
+    assert count == 1.0 and 0 <= last < TABLE.substeps
+    bounce = 1 + TABLE.table.surfaces.walls.restitution
+    assert impulse == pytest.approx(bounce * 3.0 * TABLE.table.ball.mass, rel=1e-6)
+
+
+def test_a_touch_that_lasts_is_no_new_touch(engine: Engine) -> None:
+    """Whether it lasts is told by the log of the tick before, which is in the frame."""
+    logs = []
+    for last in (-1.0, 2.0, 3.0):
+        numbers = initial_numbers(TABLE, LAYOUT)
+        place_ball(numbers, BALL, (0.0, 0.3225, 0.1), (0.0, 0.04, 0.0))
+        numbers[BALL.offsets["contacts"] + 2] = last
+        tick(engine, LAYOUT, numbers)
+        logs.append(contacts(numbers)[0])
+    assert logs == [1.0, 1.0, 0.0]
+
+
+def test_rolling_on_the_floor_is_no_contact_and_a_kick_is_one_of_both(engine: Engine) -> None:
+    numbers = initial_numbers(TABLE, LAYOUT)
+    radius = TABLE.table.ball.radius
+    place_ball(numbers, BALL, (-0.522 - 0.0075 - radius - 0.003, 0.0, radius), (1.0, 0.0, 0.0))
+    sums = {"ball": [0.0, 0.0], "red.goal": [0.0, 0.0]}
+    for _ in range(8):
+        tick(engine, LAYOUT, numbers, "red.goal")
+        for name, total in sums.items():
+            total[0] += contacts(numbers, name)[0]
+            total[1] += contacts(numbers, name)[1]
+    assert sums["ball"][0] == 1.0 and sums["ball"][1] > 0.0
+    assert sums["ball"] == sums["red.goal"]
+    tick(engine, LAYOUT, numbers)
+    assert contacts(numbers) == [0.0, 0.0, -1.0]
+
+
+def test_a_rod_without_a_command_swings_freely(engine: Engine) -> None:
+    """It does not follow the command of an earlier tick."""
+    numbers = initial_numbers(TABLE, LAYOUT)
+    engine.load([ROD], numbers)
+    engine.command([ROD], [((3.0, 90.0), (100.0, 2.0))])
+    engine.step(TABLE.substeps)
+    engine.load([ROD], numbers)
+    engine.step(TABLE.substeps)
+    engine.read([ROD], numbers)
+    start = ROD.offsets["joint_velocities"]
+    assert numbers[start : start + 2] == [0.0, 0.0]
+
+
+def test_what_is_parked_is_not_in_the_way(engine: Engine) -> None:
+    numbers = initial_numbers(TABLE, LAYOUT)
+    radius = TABLE.table.ball.radius
+    place_ball(numbers, BALL, (-0.6 + radius, 0.0, radius), (3.0, 0.0, 0.0))
+    tick(engine, LAYOUT, numbers, "red.goal")  # on the table now, parked from the next tick on
+    for _ in range(60):
+        tick(engine, LAYOUT, numbers)
+    assert numbers[BALL.offsets["position"]] > -0.3
+
+
+def test_what_is_not_asked_for_is_left_as_it_is(engine: Engine) -> None:
+    numbers = initial_numbers(TABLE, LAYOUT)
+    place_ball(numbers, BALL, (0.1, 0.2, 0.05), (1.0, 1.0, 0.0))
+    for index in range(LAYOUT.size):
+        if not BALL.start <= index < BALL.stop:
+            numbers[index] = float(index)
+    numbers[BALL.offsets["wait_ticks"]] = 77.0
+    before = numbers.copy()
+    tick(engine, LAYOUT, numbers)
+    changed = {index for index in range(LAYOUT.size) if numbers[index] != before[index]}
+    assert changed and all(BALL.start <= index < BALL.offsets["quarantined"] for index in changed)
