@@ -1,0 +1,122 @@
+"""The process `foosim-node`: a node's core between the simulation plane and its physics engine.
+
+One address is all that it needs: deployment and models come with the handshake. Neighbours: `core` decides, `solver`
+has the engines, `protocol.loop` is the loop.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated
+
+import typer
+
+from foosim.node.core import NodeCore
+from foosim.node.solver import Solver
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Say
+from foosim.protocol.channels import SUPERVISOR, Plane
+from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.errors import BadValue
+from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.loop import Loop, Wire
+from foosim.protocol.names import is_name
+from foosim.protocol.process import die_with_parent, new_boot, on_signals, start_log
+from foosim.protocol.session import Session, use_client_runtime
+
+CONNECT_S = 60.0
+
+
+class NodeProcess:
+    """One node on one session, until the run ends, the supervisor is gone, or `stop`."""
+
+    def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
+        self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
+        self.stopped = False
+        self._solver = Solver(self.core)
+        self._wire = Wire(session, Plane.SIMULATION, inbox, name)
+        self._inbox = inbox
+        self._is_present = False
+        self._loop = Loop(self.core, inbox, start_log(name), lambda now_ns: self.core.deadline_ns())
+        self._loop.connect(self._wire)
+        self._loop.turn = self._turn
+        self._loop.on_alive = self._on_alive
+        self._wire.read(channels.NODE_READS, channels.TICK_KEYS)
+        self._wire.watch_alive(SUPERVISOR)
+
+    def run(self) -> int:
+        """Take part until the end; return the exit code."""
+        self._loop.run(self._is_over)
+        self._loop.perform()
+        self._solver.close()
+        if self.core.member.refusal:
+            return REFUSED
+        return DONE if self.core.ended is not None else FAILED
+
+    def stop(self) -> None:
+        """Have `run` return soon; a signal handler may call this."""
+        self.stopped = True
+        self._inbox.wake()
+
+    def _is_over(self) -> bool:
+        return self.stopped or self.core.ended is not None or bool(self.core.member.refusal)
+
+    def _turn(self, now_ns: int) -> None:
+        """Compute ticks as far as the inputs allow; what a tick says first is said before it is solved."""
+        core = self.core
+        core.busy = self._loop.busy
+        if core.member.build is not None and not self._is_present:
+            self._is_present = True
+            self._wire.declare_alive()
+        core.advance(now_ns)
+        while core.work is not None:
+            self._loop.perform()
+            self._solver.solve(core.work)
+            core.advance(now_ns)
+        self._solver.build_wanted()
+
+    def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        if not is_alive and name == SUPERVISOR and self.core.ended is None:
+            self.core.actions.append(Say("error", "lost the supervisor"))
+            self.stop()
+
+
+def run_node(name: str, connect: str, world: str = "") -> int:
+    """Run a node until its run ends; return the exit code. Raises Refused when there is nobody to connect to."""
+    if not is_name(name):
+        raise BadValue("not a name for a node", name)
+    use_client_runtime()
+    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+    with Session.client(connect, CONNECT_S) as session:
+        node = NodeProcess(name, session, inbox, world)
+        on_signals(node.stop)
+        return node.run()
+
+
+app = new_app("A simulation node: computes its share of the world that a supervisor runs.")
+
+
+@app.command()
+def node(
+    name: Annotated[str, typer.Option(help="Its name, as the deployment declares it.")],
+    connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
+    world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    version: VersionOption = False,
+) -> None:
+    """Take part in a run as a node.
+
+    One address is enough: deployment and models come from the supervisor. The process ends with the run; it exits with
+    0 when the run ended, with 1 when it lost the supervisor, and with 3 when the supervisor would not have it.
+    """
+    die_with_parent()
+    raise typer.Exit(run_node(name, connect, world))
+
+
+def main() -> None:
+    """Entry of `foosim-node`."""
+    run_app(app)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+"""What the commands have in common: exit codes, `--version`, and how a refusal is shown.
+
+Exit codes: 0 done, 1 differs or failed, 2 bad input, 3 refused, 130 for a second Ctrl-C. Neighbours: `errors` (each
+error knows its code), every command.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version
+from typing import Annotated, Final
+
+import typer
+
+from foosim.protocol.errors import Refused
+
+DONE: Final = 0
+FAILED: Final = 1
+BAD_INPUT: Final = 2
+REFUSED: Final = 3
+INTERRUPTED: Final = 130
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"foosim {version('foosim')}")
+        raise typer.Exit(DONE)
+
+
+VersionOption = Annotated[
+    bool,
+    typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
+]
+
+
+def new_app(help_text: str) -> typer.Typer:
+    """Return a command with foosim's habits: help on no arguments, no shell completion to install, plain tracebacks."""
+    return typer.Typer(
+        help=help_text,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        no_args_is_help=True,
+    )
+
+
+def run_app(app: typer.Typer) -> None:
+    """Run a command and exit with its code; what is refused is shown without a traceback."""
+    try:
+        app()
+    except Refused as refused:
+        print(str(refused), file=sys.stderr)
+        sys.exit(refused.exit_code)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)

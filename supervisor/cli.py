@@ -1,0 +1,243 @@
+"""The command `foosim-supervisor`: runs a deployment, and controls a run from another terminal.
+
+Each subcommand is a thin shell over a typed function: `up.Up`, `main.serve`, `control`, `protocol.deployment_file`.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foosim.protocol.addresses import LOOPBACK
+from foosim.protocol.codec import encode_json
+from foosim.protocol.command import DONE, FAILED, INTERRUPTED, VersionOption, new_app, run_app
+from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.protocol.errors import BadValue
+from foosim.protocol.messages import Answer
+from foosim.supervisor import control
+from foosim.supervisor.display import Display, render_text
+from foosim.supervisor.main import serve
+from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.run_folder import create_run, open_run, run_exists
+from foosim.supervisor.up import Killed, Up, check_capture, default_capture
+
+app = new_app("Run a distributed simulation, and control one that runs.")
+
+File = Annotated[Path, typer.Argument(help="The deployment file.", show_default=False)]
+Run = Annotated[str | None, typer.Option("--run", help="The run that is meant; by default the newest live one.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+PaceOption = Annotated[str | None, typer.Option("--pace", help="realtime, fast, or a factor such as 2x.")]
+For = Annotated[str | None, typer.Option("--for", help="End after this much simulated time, e.g. 20s.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of all random draws; short for --set seed=N.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Change the deployment, e.g. --set table.ball.mass='27 g'; may be repeated."),
+]
+Engine = Annotated[str | None, typer.Option("--engine", help="bullet or pure; short for --set engine=NAME.")]
+Listen = Annotated[str, typer.Option("--listen", help="HOST[:PORT]; the radio plane listens at PORT + 1.")]
+Insecure = Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")]
+RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
+
+
+@app.callback()
+def foosim_supervisor(version: VersionOption = False) -> None:
+    """Run a distributed simulation, and control one that runs.
+
+    `up` starts everything that a deployment file declares on this machine and shows it. The other commands control a
+    run from another terminal; each names the tick at which it takes effect.
+
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 second Ctrl-C.
+    """
+
+
+@app.command()
+def up(  # noqa: PLR0913, PLR0917  # a command's options
+    file: File,
+    pace: PaceOption = None,
+    duration: For = None,
+    seed: Seed = None,
+    capture: Annotated[Path | None, typer.Option(help="By default captures/WORLD-TIME.mcap.")] = None,
+    no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
+    sets: Sets = None,
+    engine: Engine = None,
+    listen: Listen = LOOPBACK,
+    insecure: Insecure = False,
+    run: RunName = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
+) -> None:
+    """Run a deployment: supervisor, vHub, nodes and players as processes of this machine, until Ctrl-C or --for.
+
+    Ctrl-C ends the run in order and leaves a finished capture; a second one kills everything. Nodes that the deployment
+    declares as `launch: manual` are waited for; their command line is printed.
+    """
+    if no_capture and capture is not None:
+        raise BadValue("--capture and --no-capture exclude each other", str(capture))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
+    path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
+    display = Display(sys.stderr if json else sys.stdout)
+    try:
+        outcome = Up(plan, path, display, run).run()
+    except Killed:
+        print("killed", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+    if outcome.reason:
+        display.say(outcome.reason)
+    if outcome.capture:
+        display.say(f"capture {outcome.capture}")
+    if json and outcome.result is not None:
+        print(encode_json(outcome.result).decode())
+    raise typer.Exit(FAILED if outcome.failed else DONE)
+
+
+@app.command("run")
+def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
+    file: File,
+    pace: PaceOption = None,
+    duration: For = None,
+    seed: Seed = None,
+    sets: Sets = None,
+    engine: Engine = None,
+    listen: Listen = LOOPBACK,
+    insecure: Insecure = False,
+    run: RunName = None,
+) -> None:
+    """Run the supervisor alone; vHub, nodes and players are started by hand or by other means.
+
+    `up` starts this command as a child. The run's folder has the run file, logs and journals.
+    """
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
+    folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
+    raise typer.Exit(serve(plan, folder))
+
+
+def _options(
+    file: Path,
+    pace: str | None,
+    duration: str | None,
+    seed: int | None,
+    sets: list[str] | None,
+    engine: str | None,
+    listen: str,
+    insecure: bool,
+) -> RunOptions:
+    settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]
+    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure)
+
+
+@app.command()
+def status(run: Run = None, json: Json = False) -> None:
+    """Show the state of a run: time, lag, nodes, links, score."""
+    content = control.status(run)
+    print(encode_json(content).decode() if json else render_text(content).rstrip())
+
+
+@app.command()
+def pause(run: Run = None, json: Json = False) -> None:
+    """Stop simulated time; what is released is still computed."""
+    _show(control.pause(run), json)
+
+
+@app.command()
+def resume(run: Run = None, json: Json = False) -> None:
+    """Go on after a pause."""
+    _show(control.resume(run), json)
+
+
+@app.command()
+def step(
+    count: Annotated[int, typer.Argument(help="How many ticks.", min=1)] = 1, run: Run = None, json: Json = False
+) -> None:
+    """Let a number of ticks pass, then pause."""
+    _show(control.step(count, run), json)
+
+
+@app.command()
+def rate(
+    pace: Annotated[str, typer.Argument(help="realtime, fast, or a factor such as 2x.", show_default=False)],
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Change how fast simulated time passes."""
+    _show(control.rate(pace, run), json)
+
+
+Numbers = tuple[float, float, float]
+
+
+@app.command()
+def add(
+    name: Annotated[str | None, typer.Argument(help="Its name; by default the next free one.")] = None,
+    position: Annotated[Numbers | None, typer.Option(help="Where, in m: X Y Z.")] = None,
+    velocity: Annotated[Numbers | None, typer.Option(help="How fast, in m/s: X Y Z.")] = None,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Add a ball; by default it rests at the kick-off spot."""
+    _show(control.add(name, position, velocity, run), json)
+
+
+@app.command()
+def remove(
+    name: Annotated[str, typer.Argument(help="Which ball.", show_default=False)], run: Run = None, json: Json = False
+) -> None:
+    """Remove a ball that was added."""
+    _show(control.remove(name, run), json)
+
+
+@app.command()
+def move(
+    robot: Annotated[str, typer.Argument(help="Which robot.", show_default=False)],
+    node: Annotated[str, typer.Argument(help="To which node.", show_default=False)],
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Have another node own a robot; the simulated world does not notice."""
+    _show(control.move(robot, node, run), json)
+
+
+@app.command()
+def push(
+    impulse: Annotated[Numbers, typer.Argument(help="Impulse in N s: X Y Z.", show_default=False)],
+    name: Annotated[str, typer.Option(help="Which ball.")] = "ball",
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Give a ball an impulse; 0.021 N s makes the table's ball 1 m/s faster."""
+    _show(control.push(impulse, name, run), json)
+
+
+@app.command()
+def down(run: Run = None, json: Json = False) -> None:
+    """End a run in order."""
+    _show(control.down(run), json)
+
+
+def _show(answer: Answer, json: bool) -> None:
+    """Print what the supervisor answered."""
+    print(encode_json({"tick": answer.tick, "text": answer.text}).decode() if json else answer.text)
+
+
+@app.command()
+def validate(file: File, json: Json = False) -> None:
+    """Check a deployment file: all problems at once, one a line, as file:line:column: what, value, nearest name."""
+    deployment = load_deployment(read_deployment_text(file), str(file))
+    content = {
+        "world": deployment.world,
+        "robots": len(deployment.robots),
+        "nodes": sorted(deployment.nodes),
+        "players": sorted(deployment.players),
+    }
+    described = f"{len(deployment.robots)} robots on {len(deployment.nodes)} nodes, {len(deployment.players)} players"
+    print(encode_json(content).decode() if json else f"{file}: valid, world {deployment.world}, {described}")
+
+
+def main() -> None:
+    """Entry of `foosim-supervisor`."""
+    run_app(app)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,163 @@
+"""Talking to a running system from another process: requests by id, said again until they are answered.
+
+Each function finds the newest live run (or the one named), asks its supervisor, and returns the answer, which names the
+tick at which the request takes effect; what is refused raises `RequestRefused`. Neighbours: `requests` is the other
+side, `run_folder` says where it is, `cli` shows the answers.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from types import TracebackType
+from typing import Any, Final, Self
+
+from foosim.protocol import channels
+from foosim.protocol.channels import Plane
+from foosim.protocol.codec import decode, decode_json, encode, encode_json
+from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.loop import Wire
+from foosim.protocol.messages import Answer, Request, Vector
+from foosim.protocol.session import Session
+from foosim.supervisor.run_folder import find_run
+
+ANSWER_S: Final = 30.0
+"""How long an answer is waited for: adding waits until every node has built an engine."""
+AGAIN_S: Final = 0.3
+CONNECT_S: Final = 5.0
+WAITING_MAX: Final = 256
+
+
+class RequestRefused(Refused):
+    """The supervisor would not do it; the text says why."""
+
+
+class NoAnswer(Refused):
+    """The supervisor did not answer in time."""
+
+    exit_code = 1
+
+
+class Control:
+    """A connection to one running supervisor. Use it in `with`."""
+
+    def __init__(self, address: str) -> None:
+        """Connect to the simulation plane's address; raises ConnectError when nobody is there."""
+        self._name = f"operator-{os.getpid()}-{os.urandom(4).hex()}"
+        self._inbox = Inbox(WAITING_MAX)
+        self._session = Session.client(address, CONNECT_S)
+        self._wire = Wire(self._session, Plane.SIMULATION, self._inbox, self._name)
+        self._wire.read(channels.OPERATOR_READS)
+        self._requests = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._session.close()
+
+    def ask(self, verb: str, timeout_s: float = ANSWER_S, **arguments: Any) -> Answer:
+        """Ask for something and return the answer. Raises RequestRefused or NoAnswer."""
+        self._requests += 1
+        identity = f"{self._name[9:]}-{self._requests}"
+        payload = encode(Request(self._name, identity, verb, encode_json(arguments)))
+        deadline_s = time.monotonic() + timeout_s
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            self._wire.put(channels.REQUEST, self._name, payload)
+            answer = self._wait(identity, min(left_s, AGAIN_S))
+            if answer is None:
+                continue
+            if not answer.accepted:
+                raise RequestRefused(answer.text)
+            return answer
+        raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s")
+
+    def status(self, timeout_s: float = ANSWER_S) -> dict[str, Any]:
+        """Return the state of the run. Raises NoAnswer."""
+        content = decode_json(self.ask("status", timeout_s).result)
+        assert isinstance(content, dict), content
+        return content
+
+    def _wait(self, identity: str, timeout_s: float) -> Answer | None:
+        """Return the answer to a request when it comes in time."""
+        deadline_s = time.monotonic() + timeout_s
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            for _, _, payload in self._inbox.take(left_s):
+                try:
+                    answer = decode(Answer, payload, channels.ANSWER.bytes_max)
+                except Malformed:
+                    continue
+                if answer.id == identity:
+                    return answer
+        return None
+
+
+def connect(run: str | None = None) -> Control:
+    """Connect to the newest live run, or to the one named. Raises NoRun."""
+    folder = find_run(run)
+    info = folder.info()
+    assert info is not None, "a run that was found has a run file"
+    return Control(info.simulation)
+
+
+def _ask(run: str | None, verb: str, **arguments: Any) -> Answer:
+    with connect(run) as control:
+        return control.ask(verb, **arguments)
+
+
+def status(run: str | None = None) -> dict[str, Any]:
+    """Return the state of a run, as `supervisor.status` makes it."""
+    with connect(run) as control:
+        return control.status()
+
+
+def pause(run: str | None = None) -> Answer:
+    """Release no further order."""
+    return _ask(run, "pause")
+
+
+def resume(run: str | None = None) -> Answer:
+    """Go on after a pause."""
+    return _ask(run, "resume")
+
+
+def step(count: int = 1, run: str | None = None) -> Answer:
+    """Release `count` ticks and pause behind them."""
+    return _ask(run, "step", count=count)
+
+
+def rate(pace: str, run: str | None = None) -> Answer:
+    """Change the pace: realtime, fast, or a factor such as 2x."""
+    return _ask(run, "rate", pace=pace)
+
+
+def add(
+    name: str | None = None, position: Vector | None = None, velocity: Vector | None = None, run: str | None = None
+) -> Answer:
+    """Add a ball at `position` (m, world frame) with `velocity` (m/s); by default at the kick-off spot, at rest."""
+    given = {"name": name, "position": position, "velocity": velocity}
+    return _ask(run, "add", **{key: value for key, value in given.items() if value is not None})
+
+
+def remove(name: str, run: str | None = None) -> Answer:
+    """Remove what was added."""
+    return _ask(run, "remove", name=name)
+
+
+def move(robot: str, node: str, run: str | None = None) -> Answer:
+    """Have another node own a robot; the world does not notice."""
+    return _ask(run, "move", robot=robot, node=node)
+
+
+def push(impulse: Vector, name: str = "ball", run: str | None = None) -> Answer:
+    """Give a ball an impulse (N s, world frame)."""
+    return _ask(run, "push", impulse=impulse, name=name)
+
+
+def down(run: str | None = None) -> Answer:
+    """End the run in order."""
+    return _ask(run, "down")

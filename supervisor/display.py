@@ -1,0 +1,177 @@
+"""What a person sees of a running system: a live table in a terminal, a plain line a second elsewhere.
+
+Both are pure functions of a status (`supervisor.status`); only `Display` knows a terminal. Neighbours: `up` feeds it,
+the command `status` prints the same table once.
+"""
+
+from __future__ import annotations
+
+import sys
+from types import TracebackType
+from typing import Any, Final, TextIO
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+LINKS_SHOWN_MAX: Final = 20
+ENTITIES_SHOWN_MAX: Final = 6
+
+
+def simulated_s(status: dict[str, Any]) -> float:
+    """Return the simulated time of a status, in s."""
+    return float(status["ticks"]) * float(status["tick_ns"]) / 1e9
+
+
+def lag_text(status: dict[str, Any]) -> str:
+    """`lag 0.3 ms (p99 1.2)`, with the name that the last late tick waited for; nothing when time is not kept."""
+    lag = status["lag_ms"]
+    if lag is None:
+        return ""
+    late = status["late"]
+    text = f"lag {late['lag_ms']:.1f} ms (p50 {lag['p50']:.1f}, p99 {lag['p99']:.1f}, max {lag['max']:.1f})"
+    return f"{text}, waited for {late['waited_for']}" if late["waited_for"] else text
+
+
+def pace_text(status: dict[str, Any]) -> str:
+    """`realtime 1.00x`, or what it is doing instead of running."""
+    pace = str(status["pace"])
+    if status["state"] != "running":
+        return f"{pace}, {status['state']}"
+    rate = status["rtf"]
+    return pace if rate is None else f"{pace} {rate:.2f}x"
+
+
+def score_text(status: dict[str, Any]) -> str:
+    """`red 2 : 1 blue`."""
+    return f"red {status['score']['red']} : {status['score']['blue']} blue"
+
+
+def ball_text(status: dict[str, Any]) -> str:
+    """`ball at 0.123 -0.045 0.018 m, solved by red`."""
+    ball = status["ball"]
+    x, y, z = ball["position"]
+    text = f"ball at {x:+.3f} {y:+.3f} {z:+.3f} m"
+    return f"{text}, solved by {ball['solver']}" if ball["solver"] else text
+
+
+def plain_line(status: dict[str, Any]) -> str:
+    """Return one line for a log or a pipe."""
+    packets = status["packets"]
+    if status["state"] == "starting":
+        return f"starting, waiting for {status['waiting_for'] or 'the first tick'}"
+    parts = [
+        f"{simulated_s(status):.2f} s",
+        pace_text(status),
+        lag_text(status),
+        score_text(status),
+        ball_text(status),
+        f"packets {packets['offered']} offered, {packets['delivered']} delivered, {packets['dropped']} dropped",
+        "load " + " ".join(f"{name} {process['busy']:.0%}" for name, process in status["processes"].items()),
+    ]
+    return " | ".join(part for part in parts if part)
+
+
+def render(status: dict[str, Any]) -> RenderableType:
+    """Return the whole table."""
+    return Group(_head(status), _processes(status), _links(status))
+
+
+def _head(status: dict[str, Any]) -> Text:
+    lines = [
+        f"{status['world']} · run {status['run']} · {simulated_s(status):.2f} s · tick {status['ticks']} "
+        f"· {pace_text(status)}",
+        f"{score_text(status)} · {ball_text(status)} · {status['handovers']} hand-overs, {status['moves']} moves",
+    ]
+    lag = lag_text(status)
+    waiting = f"waiting for {status['waiting_for']}" if status["state"] in ("starting", "paused") else ""
+    third = " · ".join(part for part in (lag, waiting if status["waiting_for"] else "") if part)
+    return Text("\n".join([*lines, third] if third else lines))
+
+
+def _processes(status: dict[str, Any]) -> Table:
+    """Nodes with what they own, solve and how busy they are; then the other processes."""
+    table = Table(title="processes", title_justify="left", expand=False, show_edge=False)
+    for column, justify in (("name", "left"), ("owns", "left"), ("solved ticks", "right"), ("load", "right")):
+        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+    table.add_column("waits for", no_wrap=True)
+    processes = status["processes"]
+    nodes = status["nodes"]
+    for name in [*nodes, *(other for other in processes if other not in nodes)]:
+        node, process = nodes.get(name), processes.get(name)
+        table.add_row(
+            name,
+            "" if node is None else _listed(node["owned"]),
+            "" if node is None else str(node["solved_ticks"]),
+            "-" if process is None else f"{process['busy']:.0%}",
+            "not here yet" if process is None else process["waiting_for"],
+        )
+    return table
+
+
+def _listed(names: list[str]) -> str:
+    """Join names, the many shortened."""
+    shown = ", ".join(names[:ENTITIES_SHOWN_MAX])
+    return shown if len(names) <= ENTITIES_SHOWN_MAX else f"{shown} and {len(names) - ENTITIES_SHOWN_MAX} more"
+
+
+def _links(status: dict[str, Any]) -> Table:
+    """A row per directed link, the busiest first when there are too many, and a last one for all."""
+    table = Table(title="links", title_justify="left", expand=False, show_edge=False)
+    table.add_column("from")
+    table.add_column("to")
+    for column in ("offered", "delivered", "dropped", "mean delay"):
+        table.add_column(column, justify="right")
+    links = status["links"]
+    shown = sorted(links, key=lambda link: (-link[2], link[:2]))[:LINKS_SHOWN_MAX]
+    for source, destination, offered, delivered, dropped, delay_ns in sorted(shown):
+        table.add_row(source, destination, str(offered), str(delivered), str(dropped), f"{delay_ns / 1e6:.2f} ms")
+    packets = status["packets"]
+    more = f"and {len(links) - len(shown)} more" if len(links) > len(shown) else ""
+    total = (str(packets["offered"]), str(packets["delivered"]), str(packets["dropped"]))
+    table.add_row("all", more, *total, f"{packets['in_flight']} in flight", style="bold")
+    return table
+
+
+def render_text(status: dict[str, Any], width: int = 120) -> str:
+    """Return the table as text without colours."""
+    console = Console(width=width, color_system=None, force_terminal=False)
+    with console.capture() as captured:
+        console.print(render(status))
+    return captured.get()
+
+
+class Display:
+    """Shows statuses as they come, on a terminal as a live table, else as lines."""
+
+    EVERY_S_LIVE: Final = 0.25
+    EVERY_S_PLAIN: Final = 1.0
+
+    def __init__(self, stream: TextIO = sys.stdout) -> None:
+        self._console = Console(file=stream)
+        self._live: Live | None = None
+        self.is_live = self._console.is_terminal
+        self.every_s = self.EVERY_S_LIVE if self.is_live else self.EVERY_S_PLAIN
+
+    def __enter__(self) -> Display:
+        if self.is_live:
+            self._live = Live(console=self._console, auto_refresh=False, transient=False)
+            self._live.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
+
+    def show(self, status: dict[str, Any]) -> None:
+        """Show the state of the run."""
+        if self._live is not None:
+            self._live.update(render(status), refresh=True)
+        else:
+            self.say(plain_line(status))
+
+    def say(self, line: str) -> None:
+        """Show one line that stays."""
+        self._console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,101 @@
+"""The process `foosim-supervisor run`: the supervisor's core as the router of the simulation plane.
+
+It holds the run's folder: the run file says where the run listens, the journal has what was decided, and at the end
+`result.json` has how it ended. Neighbours: `core` decides, `up` starts it with everything else, `run_folder`.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+
+import msgspec
+
+from foosim.protocol import channels, limits, wall
+from foosim.protocol.actions import Say
+from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
+from foosim.protocol.command import DONE, FAILED
+from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.journal import Journal
+from foosim.protocol.loop import Loop, Wire
+from foosim.protocol.process import die_with_parent, on_signals, start_log
+from foosim.protocol.session import Session
+from foosim.supervisor.core import RunSettings, SupervisorCore
+from foosim.supervisor.plan import Plan
+from foosim.supervisor.run_folder import RunFolder, RunInfo
+from foosim.supervisor.status import result
+
+
+class SupervisorProcess:
+    """The supervisor on its session, until the run has ended."""
+
+    def __init__(self, plan: Plan, folder: RunFolder, session: Session, inbox: Inbox, journal: Journal) -> None:
+        settings = RunSettings(folder.name, str(plan.options.file), plan.text, plan.pace, plan.ticks)
+        self.core = SupervisorCore(settings, library_fingerprint(), time.monotonic_ns())
+        self._folder = folder
+        self._inbox = inbox
+        self._is_told_to_end = False
+        self._info = RunInfo(
+            folder.name,
+            plan.deployment.world,
+            str(plan.options.file.absolute()),
+            os.getpid(),
+            wall.now_text(),
+            session.locator,
+        )
+        wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
+        self._loop = Loop(self.core, inbox, start_log(SUPERVISOR), self.core.deadline_ns)
+        self._loop.connect(wire)
+        self._loop.journal = journal
+        self._loop.turn = self._turn
+        self._loop.on_alive = self._on_alive
+        wire.read(channels.SUPERVISOR_READS, channels.TICK_KEYS)
+        wire.watch_alive()
+        wire.declare_alive()
+
+    def run(self) -> int:
+        """Serve the run until it has ended; write how, and return the exit code."""
+        self._folder.write_info(self._info)
+        self._loop.run(lambda: self.core.finished)
+        self._loop.perform()
+        self._folder.write_result(result(self.core))
+        end = self.core.end
+        return FAILED if end is None or end.failed else DONE
+
+    def stop(self) -> None:
+        """Have the run end in order, as the command `down` does; a signal handler may call this."""
+        self._is_told_to_end = True
+        self._inbox.wake()
+
+    def _turn(self, now_ns: int) -> None:
+        if self._is_told_to_end:
+            self._is_told_to_end = False
+            self.core.stop()
+        self.core.advance(now_ns)
+        if not self._info.radio:
+            self._note_radio()
+
+    def _note_radio(self) -> None:
+        """Write into the run file where clients find the vHub, once it has told."""
+        hub = self.core.roster.by_name.get(VHUB)
+        address = "" if hub is None else hub.report.get("radio_address", "")
+        if isinstance(address, str) and address:
+            self._info = msgspec.structs.replace(self._info, radio=address)
+            self._folder.write_info(self._info)
+            self.core.actions.append(Say("info", f"clients find the vHub at {address}"))
+
+    def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        if not is_alive:
+            self.core.process_gone(name, time.monotonic_ns())
+
+
+def serve(plan: Plan, folder: RunFolder) -> int:
+    """Run the supervisor of a run in this process; return the exit code. Raises Refused before it has begun."""
+    die_with_parent()
+    folder.hold()
+    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+    with Journal(folder.journals, SUPERVISOR) as journal, Session.router(str(plan.address)) as session:
+        supervisor = SupervisorProcess(plan, folder, session, inbox, journal)
+        on_signals(supervisor.stop)
+        return supervisor.run()

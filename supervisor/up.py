@@ -1,0 +1,218 @@
+"""`up`: starts all processes of a run on this machine, shows the run, and ends it in order.
+
+It decides nothing of the run: supervisor, vHub, nodes and players are its children and do the work; it starts them,
+looks at them, asks the supervisor for the status that it shows, and hands on a Ctrl-C. Neighbours: `launcher`,
+`display`, `run_folder`, `control`, `plan` (what was asked for, checked).
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from foosim.protocol import wall
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.errors import Refused
+from foosim.supervisor.control import Control, NoAnswer
+from foosim.supervisor.display import Display
+from foosim.supervisor.launcher import Child, Launcher, command_line
+from foosim.supervisor.plan import Plan
+from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
+
+POLL_S: Final = 0.02
+END_S: Final = 20.0
+"""How long a run that is ending may take before its processes are stopped: the vHub has a capture to close."""
+LOST_S: Final = 3.0
+"""How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
+STATUS_S: Final = 1.0
+
+T = TypeVar("T")
+
+
+class CaptureExists(Refused):
+    """A capture is never overwritten."""
+
+
+class Killed(Exception):
+    """A second Ctrl-C: everything was killed."""
+
+
+def default_capture(world: str) -> Path:
+    """Return where a run is captured when nobody says where."""
+    stem = f"{world}-{wall.now_stamp()}"
+    names = (stem if number == 1 else f"{stem}-{number}" for number in range(1, 1000))
+    return next(path for path in (Path("captures") / f"{name}.mcap" for name in names) if not path.exists())
+
+
+def check_capture(path: Path) -> Path:
+    """Return the path when nothing is there yet; raises CaptureExists."""
+    if path.exists():
+        raise CaptureExists(f"{path} exists, and a capture is never overwritten")
+    return path
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a run ended: the JSON of its result (None when its supervisor was lost) and the reason, for people."""
+
+    result: dict[str, Any] | None
+    failed: bool
+    reason: str
+
+    @property
+    def capture(self) -> str:
+        """Return the path of the finished capture, or an empty text."""
+        return str((self.result or {}).get("capture") or "")
+
+
+class Up:
+    """One run whose processes are children of this one."""
+
+    def __init__(self, plan: Plan, capture: Path | None, display: Display, run: str | None = None) -> None:
+        """`capture` is where it is captured; None captures nothing. `run` names it."""
+        self.plan = plan
+        self.capture = capture
+        self.display = display
+        self.folder: RunFolder = create_run(plan.deployment.world, run)
+        self._launcher = Launcher()
+        self._interrupts = 0
+        self._ending_s = 0.0
+        self._lost: Child | None = None
+        self._lost_s = 0.0
+
+    def run(self) -> Outcome:
+        """Start everything, show it until it is over, and return how it ended. Raises Killed."""
+        with self._signals(), self.display:
+            try:
+                if self._start():
+                    self._watch()
+                self._launcher.wait(END_S if self._lost is None else LOST_S)
+            finally:
+                self._launcher.stop()
+                self._launcher.close()
+        return self._outcome()
+
+    # --- starting ----------------------------------------------------------------------------------------------------
+
+    def _start(self) -> bool:
+        """Start the processes, each as soon as it can connect; False when the run was over before all had started."""
+        options, folder, display = self.plan.options, self.folder, self.display
+        supervisor = ["foosim-supervisor", "run", *options.arguments(), "--run", folder.name]
+        self._launch(SUPERVISOR, supervisor)
+        display.say(f"run {folder.name}, logs in {folder.logs}")
+        info = self._await(folder.info)
+        if info is None:
+            return False
+        self._launch(VHUB, self._vhub_command(info))
+        for name, node in sorted(self.plan.deployment.nodes.items()):
+            command = ["foosim-node", "--name", name, "--connect", info.simulation]
+            if node.launch == "local":
+                self._launch(name, command)
+            else:
+                display.say(f"waiting for node {name}; start it on its machine: {command_line(command)}")
+        info = self._await(self._info_with_radio)
+        if info is None:
+            return False
+        for name in sorted(self.plan.deployment.players):
+            self._launch(name, ["foosim-player", "--name", name, "--connect", info.radio])
+        return True
+
+    def _vhub_command(self, info: RunInfo) -> list[str]:
+        options = self.plan.options
+        command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(self.plan.address.next_port())]
+        command += ["--insecure"] if options.insecure else []
+        command += ["--run-folder", str(self.folder.path)]
+        return [*command, "--no-capture"] if self.capture is None else [*command, "--capture", str(self.capture)]
+
+    def _launch(self, name: str, command: list[str]) -> None:
+        self._launcher.start(name, command, self.folder.log(name))
+
+    def _info_with_radio(self) -> RunInfo | None:
+        info = self.folder.info()
+        return info if info is not None and info.radio else None
+
+    def _await(self, value: Callable[[], T | None]) -> T | None:
+        """Return what `value` gives as soon as it is something; None when the run is over before."""
+        while self._goes_on():
+            found = value()
+            if found is not None:
+                return found
+            time.sleep(POLL_S)
+        return None
+
+    # --- running -----------------------------------------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        """Show the run until its supervisor has ended."""
+        info = self.folder.info()
+        assert info is not None
+        next_s = time.monotonic()
+        with Control(info.simulation) as control:
+            while self._goes_on():
+                if time.monotonic() >= next_s:
+                    next_s = time.monotonic() + self.display.every_s
+                    self._show(control)
+                time.sleep(POLL_S)
+
+    def _show(self, control: Control) -> None:
+        try:
+            status = control.status(STATUS_S)
+        except NoAnswer:
+            return
+        self.display.show(status)
+
+    def _goes_on(self) -> bool:
+        """Look after the children and the Ctrl-C; False when the supervisor has ended."""
+        if self._interrupts > 1:
+            self._launcher.kill()
+            raise Killed
+        supervisor = self._launcher.children[SUPERVISOR]
+        if supervisor.exit_code is not None:
+            return False
+        now_s = time.monotonic()
+        if self._interrupts and not self._ending_s:
+            self.display.say("ending the run; a second Ctrl-C kills it")
+            self._end_in_order(supervisor, now_s)
+        if self._lost is None:
+            self._lost = next((child for child in self._launcher.ended() if child.exit_code != 0), None)
+            self._lost_s = now_s
+        elif not self._ending_s and now_s > self._lost_s + LOST_S:
+            self._end_in_order(supervisor, now_s)
+        return not self._ending_s or now_s < self._ending_s + END_S
+
+    def _end_in_order(self, supervisor: Child, now_s: float) -> None:
+        """Have the supervisor end the run, as the command `down` does."""
+        self._ending_s = now_s
+        supervisor.process.send_signal(signal.SIGTERM)
+
+    def _outcome(self) -> Outcome:
+        result = self.folder.result()
+        supervisor = self._launcher.children[SUPERVISOR]
+        reason = "" if result is None else str(result["reason"])
+        if result is None:
+            self._lost = self._lost or supervisor
+        if self._lost is not None:
+            details = "".join(f"\n    {line}" for line in self._lost.last_lines())
+            reason = f"{reason or 'the run did not end in order'}; {self._lost.name} {self._lost.ending}{details}"
+        failed = result is None or bool(result["failed"]) or self._lost is not None
+        return Outcome(result, failed, reason)
+
+    @contextmanager
+    def _signals(self) -> Iterator[None]:
+        """Count Ctrl-C (and what means the same) instead of being ended by it."""
+
+        def count(number: int, frame: object) -> None:
+            self._interrupts += 1
+
+        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        before = {number: signal.signal(number, count) for number in numbers}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)

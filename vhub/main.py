@@ -1,0 +1,214 @@
+"""The process `foosim-vhub`: the vHub's core between both planes, its journal and the capture.
+
+It is a client of the simulation plane and the router of the radio plane. Nothing bridges the two but the core. What the
+core writes goes to the journal before it is spoken; the capture follows behind, from a thread of its own. Neighbours:
+`core` decides, `capture_writer`, `protocol.journal`, `protocol.loop`.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foosim.protocol import channels, limits, wall
+from foosim.protocol.actions import Say
+from foosim.protocol.addresses import LOOPBACK, check_listen
+from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
+from foosim.protocol.codec import encode
+from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.errors import BadValue
+from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.journal import Journal
+from foosim.protocol.loop import Loop, Wire
+from foosim.protocol.messages import Build, End
+from foosim.protocol.process import die_with_parent, new_boot, on_signals, start_log
+from foosim.protocol.session import Session
+from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.core import HubCore, Keep
+
+CONNECT_S = 60.0
+FORGET_EVERY_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class HubOptions:
+    """What a vHub is started with. `capture` None: where captures go by default; `keeps` False: none is written."""
+
+    capture: Path | None = None
+    keeps: bool = True
+    folder: Path | None = None
+
+
+class HubProcess:
+    """The vHub on its two sessions, until the run ends, the supervisor is gone, or `stop`."""
+
+    def __init__(self, simulation: Session, radio: Session, inbox: Inbox, options: HubOptions) -> None:
+        self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns())
+        self.core.radio_address = radio.locator
+        self.failed = ""
+        self._options = options
+        self._inbox = inbox
+        self._journal: Journal | None = None
+        self._capture: CaptureWriter | None = None
+        self._forget_ns = 0
+        self._is_abandoned = False
+        self._log: logging.Logger = start_log(VHUB)
+        self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
+        self._radio = Wire(radio, Plane.RADIO, inbox, VHUB)
+        self._loop = Loop(self.core, inbox, self._log, lambda now_ns: self.core.deadline_ns())
+        self._loop.connect(self._wire)
+        self._loop.connect(self._radio)
+        self._loop.turn = self._turn
+        self._loop.other = self._keep
+        self._loop.on_alive = self._on_alive
+        self._loop.on_say = self._on_say
+        self._wire.read(channels.VHUB_READS, channels.HUB_KEYS)
+        self._radio.read(channels.VHUB_READS)
+        self._wire.watch_alive(SUPERVISOR)
+        self._radio.watch_alive()
+
+    def run(self) -> int:
+        """Take part until the end, close the capture, say farewell; return the exit code."""
+        try:
+            self._loop.run(self._is_over)
+            self._loop.perform()
+        finally:
+            self._close()
+        if self.core.member.refusal:
+            return REFUSED
+        farewell = self.core.farewell()
+        self._wire.put(farewell.channel, farewell.name, farewell.payload)
+        return FAILED if self._is_abandoned or self.failed else DONE
+
+    def stop(self) -> None:
+        """Have `run` end what it has and return; a signal handler may call this."""
+        self._is_abandoned = True
+        self._inbox.wake()
+
+    def _is_over(self) -> bool:
+        core = self.core
+        if self._is_abandoned and core.state is None:
+            return True
+        return core.finished or bool(core.member.refusal)
+
+    # --- rounds of the loop ------------------------------------------------------------------------------------------
+
+    def _turn(self, now_ns: int) -> None:
+        core = self.core
+        core.busy = self._loop.busy
+        if core.member.build is not None and self._journal is None:
+            self._begin(core.member.build)
+        if self._is_abandoned and core.ended is None and core.state is not None:
+            end = End(core.state.closed + 1, "the vHub was told to end", True)
+            core.receive(channels.END, SUPERVISOR, encode(end), now_ns)
+        core.advance(now_ns)
+        if now_ns >= self._forget_ns and self._journal is not None and core.state is not None:
+            self._forget_ns = now_ns + FORGET_EVERY_NS
+            self._turn_journal(self._journal, core.state.closed)
+
+    def _begin(self, build: Build) -> None:
+        """Open the journal and the capture, and be present: the supervisor has let us in."""
+        options, core = self._options, self.core
+        assert core.deployment is not None
+        folder = options.folder or Path(f"{build.run}.vhub")
+        self._journal = self._loop.journal = Journal(folder / "journals", VHUB)
+        if options.keeps:
+            path = options.capture or Path("captures") / f"{core.deployment.world}-{wall.now_stamp()}.mcap"
+            metadata = {
+                "run": build.run,
+                "started": wall.now_text(),
+                "pace": build.pace,
+                "fingerprint": library_fingerprint().hex(),
+            }
+            self._capture = CaptureWriter(
+                path, core.deployment, build.deployment_name, build.deployment, metadata, self._say
+            )
+            core.capture = str(path)
+        self._wire.declare_alive()
+
+    def _turn_journal(self, journal: Journal, closed: int) -> None:
+        """Between ticks, begin a new file when one is full; what the capture has on the disk may go."""
+        if self.core.is_between_ticks and not self.core.actions:
+            journal.rotate_if_full(self.core.head, closed)
+        journal.forget_before(closed if self._capture is None else self._capture.synced_tick)
+
+    def _keep(self, action: Keep) -> None:
+        if self._capture is not None:
+            self._capture.keep(action.closing)
+
+    def _on_say(self, say: Say) -> None:
+        if self._capture is not None:
+            self._capture.log(say.level, say.text, self.core.statistics().closed + 1)
+
+    def _say(self, level: str, text: str) -> None:
+        self._log.log(logging.getLevelNamesMapping()[level.upper()], text)
+
+    def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        if is_alive:
+            return
+        if plane is Plane.RADIO:
+            self.core.client_gone(name, time.monotonic_ns())
+        elif name == SUPERVISOR and self.core.ended is None:
+            self.core.actions.append(Say("error", "lost the supervisor"))
+            self.stop()
+
+    def _close(self) -> None:
+        """Finish the capture; only then is the journal done with."""
+        if self._capture is not None:
+            end = self.core.ended
+            reason = "not ended in order" if end is None else end.reason
+            self._capture.finish({"reason": reason, "ended": wall.now_text()})
+        if self._journal is not None:
+            self._journal.close()
+
+
+def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions) -> int:
+    """Run the vHub until its run ends; return the exit code. Raises Refused when there is nobody to connect to."""
+    address = check_listen(listen, insecure)
+    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+    with (
+        Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX) as radio,
+        Session.client(connect, CONNECT_S) as simulation,
+    ):
+        hub = HubProcess(simulation, radio, inbox, options)
+        on_signals(hub.stop)
+        return hub.run()
+
+
+app = new_app("The virtual hub: carries every packet between robots and clients over the emulated network.")
+
+
+@app.command()
+def vhub(
+    connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
+    listen: Annotated[str, typer.Option(help="Where clients find it; port 0 lets the system choose.")] = LOOPBACK,
+    insecure: Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")] = False,
+    capture: Annotated[Path | None, typer.Option(help="What to write; by default captures/WORLD-TIME.mcap.")] = None,
+    no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
+    run_folder: Annotated[Path | None, typer.Option(help="Where its journal goes; by default RUN.vhub.")] = None,
+    version: VersionOption = False,
+) -> None:
+    """Take part in a run as its virtual hub.
+
+    It exits with 0 when the run ended and the capture is finished, with 1 when it lost the supervisor, and with 3 when
+    the supervisor would not have it.
+    """
+    die_with_parent()
+    if no_capture and capture is not None:
+        raise BadValue("--no-capture and --capture exclude each other", str(capture))
+    raise typer.Exit(run_vhub(connect, listen, insecure, HubOptions(capture, not no_capture, run_folder)))
+
+
+def main() -> None:
+    """Entry of `foosim-vhub`."""
+    run_app(app)
+
+
+if __name__ == "__main__":
+    main()
