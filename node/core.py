@@ -185,7 +185,7 @@ class NodeCore:
 
     def deadline_ns(self) -> int:
         """When `wake` has something to do next."""
-        if self.frame is None:
+        if self.frame is None or self.ended is not None:
             return self.member.deadline_ns
         return min(self.member.deadline_ns, self._want_ns)
 

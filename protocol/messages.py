@@ -407,4 +407,3 @@ class Down(Message, frozen=True):
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     ended: bool
-

@@ -58,6 +58,10 @@ class Settings:
     weather: Weather = CALM
     slow_ns: Mapping[str, int] = field(default_factory=dict)
     factory: EngineFactory | None = None
+    hub: type[HubCore] = HubCore
+    supervisor: type[SupervisorCore] = SupervisorCore
+    node: type[NodeCore] = NodeCore
+    """The cores' classes: tests plant faults by subclasses."""
     observer: Observer | None = None
     on_commit: Callable[[Frame], None] | None = None
     on_closing: Callable[[Closing], None] | None = None
@@ -78,9 +82,9 @@ class System:
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], None]]] = {}
         fingerprint = library_fingerprint()
-        self.supervisor = SupervisorCore(settings, fingerprint, 0)
+        self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
         self.supervisor.on_commit = self._committed
-        self.hub = HubCore("boot", fingerprint, 0)
+        self.hub = rehearsal.hub("boot", fingerprint, 0)
         deployment = self.supervisor.deployment
         self._enter(channels.SUPERVISOR, self.supervisor, self.supervisor.advance, channels.SUPERVISOR_READS)
         self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
@@ -101,7 +105,7 @@ class System:
         self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
-        core = NodeCore(name, "boot", fingerprint, 0)
+        core = self.settings.node(name, "boot", fingerprint, 0)
         solver = self.solvers[name] = Solver(core, self.settings.factory)
 
         def turn(now_ns: int) -> None:
@@ -131,6 +135,7 @@ class System:
                 continue
             bus.now_ns = max(bus.now_ns, deadline_ns)
             self._wake_all()
+            self._check_deadlines()
             if bus.now_ns - self._last_commit_ns > IDLE_NS_MAX and not self.supervisor.pacer.paused:
                 raise Stuck(self._where())
 
@@ -164,14 +169,18 @@ class System:
                 process.turn(now_ns)
                 self._perform(process)
 
+    def _deadline_of(self, process: Process) -> int:
+        core = process.core
+        deadline: int = core.deadline_ns(self.bus.now_ns) if core is self.supervisor else core.deadline_ns()
+        return max(deadline, process.busy_until_ns)
+
     def _deadline_ns(self) -> int:
-        now_ns = self.bus.now_ns
-        deadlines = []
-        for process in self.processes.values():
-            core = process.core
-            deadline = core.deadline_ns(now_ns) if core is self.supervisor else core.deadline_ns()
-            deadlines.append(max(deadline, process.busy_until_ns, now_ns + 1))
-        return min(deadlines)
+        return min(self._deadline_of(process) for process in self.processes.values())
+
+    def _check_deadlines(self) -> None:
+        """A core that was just woken has its next deadline in the future; else its process would never sleep."""
+        late = [name for name, process in self.processes.items() if self._deadline_of(process) <= self.bus.now_ns]
+        assert not late, f"{late} have deadlines that waking did not move"
 
     def _perform(self, process: Process) -> None:
         """Perform what a core asked for, in order."""

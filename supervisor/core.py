@@ -51,6 +51,8 @@ from foosim.supervisor.watch import Watch
 
 FAREWELL_NS: Final = 10_000_000_000
 """How long an ended run waits for the vHub to close its capture."""
+PREPARE_NS: Final = 200_000_000
+"""How often a layout that nodes have not built yet is asked for again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +112,8 @@ class SupervisorCore:
         self._deliveries: dict[int, bytes] = {}
         self._parts: dict[int, list[Part]] = {}
         self._commits: dict[int, bytes] = {}
+        self._prepare_ns = self._want_ns = now_ns
+        self._want_after_ns = limits.WANT_AFTER_NS
         self._refused = self._repeated = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Hello: self._on_hello,
@@ -158,6 +162,11 @@ class SupervisorCore:
             lost = self.watch.lost(self, now_ns)
             if lost:
                 self.finish(f"lost {lost}", failed=True)
+            elif self._lacks and now_ns >= self._want_ns:
+                self._ask_again(now_ns)
+            if now_ns >= self._prepare_ns:
+                self.requests.prepare()
+                self._prepare_ns = now_ns + PREPARE_NS
         elif not self.finished:
             hub = self.roster.by_name.get(channels.VHUB)
             self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
@@ -165,6 +174,8 @@ class SupervisorCore:
     def deadline_ns(self, now_ns: int) -> int:
         """When the shell has to call again at the latest."""
         deadline = now_ns + limits.HEARTBEAT_NS
+        if self._lacks:
+            deadline = min(deadline, self._want_ns)
         if self.epoch > 0 and self.end is None and self.released <= self.frame.tick + limits.RELEASE_AHEAD:
             release_ns = self.pacer.release_ns(self.released)
             if release_ns is not None and (not self.stop_at or self.released < self.stop_at):
@@ -233,6 +244,8 @@ class SupervisorCore:
             edits = self.requests.edits_for(tick)
             self.released += 1
             self._say_order(tick, edits)
+            if tick == self.frame.tick:
+                self._progress(now_ns)
             if tick == 0:
                 self.started_ns = now_ns
             self.watch.released(tick, now_ns)
@@ -283,6 +296,7 @@ class SupervisorCore:
         self.frame = frame
         self.chain = chain_next(self.chain, frame.digest)
         self.committed_ns = now_ns
+        self._progress(now_ns)
         self._say_commit(edits)
         if self.on_commit is not None:
             self.on_commit(frame)
@@ -297,14 +311,34 @@ class SupervisorCore:
         """Journal a frame, then publish it to the vHub."""
         frame = self.frame
         last = self.stop_at > 0 and frame.tick >= self.stop_at
-        commit = Commit(
-            self.epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, edits, last
-        )
+        commit = Commit(self.epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, edits, last)
         payload = encode(commit)
         self._commits[frame.tick] = payload
         self._commits.pop(frame.tick - limits.KEPT_TICKS, None)
         self.actions.append(Journal(payload))
         self.actions.append(Publish(channels.COMMIT, channels.VHUB, payload))
+
+    @property
+    def _lacks(self) -> bool:
+        """Whether a released tick waits for parts or deliveries."""
+        return self.epoch > 0 and self.end is None and self.frame.tick < self.released
+
+    def _ask_again(self, now_ns: int) -> None:
+        """Ask for what the next commit lacks, the wait doubling."""
+        tick = self.frame.tick
+        wants = (
+            [] if tick in self._deliveries else [Want(channels.SUPERVISOR, channels.DELIVERIES.name, tick, self.epoch)]
+        )
+        if len(self._parts.get(tick + 1, ())) < len(self.members):
+            wants.append(Want(channels.SUPERVISOR, channels.PART.name, tick + 1, self.epoch))
+        for want in wants:
+            self.actions.append(Publish(channels.WANT, channels.SUPERVISOR, encode(want)))
+        self._want_after_ns = min(2 * self._want_after_ns, limits.WANT_EVERY_NS_MAX)
+        self._want_ns = now_ns + self._want_after_ns
+
+    def _progress(self, now_ns: int) -> None:
+        self._want_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
+        self._want_ns = now_ns + self._want_after_ns
 
     # --- epochs ------------------------------------------------------------------------------------------------------
 
@@ -325,6 +359,7 @@ class SupervisorCore:
         for tick in range(self.frame.tick, self.released):
             self._say_order(tick, self._orders[tick][1])
         self.watch.begun(now_ns)
+        self._progress(now_ns)
 
     def _start_if_ready(self, now_ns: int) -> None:
         """Open the first epoch when every declared process has built the world."""

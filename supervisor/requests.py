@@ -174,6 +174,11 @@ class Requests:
         """Have the engines built; the first change that waits goes first, since each builds on the one before."""
         self._pending.append(_Waiting(request, edit, layout_after(self._next_layout(), [edit])))
         if len(self._pending) == 1:
+            self.prepare()
+
+    def prepare(self) -> None:
+        """Say (again) which layout the first change that waits needs."""
+        if self._pending:
             self._core.prepare(self._pending[0].layout)
 
     def layout_ready(self, now_ns: int) -> None:
@@ -190,7 +195,7 @@ class Requests:
             if self._pending:
                 following = self._pending[0]
                 following.layout = layout_after(layout_after(self._next_layout(), [waiting.edit]), [following.edit])
-                self._core.prepare(following.layout)
+                self.prepare()
 
     def _push(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         name = str(arguments.get("name", "ball"))

@@ -82,7 +82,7 @@ class HubCore:
         self.lost = self.capture = self.radio_address = ""
         self.busy = 0.0
         self._layout: Layout | None = None
-        self._epoch = 0
+        self._epoch = self._epoch_tick = 0
         self._commits: dict[int, tuple[bytes, Commit, Frame]] = {}
         self._next_commit = 0
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
@@ -339,7 +339,7 @@ class HubCore:
             self._repeated += 1
             return
         first = self._epoch == 0
-        self._epoch = epoch.epoch
+        self._epoch, self._epoch_tick = epoch.epoch, epoch.tick
         self.member.entered()
         if first:
             self._sent[0] = encode(Deliveries(0, []))
@@ -347,7 +347,9 @@ class HubCore:
             self._progress(now_ns)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
-        if commit.tick != self._next_commit or self._layout is None or commit.epoch < self._epoch:
+        # A commit up to the epoch's start is as good under its old epoch: what is committed never changes.
+        fenced = commit.epoch < self._epoch and commit.tick > self._epoch_tick
+        if commit.tick != self._next_commit or self._layout is None or fenced:
             self._repeated += 1
             return
         layout = layout_after(self._layout, commit.edits)
@@ -481,7 +483,9 @@ class HubCore:
             for flight in flights:
                 flight.cause = IN_FLIGHT
             delivered = self.state.deliveries.get(frame.tick - 1, [])
-            final = Closing(frame, commit.digest, commit.edits, delivered, fates=flights, wall_ns=now_ns)
+            final = Closing(frame, commit.digest, commit.edits, delivered, wall_ns=now_ns)
+            final = final if self._world is None else self._world.closing  # a tick that is half closed has fates
+            final.fates += flights
             self.actions.append(Keep(final))
         for name in self.sessions.by_name:
             member = self.state.members.get(name)

@@ -30,9 +30,7 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
     if state is None:
         return HubStatistics(-1, 0, 0, 0, 0, 0, malformed, repeated)
     p = state.packets
-    return HubStatistics(
-        state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated
-    )
+    return HubStatistics(state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated)
 
 
 def report(state: HubState | None, capture: str, radio_address: str) -> bytes:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from foosim.protocol.draws import draw_key, draw_words
@@ -20,7 +20,9 @@ from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TICKS = 1500
+SEEDS = settings(max_examples=2, phases=[Phase.explicit, Phase.generate])
+"""A run takes seconds, and a seed has nothing to shrink."""
+TICKS = 1200
 MOVES = 200
 REBUILDS = 40
 
@@ -44,10 +46,12 @@ def shuffle(system: System, seed: int, moves: int = MOVES, rebuilds: int = REBUI
     key = draw_key(seed, "moves")
     for number in range(moves):
         words = draw_words(key, number)
-        robot, node = robots[words[0] % len(robots)], nodes[words[1] % len(nodes)]
+        robot = robots[words[0] % len(robots)]
 
-        def move(robot: str = robot, node: str = node) -> None:
-            system.request("move", robot=robot, node=node)
+        def move(robot: str = robot, word: int = words[1]) -> None:
+            others = [node for node in nodes if node != system.supervisor.owners[robot]]
+            if others:
+                system.request("move", robot=robot, node=others[word % len(others)])
 
         system.at_tick(1 + words[2] % (TICKS - 10), move)
     key = draw_key(seed, "rebuilds")
@@ -64,8 +68,10 @@ def run(engine: str, seed: int, nodes: int, shuffled: bool, weather: Weather | N
         rehearsal.weather = weather
     prepare = (lambda system: shuffle(system, seed)) if shuffled else None
     sets = [f"engine={engine}", f"seed={seed}", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=2 m/s"]
+    if weather is not None:
+        sets += [f"deadlines.{name}=1 h" for name in ("heartbeat", "tick_named", "tick_lost", "lockstep_fast")]
     result = rehearse(TABLE.read_text(), TABLE.name, TICKS, nodes, sets, rehearsal, prepare=prepare)
-    assert result.json["ticks"] == TICKS
+    assert result.json["ticks"] == TICKS, result.json["reason"]
     return result, contacts.count
 
 
@@ -73,7 +79,7 @@ def first_difference(one: Rehearsed, other: Rehearsed) -> int | None:
     return next((i + 1 for i, (a, b) in enumerate(zip(one.digests, other.digests, strict=True)) if a != b), None)
 
 
-@settings(max_examples=2)
+@SEEDS
 @given(seed=st.integers(0, 2**31))
 @pytest.mark.parametrize("engine", ["bullet", "pure"])
 def test_nodes_owners_moves_and_rebuilds_change_nothing(engine: str, seed: int) -> None:
@@ -85,11 +91,11 @@ def test_nodes_owners_moves_and_rebuilds_change_nothing(engine: str, seed: int) 
         assert first_difference(alone, many) is None, f"seed {seed}, {nodes} nodes"
         assert many.json["digest"] == alone.json["digest"]
         handovers += many.json["handovers"]
-        assert nodes == 1 or many.json["moves"] > MOVES / 2
+        assert nodes == 1 or many.json["moves"] >= MOVES - 5, "moves of one robot may meet in one tick"
     assert handovers > 0
 
 
-@settings(max_examples=2)
+@SEEDS
 @given(seed=st.integers(0, 2**31))
 def test_a_bad_bus_changes_nothing(seed: int) -> None:
     """Messages late, reordered, repeated and lost: what is missing is asked for again, and the world is the same."""
