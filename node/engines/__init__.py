@@ -26,8 +26,3 @@ def _pure(deployment: Deployment, layout: Layout) -> Engine:
 
 
 ENGINES: Final[Mapping[str, EngineFactory]] = {"bullet": _bullet, "pure": _pure}
-
-
-def make_engine(deployment: Deployment, layout: Layout) -> Engine:
-    """Return the deployment's engine with the bodies of `layout`."""
-    return ENGINES[deployment.engine](deployment, layout)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.node.engines import ENGINES, make_engine
+from foosim.node.engines import ENGINES
 from foosim.node.engines.interface import Engine
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import Layout, build_layout
@@ -21,7 +21,7 @@ OFF = ((0.0, 0.0), (0.0, 0.0))
 @pytest.fixture(params=sorted(ENGINES))
 def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
     settings = apply_sets(TEXT, "table.yaml", [f"engine={request.param}", "table.contact_erp=0"])
-    made = make_engine(load_deployment(settings, "table.yaml"), LAYOUT)
+    made = ENGINES[request.param](load_deployment(settings, "table.yaml"), LAYOUT)
     yield made
     made.close()
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.node.engines import make_engine
+from foosim.node.engines import ENGINES
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import Entity, build_layout
 from foosim.protocol.scene import Vector
@@ -26,7 +26,7 @@ class World:
         self.table = self.deployment.table
         self.layout = build_layout(self.deployment)
         self.scene = build_scene(self.deployment, self.layout)
-        self.engine = make_engine(self.deployment, self.layout)
+        self.engine = ENGINES[self.deployment.engine](self.deployment, self.layout)
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.ball = self.layout["ball"]
         self.tick_s = self.deployment.tick_ns / 1e9
