@@ -154,7 +154,7 @@ class SupervisorCore:
         while self._commit_next(now_ns):
             self._release(now_ns)
         if self.stop_at and self.frame.tick >= self.stop_at:
-            self.finish("done", failed=False)
+            self.finish("done" if self.stop_at == self.settings.ticks else "stopped", failed=False)
 
     def wake(self, now_ns: int) -> None:
         """Look for who is silent or overdue, and for the end of an ended run."""
@@ -169,7 +169,7 @@ class SupervisorCore:
                 self._prepare_ns = now_ns + PREPARE_NS
         elif not self.finished:
             hub = self.roster.by_name.get(channels.VHUB)
-            self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
+            self.finished = hub is None or hub.farewell or hub.gone or now_ns > self.watch.ended_ns + FAREWELL_NS
 
     def deadline_ns(self, now_ns: int) -> int:
         """When the shell has to call again at the latest."""
@@ -185,7 +185,10 @@ class SupervisorCore:
     def process_gone(self, name: str, now_ns: int) -> None:
         """A process's presence has ended."""
         process = self.roster.by_name.get(name)
-        if process is not None and not process.farewell and self.end is None:
+        if process is None:
+            return
+        process.gone = True
+        if not process.farewell and self.end is None:
             self.finish(f"lost {name}: its connection closed", failed=True)
 
     def finish(self, reason: str, failed: bool) -> None:

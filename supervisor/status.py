@@ -46,7 +46,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         "moves": core.moves,
         "handovers": core.handovers,
         "score": {"red": red, "blue": blue},
-        "capture": report.get("capture") or None,
+        "capture": (report.get("capture") or None) if hub is not None and hub.farewell else None,
         "reason": core.end.reason if core.end is not None else None,
         "failed": core.end.failed if core.end is not None else False,
     }
@@ -60,6 +60,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
     ball = core.frame.vector("ball", "position", 3)
     return {
         **result(core),
+        "capture": report.get("capture") or None,
         "epoch": core.epoch,
         "state": _state(core),
         "pace": str(pacer.pace),
