@@ -51,6 +51,8 @@ from foosim.supervisor.watch import Watch
 
 FAREWELL_NS: Final = 10_000_000_000
 """How long an ended run waits for the vHub to close its capture."""
+GONE_NS: Final = 500_000_000
+"""How long what a process said last may take after the news that it is gone: the two come by different ways."""
 PREPARE_NS: Final = 200_000_000
 """How often a layout that nodes have not built yet is asked for again."""
 
@@ -169,7 +171,9 @@ class SupervisorCore:
                 self._prepare_ns = now_ns + PREPARE_NS
         elif not self.finished:
             hub = self.roster.by_name.get(channels.VHUB)
-            self.finished = hub is None or hub.farewell or hub.gone or now_ns > self.watch.ended_ns + FAREWELL_NS
+            self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
+            if hub is not None and hub.gone_ns and now_ns > hub.gone_ns + GONE_NS:
+                self.finished = True
 
     def deadline_ns(self, now_ns: int) -> int:
         """When the shell has to call again at the latest."""
@@ -187,7 +191,7 @@ class SupervisorCore:
         process = self.roster.by_name.get(name)
         if process is None:
             return
-        process.gone = True
+        process.gone_ns = now_ns
         if not process.farewell and self.end is None:
             self.finish(f"lost {name}: its connection closed", failed=True)
 

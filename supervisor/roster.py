@@ -29,7 +29,7 @@ class Process:
     heartbeat: Heartbeat | None = None
     report: dict[str, Any] = field(default_factory=dict)
     farewell: bool = False
-    gone: bool = False
+    gone_ns: int = 0
 
 
 class Roster:
