@@ -83,10 +83,8 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     except Killed:
         print("killed", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
-    if outcome.reason:
-        display.say(outcome.reason)
-    if outcome.capture:
-        display.say(f"capture {outcome.capture}")
+    for line in outcome.lines:
+        display.say(line)
     if json and outcome.result is not None:
         print(encode_json(outcome.result).decode())
     raise typer.Exit(FAILED if outcome.failed else DONE)

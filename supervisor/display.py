@@ -39,7 +39,7 @@ def pace_text(status: dict[str, Any]) -> str:
     pace = str(status["pace"])
     if status["state"] != "running":
         return f"{pace}, {status['state']}"
-    rate = status["rtf"]
+    rate = status.get("speed", status["rtf"])
     return pace if rate is None else f"{pace} {rate:.2f}x"
 
 
@@ -148,9 +148,12 @@ class Display:
     EVERY_S_LIVE: Final = 0.25
     EVERY_S_PLAIN: Final = 1.0
 
-    def __init__(self, stream: TextIO = sys.stdout) -> None:
-        self._console = Console(file=stream)
+    def __init__(self, stream: TextIO | None = None) -> None:
+        """`stream` is standard output by default."""
+        self._console = Console(file=stream or sys.stdout)
         self._live: Live | None = None
+        self._shown: tuple[float, float] | None = None
+        """Wall and simulated time of the last status, in s."""
         self.is_live = self._console.is_terminal
         self.every_s = self.EVERY_S_LIVE if self.is_live else self.EVERY_S_PLAIN
 
@@ -165,8 +168,12 @@ class Display:
             self._live.stop()
             self._live = None
 
-    def show(self, status: dict[str, Any]) -> None:
-        """Show the state of the run."""
+    def show(self, status: dict[str, Any], now_s: float) -> None:
+        """Show the state of the run; `now_s` is a wall time that tells how fast it goes since the last one."""
+        now = (now_s, simulated_s(status))
+        if self._shown is not None and now_s > self._shown[0]:
+            status = {**status, "speed": (now[1] - self._shown[1]) / (now[0] - self._shown[0])}
+        self._shown = now
         if self._live is not None:
             self._live.update(render(status), refresh=True)
         else:

@@ -49,7 +49,9 @@ class Child:
         return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
 
     def last_lines(self, count: int = 3) -> list[str]:
-        """Return the end of its log."""
+        """Return the end of its log, when it ended by itself: it may say why there."""
+        if (self.exit_code or 0) <= 0:
+            return []
         try:
             with self.log.open("rb") as file:
                 file.seek(max(0, self.log.stat().st_size - 8192))

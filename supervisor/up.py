@@ -17,6 +17,7 @@ from typing import Any, Final, TypeVar
 
 from foosim.protocol import wall
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.errors import Refused
 from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.display import Display
@@ -30,6 +31,8 @@ END_S: Final = 20.0
 LOST_S: Final = 3.0
 """How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
 STATUS_S: Final = 1.0
+ENDED: Final = ("ended", "failed")
+"""States of a run that only waits for its vHub to close the capture."""
 
 T = TypeVar("T")
 
@@ -58,16 +61,11 @@ def check_capture(path: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a run ended: the JSON of its result (None when its supervisor was lost) and the reason, for people."""
+    """How a run ended: the JSON of its result (None when its supervisor was lost), and what people should know."""
 
     result: dict[str, Any] | None
     failed: bool
-    reason: str
-
-    @property
-    def capture(self) -> str:
-        """Return the path of the finished capture, or an empty text."""
-        return str((self.result or {}).get("capture") or "")
+    lines: tuple[str, ...]
 
 
 class Up:
@@ -84,6 +82,7 @@ class Up:
         self._ending_s = 0.0
         self._lost: Child | None = None
         self._lost_s = 0.0
+        self._has_ended = False
 
     def run(self) -> Outcome:
         """Start everything, show it until it is over, and return how it ended. Raises Killed."""
@@ -164,7 +163,9 @@ class Up:
             status = control.status(STATUS_S)
         except NoAnswer:
             return
-        self.display.show(status)
+        if not self._has_ended:
+            self.display.show(status, time.monotonic())
+        self._has_ended = status["state"] in ENDED
 
     def _goes_on(self) -> bool:
         """Look after the children and the Ctrl-C; False when the supervisor has ended."""
@@ -192,15 +193,26 @@ class Up:
 
     def _outcome(self) -> Outcome:
         result = self.folder.result()
-        supervisor = self._launcher.children[SUPERVISOR]
-        reason = "" if result is None else str(result["reason"])
-        if result is None:
-            self._lost = self._lost or supervisor
-        if self._lost is not None:
-            details = "".join(f"\n    {line}" for line in self._lost.last_lines())
-            reason = f"{reason or 'the run did not end in order'}; {self._lost.name} {self._lost.ending}{details}"
-        failed = result is None or bool(result["failed"]) or self._lost is not None
-        return Outcome(result, failed, reason)
+        if result is None and self._lost is None:
+            self._lost = self._launcher.children[SUPERVISOR]
+        reason = "the run did not end in order" if result is None else f"the run has ended: {result['reason']}"
+        lines = [reason, *self._lost_lines(), *self._capture_lines()]
+        return Outcome(result, result is None or bool(result["failed"]) or self._lost is not None, tuple(lines))
+
+    def _lost_lines(self) -> list[str]:
+        """Say which child ended before the run did, and show the end of its log."""
+        child = self._lost
+        if child is None:
+            return []
+        return [f"{child.name} {child.ending}; its log is {child.log}", *(f"    {line}" for line in child.last_lines())]
+
+    def _capture_lines(self) -> list[str]:
+        """Say where the capture is; who was killed did not finish it."""
+        if self.capture is None or not self.capture.exists():
+            return []
+        hub = self._launcher.children.get(VHUB)
+        finished = hub is not None and hub.exit_code in (DONE, FAILED)
+        return [f"capture {self.capture}" if finished else f"capture {self.capture} (unfinished)"]
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
