@@ -70,48 +70,41 @@ class Records(Iterator[bytes]):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.valid_bytes = 0
-        """Where the next record starts."""
         try:
-            self._file = path.open("rb")
-            self._size = os.fstat(self._file.fileno()).st_size
-            start = self._file.read(len(SIGNATURE))
+            with path.open("rb") as file:
+                self._size = os.fstat(file.fileno()).st_size
+                start = file.read(len(SIGNATURE))
         except OSError as error:
             raise JournalError(f"{path}: cannot be read, {error.strerror}") from None
-        if start == SIGNATURE:
-            self.valid_bytes = len(SIGNATURE)
-        elif not SIGNATURE.startswith(start):
-            self._file.close()
+        if not SIGNATURE.startswith(start):
             raise JournalError(f"{path}: no journal of this version, its first bytes are {start!r}, not {SIGNATURE!r}")
+        self.valid_bytes = len(SIGNATURE) if start == SIGNATURE else 0
+        """Where the next record starts."""
+        self._records = self._read() if self.valid_bytes else iter(())
 
     @property
     def left_bytes(self) -> int:
         return self._size - self.valid_bytes
 
     def __next__(self) -> bytes:
-        record = None if self._file.closed else self._read()
-        if record is None:
-            self._file.close()
-            raise StopIteration
-        return record
+        return next(self._records)
 
-    def _read(self) -> bytes | None:
-        """Return the next whole record; a length beyond the file's end is never allocated."""
-        framing = self._file.read(_FRAMING.size)
-        if len(framing) < _FRAMING.size or self.valid_bytes == 0:
-            return None
-        length, checksum = _FRAMING.unpack(framing)
-        if length > self.left_bytes - _FRAMING.size:
-            return None
-        payload = self._file.read(length)
-        if len(payload) < length or _checksum(payload) != checksum:
-            return None
-        self.valid_bytes += _FRAMING.size + length
-        return payload
-
-    def close(self) -> None:
-        """Stop reading."""
-        self._file.close()
+    def _read(self) -> Iterator[bytes]:
+        """Yield whole records; a length beyond the file's end is never allocated."""
+        with self.path.open("rb") as file:
+            file.seek(self.valid_bytes)
+            while self.left_bytes >= _FRAMING.size:
+                framing = file.read(_FRAMING.size)
+                if len(framing) < _FRAMING.size:
+                    return
+                length, checksum = _FRAMING.unpack(framing)
+                if length > self.left_bytes - _FRAMING.size:
+                    return
+                payload = file.read(length)
+                if _checksum(payload) != checksum:
+                    return
+                self.valid_bytes += _FRAMING.size + length
+                yield payload
 
 
 def read_records(path: Path) -> Records:

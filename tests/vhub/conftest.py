@@ -1,0 +1,236 @@
+"""A vHub driven by hand, for tests of its journal and its capture: synthetic commits, samples and clients' packets.
+
+The core is the real one; the world is made up by hashing, so that every number is exact and every byte value occurs.
+What happens in a run: two lockstep players, a free-running client that comes, goes and comes back, repeats, packets
+to nobody, bytes that are no message, a robot that is down for a while, a ball that is added and removed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from hashlib import shake_128
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Journal, Publish
+from foosim.protocol.codec import decode, decode_any, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import (
+    Add,
+    AddedEntity,
+    Build,
+    ClientHello,
+    Commit,
+    Deliveries,
+    Done,
+    Down,
+    Edit,
+    End,
+    Epoch,
+    Go,
+    Join,
+    Push,
+    Remove,
+    RobotPacket,
+    Samples,
+    Sent,
+    Stop,
+    Subscription,
+    Up,
+)
+from foosim.protocol.start import initial_numbers
+from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.records import Closing
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+NAME = "table.yaml"
+WATCHER = "watcher"
+ADDED_AT, PUSHED_AT, REMOVED_AT = 25, 30, 45
+DOWN_FROM, DOWN_TO = 20, 40
+GONE_AT, BACK_AT = 35, 50
+SETS = (
+    "clients={watcher: {lockstep: false}}",
+    "network.links=[{id: slow, from: watcher, to: '*', delay: 7 ms}, {id: wild, from: '*', to: '*', delay: 1 ms,"
+    " jitter: {shape: gamma, sd: 3 ms}, loss: 20 %, order: free}]",
+    "capture.frames_every='10 ticks'",
+)
+
+
+def noise(size: int, *key: object) -> bytes:
+    """Bytes that depend on the key alone."""
+    return shake_128(repr(key).encode()).digest(size)
+
+
+@dataclass
+class HubRun:
+    """What a driven hub gave: the journal's records, the closings, and the state's bytes after each record."""
+
+    text: str
+    deployment: Deployment
+    core: HubCore
+    records: list[bytes] = field(default_factory=list)
+    snapshots: list[bytes] = field(default_factory=list)
+    closings: list[Closing] = field(default_factory=list)
+    deliveries: dict[int, list[bytes]] = field(default_factory=dict)
+    downs: list[tuple[str, Go | Down]] = field(default_factory=list)
+    head: bytes = b""
+    """The head that a new journal file would have at the end."""
+
+
+class Driver:
+    """Plays supervisor, nodes and clients to one hub."""
+
+    def __init__(self, sets: Sequence[str] = SETS) -> None:
+        text = apply_sets(TABLE.read_text(), NAME, sets)
+        self.deployment = load_deployment(text, NAME)
+        self.core = HubCore("boot", bytes(32), 0)
+        self.run = HubRun(text, self.deployment, self.core)
+        self.sent = dict.fromkeys((*self.deployment.players, WATCHER), 0)
+        self.tick = -1
+        self._now_ns = 0
+
+    def say(self, channel: channels.Channel, name: str, payload: bytes) -> None:
+        self._now_ns = (self.tick + 1) * self.deployment.tick_ns
+        self.core.receive(channel, name, payload, self._now_ns)
+        self.core.advance(self._now_ns)
+        self._perform()
+
+    def _perform(self) -> None:
+        actions = [*self.core.actions]
+        self.core.actions.clear()
+        for action in actions:
+            if isinstance(action, Journal):
+                self.run.records.append(action.record)
+            elif isinstance(action, Keep):
+                self.run.closings.append(action.closing)
+            elif isinstance(action, Publish) and action.channel is channels.DELIVERIES:
+                deliveries = decode(Deliveries, action.payload)
+                self.run.deliveries.setdefault(deliveries.tick, []).append(action.payload)
+            elif isinstance(action, Publish) and action.channel is channels.DOWN:
+                message = decode_any(Go | Down, action.payload)
+                self.run.downs.append((action.name, message))
+                if isinstance(message, Go):
+                    self._done(action.name, message.tick)
+
+    def start(self) -> None:
+        build = Build("vhub", "boot", "run-1", NAME, self.run.text, "fast", [])
+        self.say(channels.BUILD, "vhub", encode(build))
+        for name, player in self.deployment.players.items():
+            wanted = [Subscription(robot, heard) for robot, names in player.robots.items() for heard in names]
+            self.join(name, self.deployment.ticks(player.rate_hz), wanted)
+        self.say(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], [], [])))
+
+    def join(self, name: str, period: int, wanted: list[Subscription], boot: str = "one") -> None:
+        hello = ClientHello(name, boot, limits.PROTOCOL_VERSION, "", 0)
+        self.say(channels.CLIENT_HELLO, name, encode(hello))
+        self.say(channels.UP, name, encode(Join(name, boot, period, wanted)))
+
+    def close(self, last: bool = False) -> None:
+        """Bring the hub through one more tick."""
+        self.tick += 1
+        tick = self.tick
+        self._clients_before(tick)
+        frame = self.frame(tick)
+        commit = Commit(1, tick, frame.digest, frame.values.tobytes(), frame.outbox_items, self.edits(tick), last)
+        self.say(channels.COMMIT, channels.VHUB, encode(commit))
+        if last:
+            return
+        robots = [entity.name for entity in frame.layout.robots]
+        for node, names in (("n1", robots[:4]), ("n2", robots[2:])):
+            packets = [packet for name in names for packet in self._samples(tick, name)]
+            self.say(channels.SAMPLES, node, encode(Samples(tick, bytes(32), node, names, [])))
+            self.say(channels.SAMPLES, node, encode(Samples(tick, frame.digest, node, names, packets)))
+        assert self.core.state is not None and self.core.state.closed == tick
+        self.run.snapshots.append(self.core.state.snapshot())
+
+    def end(self) -> HubRun:
+        """Give the hub a last frame and end the run."""
+        self.run.head = self.core.head()
+        self.close(last=True)
+        self.say(channels.END, channels.SUPERVISOR, encode(End(self.tick, "enough", False)))
+        assert self.core.finished
+        return self.run
+
+    # --- the world ---------------------------------------------------------------------------------------------------
+
+    def frame(self, tick: int) -> Frame:
+        """A frame whose numbers are all different from tick to tick; `down` is the only one that means something."""
+        added = [AddedEntity("ball2", "ball")] if ADDED_AT <= tick < REMOVED_AT else []
+        layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in added])
+        numbers = initial_numbers(self.deployment, layout)
+        for entity in layout.rods:
+            at = entity.offsets["joint_positions"]
+            numbers[at : at + 2] = np.frombuffer(noise(16, tick, entity.name), np.uint64).astype(float) * 2.0**-66
+        numbers[layout["red.attack"].offsets["down"]] = float(DOWN_FROM <= tick < DOWN_TO)
+        outboxes = {layout["red.goal"].index: noise(9, "outbox", tick)} if tick % 3 == 0 else {}
+        return Frame(tick, layout, np.array(numbers), outboxes)
+
+    def edits(self, tick: int) -> list[Edit]:
+        """The edits of the order that led to frame `tick`."""
+        if tick == ADDED_AT:
+            return [Add("ball2", "ball", (0.1, -0.0, 1e-9), (0.0, 1.0, -2.5))]
+        if tick == PUSHED_AT:
+            return [Push("ball", (0.01, 1 / 3, -0.0)), Stop("a stop that is none")]
+        return [Remove("ball2")] if tick == REMOVED_AT else []
+
+    def _samples(self, tick: int, robot: str) -> list[RobotPacket]:
+        sensors = sorted(self.deployment.robots[robot].sensors)
+        if tick % 2:
+            return []
+        packets = [RobotPacket(robot, i, "", name, noise(16, tick, robot)) for i, name in enumerate(sensors)]
+        if robot == "red.goal":
+            packets += [
+                RobotPacket(robot, len(sensors), "blue.goal", "talk", noise(5, tick)),
+                RobotPacket(robot, len(sensors) + 1, "nobody", "talk", b""),
+            ]
+        return packets
+
+    # --- the clients -------------------------------------------------------------------------------------------------
+
+    def packet(self, name: str, destination: str, channel: str = "position") -> Sent:
+        self.sent[name] += 1
+        sequence = self.sent[name]
+        return Sent(sequence, destination, channel, 1_000_000 + sequence, noise(16, name, sequence))
+
+    def _done(self, name: str, tick: int) -> None:
+        robots = [robot for robot in self.deployment.players[name].robots if robot != "camera"]
+        packets = [self.packet(name, robot) for robot in robots]
+        packets = [*packets[::-1], packets[0], self.packet(name, "nobody"), self.packet(name, "player-red", "chat")]
+        self.say(channels.UP, name, encode(Done(name, "one", tick, packets)))
+
+    def _clients_before(self, tick: int) -> None:
+        wanted = [Subscription("camera", "ball"), Subscription("red.goal", "encoder")]
+        if tick == 3:
+            self.join(WATCHER, 0, wanted)
+        elif tick == GONE_AT:
+            self.core.client_gone(WATCHER, self._now_ns)
+        elif tick == BACK_AT:
+            self.join(WATCHER, 0, wanted[:1], boot="two")
+        boot = "two" if tick >= BACK_AT else "one"
+        if tick >= 3 and not GONE_AT <= tick < BACK_AT:
+            packets = [self.packet(WATCHER, robot) for robot in ("red.attack", "player-blue", "red.attack")]
+            self.say(channels.UP, WATCHER, encode(Up(WATCHER, boot, [*packets, packets[0]])))
+        if tick % 7 == 0:
+            self.say(channels.UP, WATCHER, noise(20, "no message", tick))
+
+
+def drive(ticks: int, sets: Sequence[str] = SETS) -> HubRun:
+    """Drive a hub through a run of `ticks` ticks."""
+    driver = Driver(sets)
+    driver.start()
+    for _ in range(ticks):
+        driver.close()
+    return driver.end()
+
+
+@pytest.fixture(scope="session")
+def hub_run() -> HubRun:
+    """A run of 64 ticks, with everything in it; not to be changed."""
+    return drive(64)

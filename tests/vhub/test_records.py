@@ -1,0 +1,137 @@
+"""The vHub's journal: a fold of its records is the hub, at every record, wherever it is cut."""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import chain, pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+import pytest
+
+from foosim.protocol.codec import decode_any, encode
+from foosim.protocol.errors import Malformed
+from foosim.protocol.journal import Journal, journal_files, read_journal, read_records
+from foosim.protocol.messages import Deliveries
+from foosim.vhub.records import HeadRecord, HubRecord, TickRecord, fold
+from foosim.vhub.rows import plan_of, rows_of
+from foosim.vhub.state import HubState
+
+if TYPE_CHECKING:
+    from tests.vhub.conftest import HubRun
+
+
+def head_of(run: HubRun, tick: int) -> bytes:
+    """The head that a journal file would start with behind the record of `tick`."""
+    names = [entity.name for entity in run.closings[tick].frame.layout.entities]
+    added = [("ball2", "ball")] if "ball2" in names else []
+    return encode(HeadRecord("run-1", run.snapshots[tick], added))
+
+
+def without_wall(row: msgspec.Struct) -> dict[str, object]:
+    content = msgspec.to_builtins(row, builtin_types=(bytes,))
+    return {name: value for name, value in content.items() if not name.startswith("wall_")}
+
+
+def test_the_run_has_everything_in_it(hub_run: HubRun) -> None:
+    """Else the comparisons below would prove little."""
+    causes = {flight.cause for closing in hub_run.closings for flight in closing.fates}
+    assert causes == {"", "random_loss", "rx_down", "in_flight"}
+    state = HubState.restore(hub_run.deployment, hub_run.snapshots[-1])
+    assert state.refusals.keys() == {"no_route", "malformed", "duplicate"}
+    assert sum(len(closing.joins) for closing in hub_run.closings) == 4
+    assert sum(len(closing.leaves) for closing in hub_run.closings) == 1
+    assert {len(closing.frame.layout.entities) for closing in hub_run.closings} == {11, 12}
+    assert all(HubState.restore(hub_run.deployment, snapshot).in_flight() for snapshot in hub_run.snapshots[1:])
+
+
+def test_a_fold_gives_the_hub_at_every_record(hub_run: HubRun) -> None:
+    plan = plan_of(hub_run.deployment)
+    known = None
+    count = 0
+    for tick, (state, closing) in enumerate(fold(hub_run.deployment, hub_run.records)):
+        live = hub_run.closings[tick]
+        assert state.snapshot() == hub_run.snapshots[tick], tick
+        assert [encode(Deliveries(tick + 1, state.deliveries[tick + 1]))] == hub_run.deliveries[tick + 1]
+        assert closing.frame.digest == closing.digest == live.digest
+        folded, kept = rows_of(closing, plan, known), rows_of(live, plan, known)
+        assert [entry[:4] for entry in folded] == [entry[:4] for entry in kept]
+        assert [without_wall(entry[4]) for entry in folded] == [without_wall(entry[4]) for entry in kept]
+        known = closing.frame
+        count += len(folded)
+    assert known is not None and known.tick == len(hub_run.records) - 2 == 63
+    assert count > 600
+
+
+@pytest.mark.parametrize("first", range(0, 63, 7))
+def test_a_fold_from_any_head_goes_on_equally(hub_run: HubRun, first: int) -> None:
+    records = [head_of(hub_run, first), *hub_run.records[first + 2 :]]
+    states = [state.snapshot() for state, _ in fold(hub_run.deployment, records)]
+    assert states == hub_run.snapshots[first + 1 :]
+
+
+def test_every_state_is_its_bytes(hub_run: HubRun) -> None:
+    for snapshot in hub_run.snapshots:
+        assert HubState.restore(hub_run.deployment, snapshot).snapshot() == snapshot
+
+
+def test_the_head_of_the_hub_is_the_state_after_its_last_record(hub_run: HubRun) -> None:
+    assert hub_run.head == head_of(hub_run, 63)
+
+
+def test_a_journal_torn_at_any_byte_of_its_last_records_folds_to_the_one_before(
+    hub_run: HubRun, tmp_path: Path
+) -> None:
+    kept = [head_of(hub_run, 60), *hub_run.records[-3:]]
+    with Journal(tmp_path, "vhub") as journal:
+        for record in kept:
+            journal.append(record)
+    content = journal.path.read_bytes()
+    last, before = len(kept[3]) + 8, len(kept[2]) + 8
+    for cut in range(last + before + 1):
+        journal.path.write_bytes(content[: len(content) - cut])
+        records = list(read_records(journal.path))
+        whole = 4 if cut == 0 else 3 if cut <= last else 2
+        assert records == kept[:whole], cut
+        if cut in (0, 1, last - 1, last, last + 1, last + before - 1, last + before):
+            states = [state.snapshot() for state, _ in fold(hub_run.deployment, records)]
+            assert states == hub_run.snapshots[61 : 60 + whole], cut
+
+
+def test_files_that_turn_and_go_fold_to_the_same_hub(hub_run: HubRun, tmp_path: Path) -> None:
+    with Journal(tmp_path, "vhub", bytes_max=30_000) as journal:
+        journal.append(hub_run.records[0])
+        for tick, record in enumerate(hub_run.records[1:]):
+            journal.append(record)
+            journal.rotate_if_full(partial(head_of, hub_run, tick), tick)
+        files = journal_files(tmp_path, "vhub")
+        assert len(files) > 4
+        whole = [state.snapshot() for state, _ in fold(hub_run.deployment, read_journal(tmp_path, "vhub"))]
+        assert whole == hub_run.snapshots
+        for path, following in pairwise(files):
+            records = chain(read_records(path), read_records(following))
+            states = [state.snapshot() for state, _ in fold(hub_run.deployment, records)]
+            at = hub_run.snapshots.index(states[0])
+            assert states == hub_run.snapshots[at : at + len(states)]
+        journal.forget_before(50)
+        rest = [state.snapshot() for state, _ in fold(hub_run.deployment, read_journal(tmp_path, "vhub"))]
+        assert 14 <= len(rest) < 64 and rest == hub_run.snapshots[-len(rest) :]
+
+
+def test_records_that_are_no_run_are_refused(hub_run: HubRun) -> None:
+    def folded(records: list[bytes]) -> int:
+        return sum(1 for _ in fold(hub_run.deployment, records))
+
+    assert folded(hub_run.records[:1]) == 0
+    with pytest.raises(Malformed):
+        folded([])
+    with pytest.raises(Malformed, match="does not start with its head"):
+        folded(hub_run.records[1:])
+    with pytest.raises(Malformed, match="record 10 of the vHub's journal does not follow on tick 8"):
+        folded([*hub_run.records[:10], *hub_run.records[11:]])
+    record = decode_any(HubRecord, hub_run.records[6])
+    assert isinstance(record, TickRecord) and record.admitted
+    changed = msgspec.structs.replace(record, admitted=record.admitted[:1])
+    with pytest.raises(Malformed, match="its inputs give other deliveries"):
+        folded([*hub_run.records[:6], encode(changed), *hub_run.records[7:10]])

@@ -1,0 +1,201 @@
+"""Rows of a capture: one for each thing that happened, valid by their own schema, readable by viewers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import jsonschema
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words
+from foosim.protocol.frame import Frame
+from foosim.protocol.messages import Add, Edit, Push, Remove, Stop
+from foosim.vhub.rows import (
+    CLIENTS,
+    FRAME,
+    LAYOUT,
+    PACKETS,
+    ROW_TYPES,
+    TICK,
+    CaptureError,
+    ClientRow,
+    EditRow,
+    Entry,
+    FrameRow,
+    LayoutRow,
+    PacketRow,
+    TickRow,
+    delivered_of,
+    edit_of,
+    edit_row,
+    plan_of,
+    row_schema,
+    rows_of,
+)
+
+if TYPE_CHECKING:
+    from tests.vhub.conftest import HubRun
+
+
+@pytest.fixture(scope="module")
+def entries(hub_run: HubRun) -> list[Entry]:
+    """All rows of the run, in the order in which a writer writes them."""
+    plan = plan_of(hub_run.deployment)
+    known: Frame | None = None
+    made: list[Entry] = []
+    for closing in hub_run.closings:
+        made += rows_of(closing, plan, known)
+        known = closing.frame
+    return made
+
+
+def rows(entries: list[Entry], kind: type[Any]) -> list[Any]:
+    return [entry[4] for entry in entries if type(entry[4]) is kind]
+
+
+def test_each_thing_that_happened_has_one_row(hub_run: HubRun, entries: list[Entry]) -> None:
+    account = hub_run.core.statistics()
+    assert [row.tick for row in rows(entries, TickRow)] == list(range(65))
+    assert [row.tick for row in rows(entries, LayoutRow)] == [0, 25, 45]
+    assert [row.tick for row in rows(entries, FrameRow)] == [0, 10, 20, 30, 40, 50, 60]
+    events = [(row.tick, row.client, row.event, row.period) for row in rows(entries, ClientRow)]
+    assert events == [
+        (0, "player-blue", "joins", 5),
+        (0, "player-red", "joins", 5),
+        (3, "watcher", "joins", 0),
+        (35, "watcher", "leaves", 0),
+        (50, "watcher", "joins", 0),
+    ]
+    packets = rows(entries, PacketRow)
+    fates = Counter(row.fate for row in packets)
+    assert len(packets) == account.offered
+    assert fates == {"delivered": account.delivered, "dropped": account.dropped, "in_flight": account.in_flight}
+    keys = Counter((row.source, row.destination, row.sequence, row.copy) for row in packets)
+    assert set(keys.values()) == {1}
+
+
+def test_a_frame_that_is_known_brings_its_packets_alone(hub_run: HubRun) -> None:
+    last = hub_run.closings[-1]
+    topics = {entry[0] for entry in rows_of(last, plan_of(hub_run.deployment), last.frame)}
+    assert last.fates and topics == {PACKETS}
+
+
+def test_rows_stand_at_their_simulated_times(hub_run: HubRun, entries: list[Entry]) -> None:
+    row: Any
+    for topic, log_ns, publish_ns, sequence, row in entries:
+        if topic == PACKETS:
+            assert (log_ns, publish_ns) == (row.sent_ns, row.stamp_ns or row.sent_ns)
+            assert sequence == row.sequence % 2**32
+        else:
+            assert log_ns == publish_ns == row.tick * hub_run.deployment.tick_ns
+            assert sequence == row.tick
+
+
+def test_rows_are_valid_by_their_schemas(entries: list[Entry]) -> None:
+    encoder = msgspec.json.Encoder()
+    for topic, kind in ROW_TYPES.items():
+        schema = row_schema(kind)
+        jsonschema.Draft202012Validator.check_schema(schema)
+        validator = jsonschema.Draft202012Validator(schema)
+        contents = [entry[4] for entry in entries if entry[0] == topic]
+        assert contents and all(type(row) is kind for row in contents)
+        for row in contents:
+            raw = encoder.encode(row)
+            validator.validate(msgspec.json.decode(raw))
+            assert msgspec.json.decode(raw, type=kind) == row
+
+
+def parse_as_viewers_do(schema: Any, place: str) -> None:
+    """What Lichtblick's and Foxglove's reader of JSON schemas accepts (`parseJsonSchema.ts`); it throws at the rest."""
+    assert schema["type"] == "object", place
+    for name, field in schema["properties"].items():
+        at = f"{place}.{name}"
+        if field["type"] == "object":
+            parse_as_viewers_do(field, at)
+        elif field["type"] == "array":
+            items = field["items"]
+            if items["type"] == "object":
+                parse_as_viewers_do(items, at)
+            else:
+                assert items["type"] in {"boolean", "string", "number", "integer"}, at
+                assert "contentEncoding" not in items, at
+        else:
+            assert field["type"] in {"boolean", "string", "number", "integer"}, at
+            assert field.get("contentEncoding") in {None, "base64"}, at
+
+
+@pytest.mark.parametrize("topic", sorted(ROW_TYPES))
+def test_viewers_can_parse_the_schema(topic: str) -> None:
+    parse_as_viewers_do(row_schema(ROW_TYPES[topic]), topic)
+
+
+def test_a_tick_holds_what_it_is_computed_from(hub_run: HubRun, entries: list[Entry]) -> None:
+    for row, closing in zip(rows(entries, TickRow), hub_run.closings, strict=True):
+        frame = closing.frame
+        assert row.digest == frame.digest.hex()
+        assert row.entities == [frame.entity_digest(entity).hex() for entity in frame.layout.entities]
+        assert [edit_of(edit) for edit in row.edits] == list(closing.edits)
+        assert [delivered_of(delivered) for delivered in row.deliveries] == list(closing.delivered)
+    assert sum(len(row.deliveries) for row in rows(entries, TickRow)) > 100
+    assert [row.tick for row in rows(entries, TickRow) if row.edits] == [25, 30, 45]
+
+
+def test_frames_are_kept_byte_for_byte(hub_run: HubRun, entries: list[Entry]) -> None:
+    for row in rows(entries, FrameRow):
+        frame = hub_run.closings[row.tick].frame
+        assert row.values == frame.values.tobytes()
+        assert {outbox.index: outbox.packets for outbox in row.outboxes} == frame.outboxes
+    assert any(row.outboxes for row in rows(entries, FrameRow))
+
+
+def test_a_verdict_can_be_told_from_the_inputs_in_its_row(hub_run: HubRun, entries: list[Entry]) -> None:
+    """The words are the packet's own keyed draws; that of loss decides the loss, and is there when it was asked."""
+    threshold = chance_threshold(0.2)
+    seen = set()
+    for row in rows(entries, PacketRow):
+        words = draw_words(draw_key(hub_run.deployment.seed, "link", row.source, row.destination), row.sequence)
+        lost = row.cause == "random_loss"
+        seen.add((row.rule, row.fate, row.cause))
+        assert row.size == len(row.payload)
+        assert (row.fate == "dropped") == (row.cause != "")
+        assert (row.due_ns == -1) == (row.arrival_tick == -1) == lost
+        if row.rule == "slow":
+            assert row.loss_word == row.jitter_word == ""
+            assert row.due_ns >= row.sent_ns + 7_000_000
+        else:
+            assert row.loss_word == f"{words[Slot.LOSS]:016x}"
+            assert (words[Slot.LOSS] < threshold) == lost
+            assert row.jitter_word == ("" if lost else f"{words[Slot.JITTER]:016x}")
+    assert {fate for _, fate, _ in seen} == {"delivered", "dropped", "in_flight"}
+    assert {cause for rule, _, cause in seen if rule == "slow"} == {"", "rx_down"}
+
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+vectors = st.tuples(numbers, numbers, numbers)
+names = st.text(min_size=1, max_size=32)
+edits = st.one_of(
+    st.builds(Add, names, names, vectors, vectors),
+    st.builds(Remove, names),
+    st.builds(Push, names, vectors),
+    st.builds(Stop, st.text()),
+)
+
+
+@given(edits)
+def test_an_edit_comes_back_to_the_last_bit(edit: Edit) -> None:
+    raw = msgspec.json.encode(edit_row(edit))
+    back = edit_of(msgspec.json.decode(raw, type=EditRow))
+    assert repr(back) == repr(edit)  # tells -0.0 from 0.0
+
+
+def test_an_edit_of_a_wrong_shape_is_refused() -> None:
+    with pytest.raises(CaptureError, match="a vector of 2 numbers, it has 3"):
+        edit_of(EditRow("push", "ball", impulse=[0.0, 1.0]))
+
+
+def test_topics_are_those_of_the_readme() -> None:
+    assert {TICK, LAYOUT, FRAME, PACKETS, CLIENTS} == set(ROW_TYPES)
