@@ -11,7 +11,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot
+from math import sqrt
 
 from foosim.protocol.deployment import Deployment, RodRobot
 from foosim.protocol.layout import Layout
@@ -60,7 +60,8 @@ def reach_of(deployment: Deployment, layout: Layout) -> Reach:
     """Return the bounding volumes of a layout's bodies."""
     table = deployment.table
     rod = table.rod
-    corner = hypot(rod.foot_radius, rod.foot.length / 2)
+    half = rod.foot.length / 2
+    corner = sqrt(rod.foot_radius * rod.foot_radius + half * half)
     tick_s = deployment.tick_ns / 1e9
     rods = []
     for entity in layout.rods:

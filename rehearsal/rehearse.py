@@ -7,18 +7,22 @@ Neighbours: `system` runs, `rehearse_command` is the terminal's side.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.core import RunSettings
 from foosim.supervisor.status import result
+from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.records import Closing
 
 
 @dataclass(slots=True)
@@ -55,12 +59,13 @@ def rehearse(
     sets: Sequence[str] = (),
     settings: Settings | None = None,
     pace: Pace | None = None,
-    prepare: Any = None,
+    prepare: Callable[[System], None] | None = None,
+    capture: Path | None = None,
 ) -> Rehearsed:
     """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on those that it declares).
 
     `prepare` is called with the built system before it runs: a test's or notebook's place to ask for things at ticks.
-    Raises DeploymentError for a bad text.
+    Raises DeploymentError for a bad text, CaptureError when `capture` exists or cannot be written.
     """
     text = apply_sets(text, name, sets) if nodes is None else with_nodes(text, name, nodes, sets)
     settings = settings or Settings()
@@ -73,7 +78,9 @@ def rehearse(
             on_commit(frame)
 
     settings.on_commit = committed
-    system = System(RunSettings(settings.run, name, text, pace or Pace("fast"), ticks), settings)
+    pace = pace or Pace("fast")
+    writer = None if capture is None else _open_capture(capture, text, name, settings, pace)
+    system = System(RunSettings(settings.run, name, text, pace, ticks), settings)
     if prepare is not None:
         prepare(system)
     begun_ns = time.perf_counter_ns()
@@ -81,8 +88,34 @@ def rehearse(
         system.run()
     finally:
         system.close()
+        if writer is not None:
+            writer.finish()
     wall_ns = time.perf_counter_ns() - begun_ns
     rehearsed.json = result(system.supervisor)
     rehearsed.json["rtf"] = round(rehearsed.json["ticks"] * rehearsed.json["tick_ns"] / wall_ns, 3)
+    rehearsed.json["capture"] = None if capture is None else str(capture)
     rehearsed.answers = system.answers
     return rehearsed
+
+
+def _open_capture(path: Path, text: str, name: str, settings: Settings, pace: Pace) -> CaptureWriter:
+    """Open a capture that gets all closings and log lines of a rehearsal."""
+    metadata = {"run": settings.run, "pace": str(pace), "fingerprint": library_fingerprint().hex()}
+    writer = CaptureWriter(path, load_deployment(text, name), name, text, metadata)
+    on_closing, on_say = settings.on_closing, settings.on_say
+    tick = 0
+
+    def keep(closing: Closing) -> None:
+        nonlocal tick
+        tick = closing.frame.tick
+        writer.keep(closing)
+        if on_closing is not None:
+            on_closing(closing)
+
+    def log(process: str, level: str, line: str) -> None:
+        writer.log(level, f"{process}: {line}", tick)
+        if on_say is not None:
+            on_say(process, level, line)
+
+    settings.on_closing, settings.on_say = keep, log
+    return writer

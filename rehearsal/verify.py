@@ -6,26 +6,15 @@ nodes, and names the first tick and entity that differ. Neighbours: `replica` co
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next
-from foosim.protocol.messages import Delivered, Edit
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
-
-
-@dataclass(frozen=True, slots=True)
-class CapturedTick:
-    """One tick as the capture has it: the frame's digests, and the inputs of the tick that led to it."""
-
-    tick: int
-    digest: bytes
-    entities: Sequence[bytes]
-    """64-bit digests, in name order; may be empty."""
-    edits: Sequence[Edit]
-    delivered: Sequence[Delivered]
+from foosim.vhub.capture_reader import CapturedTick, open_capture
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +32,13 @@ class Verified:
     @property
     def equal(self) -> bool:
         return self.tick < 0 and self.missing_tick < 0
+
+
+def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
+    """Verify a capture file. Raises CaptureError for one that cannot be read."""
+    capture = open_capture(path)
+    about = capture.about
+    return verify(about.deployment_text, about.deployment_name, capture.captured_ticks(), nodes)
 
 
 def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1) -> Verified:

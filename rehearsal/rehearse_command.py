@@ -1,0 +1,66 @@
+"""The command `foosim-rehearse`: a deployment in one process on virtual time. A shell over `rehearse`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foosim.protocol import limits
+from foosim.protocol.codec import encode_json
+from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.protocol.errors import BadValue
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings
+from foosim.supervisor.plan import RunOptions, make_plan
+
+app = new_app("Rehearse a deployment: the whole system in one process on virtual time.")
+
+
+@app.command()
+def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
+    file: Annotated[Path, typer.Argument(help="The deployment file.", show_default=False)],
+    duration: Annotated[str, typer.Option("--for", help="Simulated time to run, e.g. 20s.")],
+    seed: Annotated[int | None, typer.Option(help="Seed of all random draws; short for --set seed=N.")] = None,
+    nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN; each has an engine of its own.")] = 1,
+    engine: Annotated[str | None, typer.Option(help="bullet or pure; short for --set engine=NAME.")] = None,
+    sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
+    capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
+    version: VersionOption = False,
+) -> None:
+    """Rehearse a deployment: supervisor, vHub, nodes and players in one process, as fast as it goes.
+
+    The same cores, messages and bytes as in the processes of `foosim-supervisor up`: with lockstep players the digests
+    are those of `up`, whatever the number of nodes.
+
+    Exit codes: 0 done, 1 failed, 2 bad input.
+    """
+    if not 1 <= nodes <= limits.NODES_MAX:
+        raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
+    settings = (*(sets or []), *([f"engine={engine}"] if engine is not None else []))
+    plan = make_plan(RunOptions(file, "fast", duration, seed, settings))
+    free = sorted(name for name, player in plan.deployment.players.items() if not player.lockstep)
+    if free:
+        raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))
+
+    def show(process: str, level: str, text: str) -> None:
+        if level != "info":
+            typer.echo(f"{process}: {level}: {text}", err=True)
+
+    settled = Settings(on_say=show)
+    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settled, capture=capture).json
+    if json:
+        typer.echo(encode_json(result).decode())
+    else:
+        score, seconds = result["score"], result["ticks"] * result["tick_ns"] / 1e9
+        typer.echo(f"{seconds:.2f} s simulated at {result['rtf']}x, red {score['red']} : {score['blue']} blue")
+        typer.echo(f"{result['handovers']} hand-overs of the ball, packets {result['packets']}")
+        typer.echo(f"digest of all ticks {result['digest']['chain']}")
+    raise typer.Exit(FAILED if result["failed"] else DONE)
+
+
+def main() -> None:
+    """The entry point of `foosim-rehearse`."""
+    run_app(app)

@@ -1,0 +1,99 @@
+"""The command `foosim-replay`: what a capture holds, and whether it repeats. A shell over `verify` and the reader."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+from foosim.protocol import limits
+from foosim.protocol.codec import encode_json
+from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.protocol.errors import BadValue
+from foosim.rehearsal.verify import Verified, verify_capture
+from foosim.vhub.capture_reader import CaptureInfo, capture_info
+
+app = new_app("Look into a capture, and simulate it again.")
+
+Capture = Annotated[Path, typer.Argument(help="The capture, an MCAP file.", show_default=False)]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+
+
+@app.callback()
+def foosim_replay(version: VersionOption = False) -> None:
+    """Look into a capture, and simulate it again.
+
+    Exit codes: 0 done, 1 differs or failed, 2 bad input, 3 refused.
+    """
+
+
+@app.command()
+def info(capture: Capture, json: Json = False) -> None:
+    """Show what a capture holds: run, duration, digests, packets, topics."""
+    found = capture_info(capture)
+    typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
+
+
+def _describe(found: CaptureInfo) -> str:
+    packets = found.packets
+    state = (
+        "finished" if found.finished else f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
+    )
+    lines = [
+        f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
+        *(f"  {key}: {value}" for key, value in sorted({**found.metadata, **found.end}.items())),
+        f"  {found.ticks} ticks of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
+        f"  digest of the last frame {found.digest}",
+        f"  digest of all ticks {found.chain}",
+        f"  packets {', '.join(f'{count} {fate}' for fate, count in packets.items())}",
+        "  topics",
+        *(f"    {topic}: {count}" for topic, count in found.topics.items()),
+        "  versions",
+        *(f"    {name}: {number}" for name, number in sorted(found.versions.items())),
+    ]
+    return "\n".join(lines)
+
+
+@app.command()
+def verify(
+    capture: Capture,
+    nodes: Annotated[int, typer.Option(help="Number of nodes to simulate on.")] = 1,
+    json: Json = False,
+) -> None:
+    """Simulate a capture again from its orders and deliveries, and compare the digest of every tick.
+
+    Names the first tick and the entities that differ. The number of nodes need not be the capture's.
+    """
+    if not 1 <= nodes <= limits.NODES_MAX:
+        raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
+    found = verify_capture(capture, nodes)
+    typer.echo(encode_json(_as_json(found)).decode() if json else _verdict(found))
+    raise typer.Exit(DONE if found.equal else FAILED)
+
+
+def _as_json(found: Verified) -> dict[str, Any]:
+    return {
+        "equal": found.equal,
+        "ticks": found.ticks,
+        "nodes": found.nodes,
+        "chain": found.chain.hex(),
+        "tick": found.tick if found.tick >= 0 else None,
+        "entities": list(found.entities),
+        "missing_tick": found.missing_tick if found.missing_tick >= 0 else None,
+    }
+
+
+def _verdict(found: Verified) -> str:
+    on = f"on {found.nodes} node{'s' if found.nodes > 1 else ''}"
+    if found.equal:
+        return f"equal: {found.ticks} ticks simulated again {on}, digest of all ticks {found.chain.hex()}"
+    if found.missing_tick >= 0:
+        return f"tick {found.missing_tick} is missing; {found.ticks} ticks before it are equal {on}"
+    return f"differs at tick {found.tick} in {', '.join(found.entities)}; the ticks before it are equal {on}"
+
+
+def main() -> None:
+    """The entry point of `foosim-replay`."""
+    run_app(app)

@@ -1,0 +1,114 @@
+"""Captures repeat: verified on any number of nodes, equal when run twice, and one flipped bit is found at its tick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+import pytest
+from typer.testing import CliRunner
+
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.messages import Delivered
+from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.replay_command import app
+from foosim.rehearsal.system import System
+from foosim.rehearsal.verify import verify, verify_capture
+from foosim.vhub.capture_reader import CapturedTick, open_capture
+from foosim.vhub.mcap_file import McapFile, Message
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TEXT = TABLE.read_text()
+TICKS = 700
+
+
+def disturb(system: System) -> None:
+    """Ask for everything that changes world or owners."""
+    system.at_tick(50, lambda: system.request("push", impulse=[0.03, 0.01, 0.0]))
+    system.at_tick(120, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
+    system.at_tick(300, lambda: system.request("move", robot="red.goal", node="n2"))
+    system.at_tick(400, lambda: system.request("remove", name="ball2"))
+
+
+def capture_to(path: Path, engine: str = "pure", nodes: int = 2) -> Rehearsed:
+    result = rehearse(TEXT, TABLE.name, TICKS, nodes, [f"engine={engine}"], prepare=disturb, capture=path)
+    assert all(answer.accepted for answer in result.answers.values()) and len(result.answers) == 4
+    return result
+
+
+@pytest.mark.parametrize("engine", ["bullet", "pure"])
+@pytest.mark.parametrize("nodes", [1, 3])
+def test_a_capture_is_simulated_again_bit_for_bit(tmp_path: Path, engine: str, nodes: int) -> None:
+    result = capture_to(tmp_path / "run.mcap", engine)
+    verified = verify_capture(tmp_path / "run.mcap", nodes)
+    assert verified.equal and verified.ticks == TICKS
+    assert verified.chain.hex() == result.json["digest"]["chain"]
+
+
+def messages_of(path: Path) -> dict[str, list[tuple[int, int, bytes]]]:
+    """Return (log time, sequence, content) of every topic but the log; JSON without its wall-clock fields."""
+    topics: dict[str, list[tuple[int, int, bytes]]] = {}
+    with path.open("rb") as stream:
+        for content in McapFile(stream, path.stat().st_size, str(path)).contents():
+            if isinstance(content, Message) and content.topic != "/log":
+                data = content.data
+                if data[:1] == b"{":
+                    row = {key: value for key, value in msgspec.json.decode(data).items() if not key.startswith("wall")}
+                    data = msgspec.json.encode(row)
+                topics.setdefault(content.topic, []).append((content.log_ns, content.sequence, data))
+    return topics
+
+
+def test_law_2_two_runs_give_equal_captures(tmp_path: Path) -> None:
+    capture_to(tmp_path / "one.mcap")
+    capture_to(tmp_path / "two.mcap")
+    one, two = messages_of(tmp_path / "one.mcap"), messages_of(tmp_path / "two.mcap")
+    assert sorted(one) == sorted(two)
+    assert {"/tick", "/frame", "/packets", "/tf", "/scene"} <= set(one)
+    for topic, messages in one.items():
+        assert messages == two[topic], topic
+
+
+def flipped(ticks: Sequence[CapturedTick], at: int) -> list[CapturedTick]:
+    """Return the ticks with the lowest bit of one delivered command flipped, in the inputs of tick `at`'s frame."""
+    changed = list(ticks)
+    tick = changed[at]
+    packet = tick.delivered[0]
+    payload = bytes([packet.payload[0] ^ 1]) + packet.payload[1:]
+    delivered = [Delivered(*[getattr(packet, name) for name in Delivered.__struct_fields__[:-1]], payload)]
+    changed[at] = CapturedTick(tick.tick, tick.digest, tick.entities, tick.edits, delivered + tick.delivered[1:])
+    return changed
+
+
+def test_one_flipped_bit_of_one_command_is_found_at_its_tick(tmp_path: Path) -> None:
+    capture_to(tmp_path / "run.mcap")
+    capture = open_capture(tmp_path / "run.mcap")
+    ticks = list(capture.captured_ticks())
+    name, text = capture.about.deployment_name, capture.about.deployment_text
+    with_commands = [tick.tick for tick in ticks if tick.delivered]
+    for at in (with_commands[0], with_commands[len(with_commands) // 2], with_commands[-1]):
+        found = verify(text, name, flipped(ticks, at), nodes=2)
+        assert (found.tick, found.entities) == (at, (ticks[at].delivered[0].destination,))
+
+
+def test_a_missing_tick_is_named(tmp_path: Path) -> None:
+    capture_to(tmp_path / "run.mcap")
+    capture = open_capture(tmp_path / "run.mcap")
+    ticks = [tick for tick in capture.captured_ticks() if tick.tick != 77]
+    found = verify(capture.about.deployment_text, capture.about.deployment_name, ticks)
+    assert not found.equal and found.missing_tick == 77
+
+
+def test_the_command_says_what_it_found(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    result = capture_to(path)
+    runner = CliRunner()
+    done = runner.invoke(app, ["verify", str(path), "--nodes", "2"])
+    assert done.exit_code == 0 and result.json["digest"]["chain"] in done.output
+    shown = runner.invoke(app, ["info", str(path), "--json"])
+    assert shown.exit_code == 0
+    content = msgspec.json.decode(shown.output)
+    assert content["ticks"] == TICKS and content["chain"] == result.json["digest"]["chain"]
+    assert content["packets"]["offered"] == result.json["packets"]["offered"]
+    assert load_deployment(open_capture(path).about.deployment_text, "x").world == "table"
