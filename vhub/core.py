@@ -166,13 +166,15 @@ class HubCore:
 
     def client_gone(self, name: str, now_ns: int) -> None:
         """A client's presence has ended: a lockstep one ends the run, a free-running one leaves it."""
-        session = self.sessions.by_name.pop(name, None)
-        if session is None or self.state is None or self.ended is not None:
+        if name not in self.sessions.by_name or self.state is None or self.ended is not None:
             return
-        member = self.state.members.get(name)
+        member = self.sessions.joins.get(name) or self.state.members.get(name)
         if member is not None and member.period > 0:
-            self._lose(name, "its connection closed")
-        elif member is not None:
+            self._lose(name, "its connection closed")  # its session stays: a tick may be waiting for it
+            return
+        self.sessions.by_name.pop(name)
+        self.sessions.joins.pop(name, None)
+        if name in self.state.members:
             self._leaves.append(name)
 
     def statistics(self) -> HubStatistics:
