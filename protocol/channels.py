@@ -130,6 +130,8 @@ TICK_KEYS: Final = "foosim/simulation/tick/**"
 """What every tick brings to nodes and supervisor: each waits in one queue for all of it."""
 HUB_KEYS: Final = "foosim/simulation/hub/**"
 """What every tick brings to the vHub. A commit for another one passes by."""
+DOWN_KEYS: Final = "foosim/radio/down/{name}/**"
+"""What every tick brings to a client."""
 
 ALIVE: Final = {
     Plane.SIMULATION: "foosim/simulation/alive/{name}",

@@ -37,8 +37,9 @@ class Wire:
     def read(self, reads: Sequence[tuple[Channel, bool]], at_every_tick: str = "") -> None:
         """Read these channels: (channel, whether only what is addressed to this name).
 
-        `at_every_tick` is a key expression of those for which the reader waits itself: the shortest way.
+        `at_every_tick` is an expression of the keys for which the reader waits itself: the shortest way.
         """
+        at_every_tick = at_every_tick.replace("{name}", self.name)
         mine = {channel.key for channel, own in reads if own}
         wanted = {channel.key for channel, _ in reads}
 
@@ -52,8 +53,8 @@ class Wire:
         if at_every_tick:
             self.session.receive(at_every_tick, read_key, self._inbox)
         for channel, own in reads:
-            if channel.plane is self.plane and not (prefix and channel.key.startswith(prefix)):
-                key = channel.key_for(self.name) if own else channel.key_for_all
+            key = channel.key_for(self.name) if own else channel.key_for_all
+            if channel.plane is self.plane and not (prefix and f"{key}/".startswith(prefix)):
                 self.session.subscribe(key, channel.key, self._inbox)
 
     def put(self, channel: Channel, name: str, payload: bytes) -> None:
