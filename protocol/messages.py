@@ -1,6 +1,7 @@
 """The messages of both planes, as typed structs that are their own schema.
 
 On the wire each is a MessagePack array: the tag (`part.1`: name and protocol version), then the fields in order.
+Hello and refusal are the same in every version and have none in their tags, so that both sides can name a mismatch.
 Decoding validates: unknown fields, negative counters, oversized lists and bytes are refused. Number arrays travel as
 raw little-endian float64 bytes. Floats are checked to be finite where they are used, since msgspec does not.
 Neighbours: `codec` encodes and decodes, `channels` says which message travels where.
@@ -187,7 +188,7 @@ class Heartbeat(Message, frozen=True):
 # --- simulation plane: who takes part --------------------------------------------------------------------------------
 
 
-class Hello(Message, frozen=True):
+class Hello(Message, frozen=True, tag="hello"):
     """A process asks to take part. `world` is empty when it takes whatever world it finds."""
 
     role: Name
@@ -220,7 +221,7 @@ class Build(Message, frozen=True):
     added: Added
 
 
-class Refusal(Message, frozen=True):
+class Refusal(Message, frozen=True, tag="refusal"):
     """The supervisor will not have this process, and why."""
 
     name: Name
@@ -309,7 +310,7 @@ class Subscription(Item, frozen=True):
     channel: Name
 
 
-class ClientHello(Message, frozen=True):
+class ClientHello(Message, frozen=True, tag="clienthello"):
     """A client asks to be let in. `received` is the last downlink number it has."""
 
     name: Name
@@ -331,7 +332,7 @@ class ClientWelcome(Message, frozen=True):
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
 
 
-class ClientRefusal(Message, frozen=True):
+class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
     """The vHub will not have this client, and why."""
 
     name: Name
