@@ -56,16 +56,6 @@ from foosim.vhub.rows import (
 _DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
 
 
-class _TickHead(msgspec.Struct, gc=False):
-    """The part of a tick's row that is looked at when all are counted."""
-
-    tick: int
-    digest: str
-
-
-_TICK_HEAD: Final = msgspec.json.Decoder(_TickHead)
-
-
 @dataclass(frozen=True, slots=True)
 class CapturedTick:
     """One tick as the capture has it: the frame's digests, and the inputs of the tick that led to it."""
@@ -246,9 +236,9 @@ def open_capture(path: Path | str) -> CaptureData:
     clients: list[ClientRow] = []
     for message in scan.messages():
         if message.topic == TICK:
-            head = scan.decode(_DECODERS[TICK], message)
-            ticks.append(head.tick)
-            digests.append(bytes.fromhex(head.digest))
+            tick_row = scan.decode(_DECODERS[TICK], message)
+            ticks.append(tick_row.tick)
+            digests.append(bytes.fromhex(tick_row.digest))
         elif message.topic == LAYOUT:
             layouts.append(scan.decode(_DECODERS[LAYOUT], message))
             frames.append([])
@@ -328,11 +318,8 @@ def capture_info(path: Path | str) -> CaptureInfo:
     for message in scan.messages():
         topics[message.topic] += 1
         if message.topic == TICK:
-            head = scan.decode(_TICK_HEAD, message)
-            try:
-                tick, digest = head.tick, bytes.fromhex(head.digest)
-            except ValueError:
-                raise CaptureError(f"{path}: {TICK} at {message.log_ns} ns: {head.digest!r} is no digest") from None
+            row = scan.decode(_DECODERS[TICK], message)
+            tick, digest = row.tick, bytes.fromhex(row.digest)
             chain = chain_next(chain, digest) if tick > 0 else chain
         elif message.topic == PACKETS:
             fates[scan.decode(_DECODERS[PACKETS], message).fate] += 1

@@ -295,11 +295,11 @@ class CaptureWriter:
     def _create(self) -> int:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-        except FileExistsError:
-            raise CaptureError(f"{self.path}: exists already; a capture is never overwritten") from None
+            if not os.path.lexists(self.path):
+                return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise CaptureError(f"{self.path}: cannot be created, {error.strerror}") from None
+        raise CaptureError(f"{self.path}: exists already; a capture is never overwritten")
 
     def _declare(self) -> dict[str, int]:
         """Declare all topics, also those that stay empty."""

@@ -273,6 +273,7 @@ class McapFile:
         self._topics: dict[int, str] = {}
         self.profile = ""
         self.library = ""
+        self._ended = False
         self.finished = False
         """Whether the file's end was reached, and was an end."""
         self.unfinished_bytes = 0
@@ -283,7 +284,7 @@ class McapFile:
         if self._stream.read(len(MAGIC)) != MAGIC:
             raise CaptureError(f"{self._name}: no MCAP file, it does not start with {MAGIC!r}")
         self._at = len(MAGIC)
-        while not self.finished:
+        while not self._ended:
             record = self._next_record()
             if record is None:
                 self._end_unfinished()
@@ -304,6 +305,14 @@ class McapFile:
         self._stream.seek(max(0, self._size - len(MAGIC)))
         if self._stream.read(len(MAGIC)) == MAGIC and self.unfinished_bytes:
             raise self._damaged("it is longer than the file")
+
+    def _end(self, rest: bytes) -> None:
+        """Stop at the footer, behind which there is only `rest`."""
+        if not MAGIC.startswith(rest):
+            raise ValueError("the file does not end behind its footer")
+        self._ended = True
+        self.finished = rest == MAGIC
+        self.unfinished_bytes = 0 if self.finished else len(rest)
 
     def _next_record(self) -> tuple[int, bytes] | None:
         """Return opcode and content of the next record, None where the file ends within it."""
@@ -335,9 +344,7 @@ class McapFile:
             header = records.Header.read(_stream(content))
             self.profile, self.library = header.profile, header.library
         elif opcode == Opcode.FOOTER:
-            if self._stream.read(len(MAGIC) + 1) != MAGIC:
-                raise ValueError("the file does not end behind its footer")
-            self.finished = True
+            self._end(self._stream.read(len(MAGIC) + 1))
 
     def _declare(self, content: bytes) -> None:
         channel = records.Channel.read(_stream(content))

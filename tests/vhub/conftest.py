@@ -93,6 +93,8 @@ class Driver:
         self.core = HubCore("boot", bytes(32), 0)
         self.run = HubRun(text, self.deployment, self.core)
         self.sent = dict.fromkeys((*self.deployment.players, WATCHER), 0)
+        self.answers = True
+        """Whether players answer Go."""
         self.tick = -1
         self._now_ns = 0
 
@@ -116,7 +118,7 @@ class Driver:
             elif isinstance(action, Publish) and action.channel is channels.DOWN:
                 message = decode_any(Go | Down, action.payload)
                 self.run.downs.append((action.name, message))
-                if isinstance(message, Go):
+                if isinstance(message, Go) and self.answers:
                     self._done(action.name, message.tick)
 
     def start(self) -> None:
@@ -147,7 +149,10 @@ class Driver:
             packets = [packet for name in names for packet in self._samples(tick, name)]
             self.say(channels.SAMPLES, node, encode(Samples(tick, bytes(32), node, names, [])))
             self.say(channels.SAMPLES, node, encode(Samples(tick, frame.digest, node, names, packets)))
-        assert self.core.state is not None and self.core.state.closed == tick
+        assert self.core.state is not None
+        if self.core.state.closed < tick:
+            assert not self.answers
+            return
         self.run.snapshots.append(self.core.state.snapshot())
 
     def end(self) -> HubRun:
@@ -228,6 +233,23 @@ def drive(ticks: int, sets: Sequence[str] = SETS) -> HubRun:
     for _ in range(ticks):
         driver.close()
     return driver.end()
+
+
+@pytest.fixture(scope="session")
+def half_closed_run() -> HubRun:
+    """A run that ends by a failure while its tick 15 waits for the players."""
+    driver = Driver()
+    driver.start()
+    for _ in range(15):
+        driver.close()
+    driver.answers = False
+    driver.close()
+    driver.say(channels.END, channels.SUPERVISOR, encode(End(15, "player-red is lost", True)))
+    driver.tick += 100_000
+    driver.core.wake((driver.tick + 1) * driver.deployment.tick_ns)
+    driver.say(channels.END, channels.SUPERVISOR, encode(End(15, "player-red is lost", True)))
+    assert driver.core.finished
+    return driver.run
 
 
 @pytest.fixture(scope="session")

@@ -78,6 +78,15 @@ def test_each_thing_that_happened_has_one_row(hub_run: HubRun, entries: list[Ent
     assert set(keys.values()) == {1}
 
 
+def test_a_run_that_ends_within_a_tick_has_the_fates_of_the_half_that_was_closed(half_closed_run: HubRun) -> None:
+    """Packets that robots sent at tick 15 are judged, and some have arrived, before the players are asked."""
+    account = half_closed_run.core.statistics()
+    assert account.closed == 14 and half_closed_run.closings[-1].frame.tick == 15
+    fates = Counter(flight.cause for closing in half_closed_run.closings for flight in closing.fates)
+    assert (fates.total(), fates[""], fates["in_flight"]) == (account.offered, account.delivered, account.in_flight)
+    assert any(not flight.cause for flight in half_closed_run.closings[-1].fates)
+
+
 def test_a_frame_that_is_known_brings_its_packets_alone(hub_run: HubRun) -> None:
     last = hub_run.closings[-1]
     topics = {entry[0] for entry in rows_of(last, plan_of(hub_run.deployment), last.frame)}
