@@ -42,7 +42,7 @@ class NodeProcess:
         self._loop.connect(self._wire)
         self._loop.turn = self._turn
         self._loop.on_alive = self._on_alive
-        self._wire.read(channels.NODE_READS, channels.TICK_KEYS)
+        self._wire.read(channels.NODE_READS, channels.NODE_WAITS)
         self._wire.watch_alive(SUPERVISOR)
 
     def run(self) -> int:
@@ -94,7 +94,7 @@ def run_node(name: str, connect: str, world: str = "") -> int:
         return node.run()
 
 
-app = new_app("A simulation node: computes its share of the world that a supervisor runs.")
+app = new_app()
 
 
 @app.command()
@@ -115,7 +115,7 @@ def node(
 
 def main() -> None:
     """Entry of `foosim-node`."""
-    run_app(app)
+    run_app(app, "foosim-node")
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ FAILED: Final = 1
 BAD_INPUT: Final = 2
 REFUSED: Final = 3
 INTERRUPTED: Final = 130
+HELP_WIDTH_MAX: Final = 100
 
 
 def _show_version(wanted: bool) -> None:
@@ -33,10 +34,10 @@ VersionOption = Annotated[
 ]
 
 
-def new_app(help_text: str) -> typer.Typer:
+def new_app() -> typer.Typer:
     """Return a command with foosim's habits: help on no arguments, no shell completion to install, plain tracebacks."""
     return typer.Typer(
-        help=help_text,
+        context_settings={"max_content_width": HELP_WIDTH_MAX},
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
@@ -44,10 +45,10 @@ def new_app(help_text: str) -> typer.Typer:
     )
 
 
-def run_app(app: typer.Typer) -> None:
-    """Run a command and exit with its code; what is refused is shown without a traceback."""
+def run_app(app: typer.Typer, name: str) -> None:
+    """Run the command `name` and exit with its code; what is refused is shown without a traceback."""
     try:
-        app()
+        app(prog_name=name)
     except Refused as refused:
         print(str(refused), file=sys.stderr)
         sys.exit(refused.exit_code)

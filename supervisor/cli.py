@@ -24,9 +24,9 @@ from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.supervisor.run_folder import create_run, open_run, run_exists
 from foosim.supervisor.up import Killed, Up, check_capture, default_capture
 
-app = new_app("Run a distributed simulation, and control one that runs.")
+app = new_app()
 
-File = Annotated[Path, typer.Argument(help="The deployment file.", show_default=False)]
+File = Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
 Run = Annotated[str | None, typer.Option("--run", help="The run that is meant; by default the newest live one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 PaceOption = Annotated[str | None, typer.Option("--pace", help="realtime, fast, or a factor such as 2x.")]
@@ -68,9 +68,10 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     run: RunName = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
 ) -> None:
-    """Run a deployment: supervisor, vHub, nodes and players as processes of this machine, until Ctrl-C or --for.
+    """Run all that a deployment declares, on this machine, until Ctrl-C or --for.
 
-    Ctrl-C ends the run in order and leaves a finished capture; a second one kills everything. Nodes that the deployment
+    Supervisor, vHub, nodes and players are processes of their own, each with a log; they end with this command. Ctrl-C
+    ends the run in order and leaves a finished capture; a second one kills everything. Nodes that the deployment
     declares as `launch: manual` are waited for; their command line is printed.
     """
     if no_capture and capture is not None:
@@ -102,9 +103,10 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     insecure: Insecure = False,
     run: RunName = None,
 ) -> None:
-    """Run the supervisor alone; vHub, nodes and players are started by hand or by other means.
+    """Run a supervisor alone.
 
-    `up` starts this command as a child. The run's folder has the run file, logs and journals.
+    vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
+    folder has the run file, logs and journals.
     """
     plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
@@ -192,18 +194,21 @@ def move(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Have another node own a robot; the simulated world does not notice."""
+    """Have another node own a robot; the world does not notice."""
     _show(control.move(robot, node, run), json)
 
 
-@app.command()
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
 def push(
     impulse: Annotated[Numbers, typer.Argument(help="Impulse in N s: X Y Z.", show_default=False)],
     name: Annotated[str, typer.Option(help="Which ball.")] = "ball",
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Give a ball an impulse; 0.021 N s makes the table's ball 1 m/s faster."""
+    """Give a ball an impulse.
+
+    On a ball of 21 g, 0.021 N s are 1 m/s.
+    """
     _show(control.push(impulse, name, run), json)
 
 
@@ -220,7 +225,10 @@ def _show(answer: Answer, json: bool) -> None:
 
 @app.command()
 def validate(file: File, json: Json = False) -> None:
-    """Check a deployment file: all problems at once, one a line, as file:line:column: what, value, nearest name."""
+    """Check a deployment file.
+
+    All problems are shown at once, one a line: file:line:column: what, value, nearest valid name.
+    """
     deployment = load_deployment(read_deployment_text(file), str(file))
     content = {
         "world": deployment.world,
@@ -234,7 +242,7 @@ def validate(file: File, json: Json = False) -> None:
 
 def main() -> None:
     """Entry of `foosim-supervisor`."""
-    run_app(app)
+    run_app(app, "foosim-supervisor")
 
 
 if __name__ == "__main__":

@@ -92,7 +92,7 @@ def _head(status: dict[str, Any]) -> Text:
 
 def _processes(status: dict[str, Any]) -> Table:
     """Nodes with what they own, solve and how busy they are; then the other processes."""
-    table = Table(title="processes", title_justify="left", expand=False, show_edge=False)
+    table = Table(title="processes", title_justify="left", box=None, pad_edge=False)
     for column, justify in (("name", "left"), ("owns", "left"), ("solved ticks", "right"), ("load", "right")):
         table.add_column(column, justify=justify)  # type: ignore[arg-type]
     table.add_column("waits for", no_wrap=True)
@@ -118,7 +118,7 @@ def _listed(names: list[str]) -> str:
 
 def _links(status: dict[str, Any]) -> Table:
     """A row per directed link, the busiest first when there are too many, and a last one for all."""
-    table = Table(title="links", title_justify="left", expand=False, show_edge=False)
+    table = Table(title="links", title_justify="left", box=None, pad_edge=False)
     table.add_column("from")
     table.add_column("to")
     for column in ("offered", "delivered", "dropped", "mean delay"):

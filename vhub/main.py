@@ -68,7 +68,7 @@ class HubProcess:
         self._loop.other = self._keep
         self._loop.on_alive = self._on_alive
         self._loop.on_say = self._on_say
-        self._wire.read(channels.VHUB_READS, channels.HUB_KEYS)
+        self._wire.read(channels.VHUB_READS, channels.VHUB_WAITS)
         self._radio.read(channels.VHUB_READS)
         self._wire.watch_alive(SUPERVISOR)
         self._radio.watch_alive()
@@ -181,7 +181,7 @@ def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions) -> 
         return hub.run()
 
 
-app = new_app("The virtual hub: carries every packet between robots and clients over the emulated network.")
+app = new_app()
 
 
 @app.command()
@@ -207,7 +207,7 @@ def vhub(
 
 def main() -> None:
     """Entry of `foosim-vhub`."""
-    run_app(app)
+    run_app(app, "foosim-vhub")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,141 @@
+"""The command `foosim-supervisor` without a run: help, what it refuses before anything starts, exit codes."""
+
+import json
+import sys
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from foosim.supervisor import cli
+from foosim.supervisor.run_folder import runs_folder
+
+TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
+COMMANDS = (
+    *("up", "run", "status", "pause", "resume", "step", "rate", "add", "remove", "move", "push", "down", "validate"),
+)
+
+
+class Done(NamedTuple):
+    """What a command left."""
+
+    code: object
+    out: str
+    err: str
+
+
+Command = Callable[..., Done]
+
+
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Command:
+    """Runs `foosim-supervisor` with arguments, in an empty folder."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str | Path) -> Done:
+        monkeypatch.setattr(sys, "argv", ["foosim-supervisor", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        printed = capsys.readouterr()
+        return Done(ended.value.code, printed.out, printed.err)
+
+    return run
+
+
+def test_help_names_every_command_and_the_exit_codes(command: Command) -> None:
+    done = command("--help")
+    assert done.code == 0
+    for name in COMMANDS:
+        assert f"\n  {name} " in done.out
+    assert "Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 second Ctrl-C" in done.out
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_command_says_what_it_does(command: Command, name: str) -> None:
+    done = command(name, "--help")
+    assert done.code == 0
+    assert f"Usage: foosim-supervisor {name}" in done.out
+
+
+def test_the_version_is_that_of_the_package(command: Command) -> None:
+    assert command("--version") == (0, f"foosim {version('foosim')}\n", "")
+
+
+def test_a_valid_file_is_summed_up(command: Command) -> None:
+    assert command("validate", TABLE).out == f"{TABLE}: valid, world table, 9 robots on 2 nodes, 2 players\n"
+    assert json.loads(command("validate", TABLE, "--json").out) == {
+        "world": "table",
+        "robots": 9,
+        "nodes": ["blue", "red"],
+        "players": ["player-blue", "player-red"],
+    }
+
+
+def test_all_problems_of_a_file_are_shown_with_their_places(command: Command, tmp_path: Path) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text(TABLE.read_text().replace("seed: 1\n", "seed: -1\n").replace("engine: bullet", "engine: bulet"))
+    done = command("validate", path)
+    assert done.code == 2
+    lines = done.err.splitlines()
+    assert [line.split(": ")[1] for line in lines] == ["seed", "engine"]
+    assert all(line.startswith(f"{path}:") for line in lines)
+    assert "nearest is 'bullet'" in lines[1]
+
+
+def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
+    done = command("up", "nowhere.yaml")
+    assert (done.code, done.err) == (2, "nowhere.yaml:1:1: cannot be read, No such file or directory\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (("--set", "table.ball.mas=27 g"), 2, "--set:1:12: table.ball: unknown key, 'mas', nearest is 'mass'"),
+        (("--set", "seed=2", "--set", "engine=bulet"), 2, "--set:2:8: engine: "),
+        (("--engine", "bulet"), 2, "nearest is 'bullet'"),
+        (("--pace", "quick"), 2, "not a pace (realtime, fast or a factor such as 2x), 'quick'"),
+        (("--for", "20"), 2, "not a time"),
+        (("--for", "0 s"), 2, "a run has at least one tick"),
+        (("--seed", "-1"), 2, "seed: "),
+        (("--listen", "nowhere:x"), 2, "not an address (HOST, HOST:PORT or tcp/HOST:PORT), 'nowhere:x'"),
+        (("--listen", "127.0.0.1:65535"), 2, "no room for 2 ports"),
+        (("--listen", "0.0.0.0"), 3, "say --insecure if that is meant"),
+        (("--run", "Über"), 3, "is no name for a run"),
+        (("--capture", "a.mcap", "--no-capture"), 2, "exclude each other"),
+        (("--bogus",), 2, "No such option"),
+    ],
+)
+def test_what_is_wrong_with_a_run_is_said_before_anything_starts(
+    command: Command, arguments: tuple[str, ...], code: int, text: str
+) -> None:
+    done = command("up", TABLE, *arguments)
+    assert text in done.err
+    assert done.code == code
+    assert not runs_folder().exists() or list(runs_folder().iterdir()) == []
+
+
+def test_an_existing_capture_is_refused_before_anything_starts(command: Command, tmp_path: Path) -> None:
+    capture = tmp_path / "mine.mcap"
+    capture.write_bytes(b"precious")
+    done = command("up", TABLE, "--for", "1s", "--capture", capture)
+    assert (done.code, done.err) == (3, f"{capture} exists, and a capture is never overwritten\n")
+    assert capture.read_bytes() == b"precious"
+    assert not runs_folder().exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("status",), ("pause",), ("step", "3"), ("push", "0", "0", "1"), ("move", "red.goal", "blue"), ("down",)],
+)
+def test_without_a_live_run_there_is_nobody_to_control(command: Command, arguments: tuple[str, ...]) -> None:
+    assert command(*arguments) == (1, "", "no run is live; foosim-supervisor up FILE starts one\n")
+
+
+def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
+    assert command("step", "many").code == 2
+    assert command("step", "0").code == 2
+    assert command("push", "0", "0").code == 2

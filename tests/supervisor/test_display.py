@@ -1,0 +1,121 @@
+"""What a person sees: every figure that the run has is in the table and, shorter, in the plain line."""
+
+import io
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.units import parse_pace
+from foosim.supervisor.core import RunSettings, SupervisorCore
+from foosim.supervisor.display import LINKS_SHOWN_MAX, Display, plain_line, render_text
+from foosim.supervisor.status import status
+
+TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
+
+
+@pytest.fixture
+def running() -> dict[str, Any]:
+    """The status of a run in full swing."""
+    return {
+        "run": "table-1",
+        "world": "table",
+        "ticks": 6170,
+        "tick_ns": 2_000_000,
+        "rtf": 0.998,
+        "pace": "realtime",
+        "state": "running",
+        "handovers": 41,
+        "moves": 2,
+        "waiting_for": "red",
+        "score": {"red": 2, "blue": 1},
+        "lag_ms": {"p50": 0.31, "p99": 1.62, "max": 7.4},
+        "late": {"lag_ms": 0.7, "waited_for": "player-blue", "tick": 6169},
+        "ball": {"position": [0.123, -0.045, 0.0175], "solver": "red"},
+        "packets": {"offered": 22510, "delivered": 22390, "dropped": 113, "in_flight": 7, "refused": 0},
+        "nodes": {
+            "blue": {"owned": ["blue.attack", "blue.goal"], "solved_ticks": 6001},
+            "red": {"owned": [f"red.{number}" for number in range(8)], "solved_ticks": 6170},
+        },
+        "processes": {
+            "blue": {"role": "node", "busy": 0.314, "tick": 6170, "waiting_for": "order"},
+            "vhub": {"role": "vhub", "busy": 0.22, "tick": 6170, "waiting_for": "Done of player-blue"},
+        },
+        "links": [
+            ["player-red", "red.goal", 1234, 1220, 9, 1_302_000],
+            ["camera", "player-red", 617, 612, 4, 1_297_000],
+        ],
+    }
+
+
+def row_of(text: str, *words: str) -> str:
+    """The one line of the table with all these words."""
+    (line,) = [line for line in text.splitlines() if all(word in line for word in words)]
+    return line
+
+
+def test_the_table_has_time_pace_lag_score_and_ball(running: dict[str, Any]) -> None:
+    text = render_text(running)
+    assert "12.34 s · tick 6170 · realtime 1.00x" in text
+    assert "red 2 : 1 blue · ball at +0.123 -0.045 +0.018 m, solved by red · 41 hand-overs, 2 moves" in text
+    assert "lag 0.7 ms (p50 0.3, p99 1.6, max 7.4), waited for player-blue" in text
+
+
+def test_a_row_for_each_node_with_what_it_owns_solved_and_its_load(running: dict[str, Any]) -> None:
+    text = render_text(running)
+    assert row_of(text, "blue.attack").split() == ["blue", "blue.attack,", "blue.goal", "6001", "31%", "order"]
+    assert "red.5 and 2 more" in row_of(text, "not here yet")
+    assert "6170" in row_of(text, "not here yet")
+    assert row_of(text, "vhub").split() == ["vhub", "22%", "Done", "of", "player-blue"]
+
+
+def test_a_row_for_each_link_and_one_for_all(running: dict[str, Any]) -> None:
+    text = render_text(running)
+    assert row_of(text, "1234").split() == ["player-red", "red.goal", "1234", "1220", "9", "1.30", "ms"]
+    assert row_of(text, "617 ").split() == ["camera", "player-red", "617", "612", "4", "1.30", "ms"]
+    assert row_of(text, "22510").split() == ["all", "22510", "22390", "113", "7", "in", "flight"]
+
+
+def test_of_too_many_links_the_busiest_are_shown(running: dict[str, Any]) -> None:
+    running["links"] = [["camera", f"player-{number}", number, number, 0, 0] for number in range(LINKS_SHOWN_MAX + 5)]
+    text = render_text(running)
+    assert row_of(text, "player-5 ")
+    assert "player-4 " not in text
+    assert "and 5 more" in row_of(text, "all", "22510")
+
+
+def test_the_plain_line_has_the_same_in_short(running: dict[str, Any]) -> None:
+    assert plain_line(running) == (
+        "12.34 s | realtime 1.00x | lag 0.7 ms (p50 0.3, p99 1.6, max 7.4), waited for player-blue | red 2 : 1 blue | "
+        "ball at +0.123 -0.045 +0.018 m, solved by red | packets 22510 offered, 22390 delivered, 113 dropped | "
+        "load blue 31% vhub 22%"
+    )
+
+
+def test_fast_has_no_lag_and_a_pause_says_so(running: dict[str, Any]) -> None:
+    running |= {"lag_ms": None, "pace": "fast", "state": "paused"}
+    assert "lag" not in plain_line(running)
+    assert " | fast, paused | " in plain_line(running)
+    assert "lag" not in render_text(running)
+
+
+def test_before_the_first_tick_it_says_who_is_waited_for() -> None:
+    settings = RunSettings("run", "table.yaml", TABLE.read_text(), parse_pace("realtime"))
+    content = status(SupervisorCore(settings, library_fingerprint(), 0), 0)
+    assert plain_line(content) == "starting, waiting for blue, red, vhub"
+    assert "waiting for blue, red, vhub" in render_text(content)
+    assert "not here yet" in row_of(render_text(content), "blue.attack")
+
+
+def test_a_display_that_is_no_terminal_prints_lines_with_the_speed_since_the_last(running: dict[str, Any]) -> None:
+    stream = io.StringIO()
+    with Display(stream) as display:
+        display.say("run [bold]table-1[/bold]")
+        display.show(running, 100.0)
+        display.show({**running, "ticks": 6420}, 102.0)
+    lines = stream.getvalue().splitlines()
+    assert lines[0] == "run [bold]table-1[/bold]"
+    assert lines[1].startswith("12.34 s | realtime 1.00x | ")
+    assert lines[2].startswith("12.84 s | realtime 0.25x | ")
+    assert not display.is_live
