@@ -67,10 +67,8 @@ class McapWriter:
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._chunk = bytearray()
         self._index: dict[int, array[int]] = {}
-        self._first_ns, self._last_ns = sys.maxsize, 0
-        """Times of the messages in the chunk."""
         self._start_ns, self._end_ns = sys.maxsize, 0
-        """Times of the messages in the file."""
+        """Times of the first and the last message."""
         self._put(MAGIC)
         self._put_record(records.Header(profile, f"foosim {version('foosim')}, mcap {version('mcap')}"))
 
@@ -133,21 +131,21 @@ class McapWriter:
         self._index[channel].extend((log_ns, len(chunk)))
         chunk += _MESSAGE.pack(Opcode.MESSAGE, 22 + len(data), channel, sequence, log_ns, publish_ns)
         chunk += data
-        self._first_ns = min(self._first_ns, log_ns)
-        self._last_ns = max(self._last_ns, log_ns)
 
     def end_chunk(self) -> None:
         """Compress and write what is collected, with its indexes; nothing if it is empty."""
         if not self._chunk:
             return
         chunk, size, offset = bytes(self._chunk), len(self._chunk), self._offset
+        times = [entries[::2] for entries in self._index.values() if entries]
+        first_ns, last_ns = min(map(min, times)), max(map(max, times))
         data = self._compressor.compress(chunk)
         name = COMPRESSION.encode()
         head = _CHUNK.pack(
             Opcode.CHUNK,
             _CHUNK.size - _RECORD.size + len(data),
-            self._first_ns,
-            self._last_ns,
+            first_ns,
+            last_ns,
             size,
             crc32(chunk),
             len(name),
@@ -163,16 +161,15 @@ class McapWriter:
                 compression=COMPRESSION,
                 compressed_size=len(data),
                 uncompressed_size=size,
-                message_start_time=self._first_ns,
-                message_end_time=self._last_ns,
+                message_start_time=first_ns,
+                message_end_time=last_ns,
                 message_index_offsets=offsets,
                 message_index_length=len(indexes),
             )
         )
-        self._start_ns = min(self._start_ns, self._first_ns)
-        self._end_ns = max(self._end_ns, self._last_ns)
+        self._start_ns = min(self._start_ns, first_ns)
+        self._end_ns = max(self._end_ns, last_ns)
         self._chunk.clear()
-        self._first_ns, self._last_ns = sys.maxsize, 0
 
     def _message_indexes(self, offset: int) -> tuple[bytes, dict[int, int]]:
         """Return the chunk's message index records, to be written at `offset`, and where each channel's is."""

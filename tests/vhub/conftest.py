@@ -57,8 +57,9 @@ DOWN_FROM, DOWN_TO = 20, 40
 GONE_AT, BACK_AT = 35, 50
 SETS = (
     "clients={watcher: {lockstep: false}}",
-    "network.links=[{id: slow, from: watcher, to: '*', delay: 7 ms}, {id: wild, from: '*', to: '*', delay: 1 ms,"
-    " jitter: {shape: gamma, sd: 3 ms}, loss: 20 %, order: free}]",
+    "network.links=[{id: slow, from: watcher, to: '*', delay: 7 ms},"
+    " {id: steady, from: '*', to: red.goal, delay: 1 ms, jitter: {shape: gamma, sd: 1 ms}},"
+    " {id: wild, from: '*', to: '*', delay: 1 ms, jitter: {shape: gamma, sd: 3 ms}, loss: 20 %, order: free}]",
     "capture.frames_every='10 ticks'",
 )
 

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 import zstandard
 from mcap.reader import make_reader
-from mcap.records import Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Chunk, Message, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -227,6 +227,19 @@ def test_the_mcap_library_reads_it_with_checksums_and_index(path: Path, hub_run:
         assert sum(1 for _ in StreamReader(file, validate_crcs=True).records) > sum(counts.values())
 
 
+def test_every_chunk_tells_the_times_of_its_messages(chunked: bytes) -> None:
+    """By these a viewer that seeks chooses its chunks."""
+    chunks = [c for c in StreamReader(BytesIO(chunked), emit_chunks=True).records if isinstance(c, Chunk)]
+    summary = make_reader(BytesIO(chunked)).get_summary()
+    assert summary is not None and len(chunks) == len(summary.chunk_indexes) > 8
+    for chunk, index in zip(chunks, summary.chunk_indexes, strict=True):
+        times = [
+            message.log_time for message in breakup_chunk(chunk, validate_crc=True) if isinstance(message, Message)
+        ]
+        assert (chunk.message_start_time, chunk.message_end_time) == (min(times), max(times))
+        assert (index.message_start_time, index.message_end_time) == (min(times), max(times))
+
+
 def test_rows_are_json_valid_by_the_schemas_in_the_file(path: Path) -> None:
     with path.open("rb") as file:
         seen: Counter[str] = Counter()
@@ -380,6 +393,16 @@ def test_what_is_no_capture_is_told_so(tmp_path: Path, hub_run: HubRun) -> None:
         open_capture(mcap_with(path, "foosim", about, "format: 1\nworld: [\n"))
 
 
+def test_ticks_that_go_back_are_refused(hub_run: HubRun, tmp_path: Path) -> None:
+    path = tmp_path / "back.mcap"
+    writer = new_writer(path, hub_run)
+    for tick in (0, 2, 1):
+        writer.keep(hub_run.closings[tick])
+    writer.finish()
+    with pytest.raises(CaptureError, match=r"back\.mcap: tick 1 comes behind tick 2"):
+        open_capture(path)
+
+
 def test_damaged_files_are_refused_or_read_and_nothing_else(chunked: bytes, tmp_path: Path) -> None:
     """Bits flipped at many places: a checksum or a schema notices, or the bit stood where nothing depends on it."""
     path = tmp_path / "damaged.mcap"
@@ -463,6 +486,7 @@ def test_a_lagging_writer_slows_the_run_says_so_once_and_loses_nothing(
     writer = Gated(path, hub_run.deployment, "table.yaml", hub_run.text, {}, say)
     for closing in hub_run.closings:
         writer.keep(closing)
+        assert writer.statistics().queued_rows <= max(30, 1 + len(closing.fates))
     writer.finish()
     assert writer.statistics().waits > 0 and writer.statistics().queued_rows == 0
     assert [level for level, _ in said] == ["warning"]

@@ -175,11 +175,14 @@ def test_a_verdict_can_be_told_from_the_inputs_in_its_row(hub_run: HubRun, entri
         if row.rule == "slow":
             assert row.loss_word == row.jitter_word == ""
             assert row.due_ns >= row.sent_ns + 7_000_000
+        elif row.rule == "steady":
+            assert (row.loss_word, row.jitter_word) == ("", f"{words[Slot.JITTER]:016x}")
         else:
             assert row.loss_word == f"{words[Slot.LOSS]:016x}"
             assert (words[Slot.LOSS] < threshold) == lost
             assert row.jitter_word == ("" if lost else f"{words[Slot.JITTER]:016x}")
     assert {fate for _, fate, _ in seen} == {"delivered", "dropped", "in_flight"}
+    assert {rule for rule, _, _ in seen} == {"slow", "steady", "wild"}
     assert {cause for rule, _, cause in seen if rule == "slow"} == {"", "rx_down"}
 
 
