@@ -22,7 +22,7 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
-from foosim.protocol.process import die_with_parent, new_boot, on_signals, start_log
+from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
 
 CONNECT_S = 60.0
@@ -41,6 +41,7 @@ class NodeProcess:
         self._loop = Loop(self.core, inbox, start_log(name), lambda now_ns: self.core.deadline_ns())
         self._loop.connect(self._wire)
         self._loop.turn = self._turn
+        self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
         self._wire.read(channels.NODE_READS, channels.NODE_WAITS)
         self._wire.watch_alive(SUPERVISOR)
@@ -88,9 +89,10 @@ def run_node(name: str, connect: str, world: str = "") -> int:
         raise BadValue("not a name for a node", name)
     use_client_runtime()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
-    with Session.client(connect, CONNECT_S) as session:
+    stop = Stop()
+    with Session.client(connect, CONNECT_S, give_up=stop.is_set) as session:
         node = NodeProcess(name, session, inbox, world)
-        on_signals(node.stop)
+        stop.then(node.stop)
         return node.run()
 
 

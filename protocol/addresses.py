@@ -16,7 +16,8 @@ from foosim.protocol.errors import BadValue, Refused
 LOOPBACK: Final = "127.0.0.1"
 PORT_MAX: Final = 65_535
 
-_ADDRESS = re.compile(r"(?:tcp/)?(?P<host>\[[0-9a-fA-F:.]{2,45}\]|[A-Za-z0-9][A-Za-z0-9.-]{0,252})(?::(?P<port>\d{1,5}))?")
+_HOST = r"\[[0-9a-fA-F:.]{2,45}\]|[A-Za-z0-9][A-Za-z0-9.-]{0,252}"
+_ADDRESS = re.compile(rf"(?:tcp/)?(?P<host>{_HOST})(?::(?P<port>[0-9]{{1,5}}))?")
 
 
 class Insecure(Refused):
@@ -73,7 +74,7 @@ def check_listen(text: str, insecure: bool, ports: int = 1) -> Address:
         raise BadValue(f"no room for {ports} ports", text)
     if not address.is_loopback and not insecure:
         raise Insecure(
-            f"{address} is reached by other machines, and whoever reaches it takes part: say --insecure if that is meant"
+            f"{address} is reached by other machines, and whoever reaches it takes part; say --insecure to mean it"
         )
     return address
 

@@ -58,16 +58,28 @@ def new_boot() -> str:
     return f"b{os.urandom(8).hex()}"
 
 
-def on_signals(stop: Callable[[], None]) -> None:
-    """Call `stop` on the first SIGTERM, SIGINT or SIGHUP; a second SIGINT ends the process at once."""
-    seen: list[int] = []
+class Stop:
+    """Whether this process was told to end: by SIGTERM, SIGINT or SIGHUP. A second SIGINT ends it at once."""
 
-    def take(number: int, frame: object) -> None:
-        if seen and number == signal.SIGINT:
+    def __init__(self) -> None:
+        """Take the signals over; only the main thread can."""
+        self._is_set = False
+        self._then: Callable[[], None] = lambda: None
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            signal.signal(number, self._take)
+
+    def is_set(self) -> bool:
+        return self._is_set
+
+    def then(self, call: Callable[[], None]) -> None:
+        """Call this when told to end; at once when that was before."""
+        self._then = call
+        if self._is_set:
+            call()
+
+    def _take(self, number: int, frame: object) -> None:
+        if self._is_set and number == signal.SIGINT:
             os._exit(130)
-        if not seen:
-            stop()
-        seen.append(number)
-
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, take)
+        if not self._is_set:
+            self._is_set = True
+            self._then()

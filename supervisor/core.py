@@ -175,6 +175,12 @@ class SupervisorCore:
             if hub is not None and hub.gone_ns and now_ns > hub.gone_ns + GONE_NS:
                 self.finished = True
 
+    @property
+    def lacking(self) -> Channel:
+        """The channel without which the next commit cannot be made."""
+        complete = len(self._parts.get(self.frame.tick + 1, ())) >= len(self.members)
+        return channels.DELIVERIES if complete and self.frame.tick not in self._deliveries else channels.PART
+
     def deadline_ns(self, now_ns: int) -> int:
         """When the shell has to call again at the latest."""
         deadline = now_ns + limits.HEARTBEAT_NS
@@ -395,6 +401,9 @@ class SupervisorCore:
         if reason:
             self._refuse(hello.role, hello.name, hello.boot, reason)
             return
+        if self.end is not None:
+            self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+            return
         self.roster.take(hello, now_ns)
         settings = self.settings
         build = Build(
@@ -418,6 +427,9 @@ class SupervisorCore:
             self._repeated += 1
             return
         process.heard_ns = now_ns
+        if self.end is not None:
+            self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+            return
         reason = self.roster.note_ready(process, ready)
         if reason:
             self._refuse(process.role, process.name, process.boot, reason)

@@ -19,7 +19,7 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal
 from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.process import die_with_parent, on_signals, start_log
+from foosim.protocol.process import Stop, die_with_parent, start_log
 from foosim.protocol.session import Session
 from foosim.supervisor.core import RunSettings, SupervisorCore
 from foosim.supervisor.plan import Plan
@@ -49,8 +49,9 @@ class SupervisorProcess:
         self._loop.connect(wire)
         self._loop.journal = journal
         self._loop.turn = self._turn
+        self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
-        wire.read(channels.SUPERVISOR_READS, channels.TICK_KEYS)
+        wire.read(channels.SUPERVISOR_READS, channels.SUPERVISOR_WAITS)
         wire.watch_alive()
         wire.declare_alive()
 
@@ -95,7 +96,8 @@ def serve(plan: Plan, folder: RunFolder) -> int:
     die_with_parent()
     folder.hold()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+    stop = Stop()
     with Journal(folder.journals, SUPERVISOR) as journal, Session.router(str(plan.address)) as session:
         supervisor = SupervisorProcess(plan, folder, session, inbox, journal)
-        on_signals(supervisor.stop)
+        stop.then(supervisor.stop)
         return supervisor.run()

@@ -28,6 +28,8 @@ from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
 POLL_S: Final = 0.02
 END_S: Final = 20.0
 """How long a run that is ending may take before its processes are stopped: the vHub has a capture to close."""
+LEAVE_S: Final = 1.0
+"""How long the others may take to end when the supervisor has: it waited for the vHub's capture."""
 LOST_S: Final = 3.0
 """How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
 STATUS_S: Final = 1.0
@@ -90,7 +92,7 @@ class Up:
             try:
                 if self._start():
                     self._watch()
-                self._launcher.wait(END_S if self._lost is None else LOST_S)
+                self._launcher.wait(LEAVE_S if self.folder.result() is not None else END_S)
             finally:
                 self._launcher.stop()
                 self._launcher.close()

@@ -27,7 +27,7 @@ from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
-from foosim.protocol.process import die_with_parent, new_boot, on_signals, start_log
+from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore, Keep
@@ -65,6 +65,7 @@ class HubProcess:
         self._loop.connect(self._wire)
         self._loop.connect(self._radio)
         self._loop.turn = self._turn
+        self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
         self._loop.on_alive = self._on_alive
         self._loop.on_say = self._on_say
@@ -93,7 +94,7 @@ class HubProcess:
 
     def _is_over(self) -> bool:
         core = self.core
-        if self._is_abandoned and core.state is None:
+        if core.state is None and (self._is_abandoned or core.ended is not None):
             return True
         return core.finished or bool(core.member.refusal)
 
@@ -172,12 +173,13 @@ def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions) -> 
     """Run the vHub until its run ends; return the exit code. Raises Refused when there is nobody to connect to."""
     address = check_listen(listen, insecure)
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+    stop = Stop()
     with (
         Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX) as radio,
-        Session.client(connect, CONNECT_S) as simulation,
+        Session.client(connect, CONNECT_S, give_up=stop.is_set) as simulation,
     ):
         hub = HubProcess(simulation, radio, inbox, options)
-        on_signals(hub.stop)
+        stop.then(hub.stop)
         return hub.run()
 
 

@@ -34,7 +34,10 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
 
 
 def report(state: HubState | None, capture: str, radio_address: str) -> bytes:
-    """Return the account so far, and where the radio plane and the capture are. `links` are [from, to, offered, delivered, dropped, mean delay in ns]."""
+    """Return the account so far, and where the radio plane and the capture are.
+
+    `links` are [from, to, offered, delivered, dropped, mean delay in ns].
+    """
     if state is None:
         return encode_json({})
     packets = state.packets

@@ -103,7 +103,7 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--seed", "-1"), 2, "seed: "),
         (("--listen", "nowhere:x"), 2, "not an address (HOST, HOST:PORT or tcp/HOST:PORT), 'nowhere:x'"),
         (("--listen", "127.0.0.1:65535"), 2, "no room for 2 ports"),
-        (("--listen", "0.0.0.0"), 3, "say --insecure if that is meant"),
+        (("--listen", "0.0.0.0"), 3, "say --insecure to mean it"),
         (("--run", "Über"), 3, "is no name for a run"),
         (("--capture", "a.mcap", "--no-capture"), 2, "exclude each other"),
         (("--bogus",), 2, "No such option"),

@@ -1,0 +1,163 @@
+"""Runs of real processes through the commands, each in a folder and a state folder of its own.
+
+Nothing here waits for a time: everything waits for a condition, with a limit that only a run that hangs reaches. The
+machines are shared, so the run's own deadlines are set long, too.
+"""
+
+import os
+import signal
+import subprocess
+import sysconfig
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any, Final, TypeVar
+
+import pytest
+
+from foosim.protocol.errors import Refused
+from foosim.supervisor import control
+from foosim.supervisor.run_folder import RunFolder, RunInfo, live_runs
+
+TABLE: Final = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
+LONG: Final = (
+    "deadlines={heartbeat: 100 s, tick_named: 50 s, tick_lost: 100 s, lockstep_fast: 100 s, lockstep_realtime: 100 s,"
+    " start: 100 s}"
+)
+LIMIT_S: Final = 100.0
+
+T = TypeVar("T")
+
+
+def wait_for(what: str, found: Callable[[], T]) -> T:
+    """Return the first true value of `found`."""
+    deadline_s = time.monotonic() + LIMIT_S
+    while time.monotonic() < deadline_s:
+        value = found()
+        if value:
+            return value
+        time.sleep(0.02)
+    raise AssertionError(f"waited {LIMIT_S} s for {what}")
+
+
+def command_path(name: str) -> str:
+    """Where a command of this environment is."""
+    return str(Path(sysconfig.get_path("scripts")) / name)
+
+
+def processes_with(text: str) -> dict[int, str]:
+    """Process ids and command lines that have this text in them."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            line = (path / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+            if text in line and "State:\tZ" not in (path / "status").read_text():
+                found[int(path.name)] = line
+    return found
+
+
+class House:
+    """Starts commands, and knows the run that is live."""
+
+    table = TABLE
+    wait_for = staticmethod(wait_for)
+    processes_with = staticmethod(processes_with)
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.started: list[subprocess.Popen[str]] = []
+
+    def start(self, name: str, *arguments: str | Path) -> subprocess.Popen[str]:
+        """Start one of foosim's commands, in a process group of its own."""
+        process = subprocess.Popen(
+            [command_path(name), *map(str, arguments)],
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            process_group=0,
+        )
+        self.started.append(process)
+        return process
+
+    def up(self, *arguments: str | Path, players: bool = False) -> subprocess.Popen[str]:
+        """Start a run of the table, without its players unless they are asked for."""
+        bare = () if players else ("--set", "players={}")
+        return self.start("foosim-supervisor", "up", TABLE, "--set", LONG, *bare, *arguments)
+
+    def run(self, name: str, *arguments: str | Path) -> tuple[int, str, str]:
+        """Run a command to its end; return exit code, output and errors."""
+        return self.end(self.start(name, *arguments))
+
+    @staticmethod
+    def end(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+        """Wait for a process to end; return exit code, output and errors."""
+        out, err = process.communicate(timeout=LIMIT_S)
+        return process.returncode, out, err
+
+    @staticmethod
+    def read_until(stream: IO[str] | None, text: str) -> str:
+        """Read lines until one has this text; return it."""
+        assert stream is not None
+        for line in stream:
+            if text in line:
+                return line
+        raise AssertionError(f"the output ended without {text!r}")
+
+    def live(self) -> RunFolder:
+        """The run that is live, as soon as one is."""
+        return wait_for("a live run", live_runs)[0]
+
+    def info(self) -> RunInfo:
+        """Its run file, once clients can find it."""
+        folder = self.live()
+
+        def complete() -> RunInfo | None:
+            info = folder.info()
+            return info if info is not None and info.radio else None
+
+        return wait_for("the radio plane's address", complete)
+
+    def ticking(self, ticks: int = 1) -> dict[str, Any]:
+        """The status of the live run, once it has come so far."""
+
+        def status() -> dict[str, Any] | None:
+            with suppress(Refused):
+                content = control.status()
+                return content if content["ticks"] >= ticks else None
+            return None
+
+        self.live()
+        return wait_for(f"tick {ticks}", status)
+
+    def pid_of(self, process: str) -> int:
+        """The process id of a process of the live run."""
+        info = self.info()
+        if process == "supervisor":
+            return info.pid
+        marks = {"vhub": "foosim-vhub"}
+        mark = marks.get(process, f"--name {process}")
+        (pid,) = [
+            pid
+            for address in (info.simulation, info.radio)
+            for pid, line in processes_with(f"--connect {address}").items()
+            if f"{mark} " in f"{line} "
+        ]
+        return pid
+
+    def kill(self, process: str, number: signal.Signals = signal.SIGKILL) -> None:
+        os.kill(self.pid_of(process), number)
+
+
+@pytest.fixture
+def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
+    """A place for runs; whatever a test leaves running is killed, children with their launcher."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("COLUMNS", "200")
+    made = House(tmp_path)
+    yield made
+    for process in made.started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()

@@ -1,0 +1,294 @@
+"""A run of real processes through the commands: it ends in order, whoever ends it, and says who was lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from foosim.protocol.units import parse_pace
+from foosim.rehearsal.rehearse import rehearse
+from foosim.supervisor import control
+from foosim.supervisor.control import Control, RequestRefused
+from foosim.vhub.capture_reader import open_capture
+
+if TYPE_CHECKING:
+    from tests.wire.conftest import House
+
+KEYS = {
+    *("ticks", "tick_ns", "rtf", "lag_ms", "digest", "packets", "nodes", "moves", "handovers", "score", "capture"),
+}
+
+
+def last_json(out: str) -> dict[str, Any]:
+    """The object in the last line."""
+    content = json.loads(out.splitlines()[-1])
+    assert isinstance(content, dict)
+    return content
+
+
+def assert_finished(house: House, content: dict[str, Any]) -> None:
+    """The capture that a result names is finished and has the run's last frame."""
+    about = open_capture(house.folder / content["capture"]).about
+    assert about.finished
+    assert about.end["reason"] == content["reason"]
+
+
+def test_two_nodes_and_two_players_compute_what_a_rehearsal_computes(house: House) -> None:
+    code, out, err = house.end(house.up("--pace", "fast", "--for", "2s", "--json", players=True))
+    assert code == 0, err
+    content = last_json(out)
+    assert content.keys() >= KEYS
+    assert (content["ticks"], content["tick_ns"], content["lag_ms"], content["reason"]) == (
+        *(1000, 2_000_000, None, "done"),
+    )
+    assert content["rtf"] > 0
+    assert all(node["solved_ticks"] > 0 and node["owned"] for node in content["nodes"].values())
+    assert content["packets"]["dropped"] > 0 and content["packets"]["delivered"] > 0
+    assert_finished(house, content)
+    assert "capture captures/table-" in err, "people are told where it is"
+    assert house.processes_with(str(house.folder)) == {}
+
+    rehearsed = rehearse(house.table.read_text(), "table.yaml", 1000, nodes=None, pace=parse_pace("fast")).json
+    for same in ("digest", "packets", "nodes", "handovers", "score"):
+        assert content[same] == rehearsed[same], same
+
+
+def test_the_processes_stand_in_groups_of_their_own_and_die_with_up(house: House) -> None:
+    up = house.up()
+    info = house.info()
+    house.ticking()
+    lines = house.processes_with(info.simulation)
+    assert any("foosim-node --name red --connect" in line for line in lines.values()), lines
+    assert any("foosim-vhub --connect" in line for line in lines.values()), lines
+    pids = [info.pid, *lines]
+    assert all(os.getpgid(pid) == pid for pid in pids)
+    logs = {path.name for path in house.live().logs.iterdir()}
+    assert logs == {"supervisor.log", "vhub.log", "red.log", "blue.log"}
+    up.kill()
+    house.wait_for("the end of the children", lambda: not any(os.path.exists(f"/proc/{pid}/exe") for pid in pids))
+
+
+def test_ctrl_c_ends_the_run_in_order(house: House) -> None:
+    up = house.up("--json")
+    house.ticking()
+    up.send_signal(signal.SIGINT)
+    code, out, err = house.end(up)
+    assert code == 0, err
+    content = last_json(out)
+    assert (content["reason"], content["failed"]) == ("stopped", False)
+    assert content["ticks"] >= 1
+    assert_finished(house, content)
+
+
+def test_ctrl_c_before_the_first_tick_ends_it_too(house: House) -> None:
+    up = house.up("--set", "nodes.blue.launch=manual", "--json")
+    house.read_until(up.stderr, "waiting for node blue")
+    up.send_signal(signal.SIGINT)
+    code, out, err = house.end(up)
+    assert (code, last_json(out)["ticks"]) == (0, 0), err
+
+
+def test_a_second_ctrl_c_kills_everything(house: House) -> None:
+    up = house.up("--pace", "fast")
+    house.ticking()
+    info = house.info()
+    house.kill("vhub", signal.SIGSTOP)  # so that the run cannot end in order
+    up.send_signal(signal.SIGINT)
+    house.read_until(up.stdout, "a second Ctrl-C kills it")
+    up.send_signal(signal.SIGINT)
+    code, _, err = house.end(up)
+    assert (code, err) == (130, "killed\n")
+    assert house.processes_with(info.simulation) == {}
+
+
+@pytest.mark.parametrize("process", ["red", "vhub", "player-blue", "supervisor"])
+def test_a_process_that_is_lost_ends_the_run_in_order_and_is_named(house: House, process: str) -> None:
+    up = house.up("--json", players=process.startswith("player"))
+    house.ticking(5)
+    house.kill(process)
+    code, out, err = house.end(up)
+    assert code == 1, err
+    assert f"{process} was killed by SIGKILL" in err
+    if process != "supervisor":
+        content = last_json(out)
+        assert content["reason"] == f"lost {process}: its connection closed"
+        assert content["failed"]
+    capture = next((house.folder / "captures").iterdir())
+    if process == "vhub":
+        assert f"{capture.name} (unfinished)" in err
+    else:
+        assert open_capture(capture).about.finished
+    assert house.processes_with(str(house.folder)) == {}
+
+
+def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House) -> None:
+    up = house.up("--set", "players.player-red.class=foosim.client.players:Taem", players=True)
+    code, out, err = house.end(up)
+    assert code == 1, err
+    assert "player-red ended with exit code" in out
+    assert "Taem" in out
+
+
+def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(house: House) -> None:
+    up = house.up("--json")
+    house.ticking(3)
+    code, out, _ = house.run("foosim-supervisor", "pause", "--json")
+    paused = json.loads(out)
+    assert (code, paused["text"]) == (0, f"paused at tick {paused['tick']}")
+    tick = paused["tick"]
+    with control.connect() as asked:
+        assert_paused_at(house, asked, tick)
+        assert asked.ask("step", count=10).tick == tick
+        assert_paused_at(house, asked, tick + 10)
+        assert_the_world_changes_as_asked(house, asked, tick + 10)
+        assert asked.ask("rate", pace="fast").accepted
+        resumed = asked.ask("resume")
+        assert resumed.text == f"resumed at tick {resumed.tick}"
+        house.wait_for("ticks", lambda: asked.status()["ticks"] > resumed.tick)
+        assert asked.status()["pace"] == "fast"
+        last = asked.ask("down").tick
+    code, out, err = house.end(up)
+    assert code == 0, err
+    assert (last_json(out)["ticks"], last_json(out)["moves"]) == (last, 1)
+
+
+def assert_paused_at(house: House, asked: Control, tick: int) -> None:
+    """What is released is computed, and no more."""
+    house.wait_for(f"tick {tick}", lambda: asked.status()["ticks"] == tick)
+    status = asked.status()
+    assert (status["state"], status["ticks"], status["released"]) == ("paused", tick, tick)
+
+
+def assert_the_world_changes_as_asked(house: House, asked: Control, tick: int) -> None:
+    """Push, add, move and remove, each at the first tick that is not yet released."""
+    at_rest = asked.status()["ball"]["position"]
+    assert asked.ask("push", impulse=(0.02, 0.01, 0.0)).tick == tick
+    assert asked.ask("add", position=(0.1, 0.1, 0.0175)).text == f"ball2 added at tick {tick}"
+    moved = asked.ask("move", robot="red.goal", node="blue")
+    assert moved.text == f"red.goal moved to blue at tick {tick}"
+    asked.ask("step", count=30)
+    assert_paused_at(house, asked, tick + 30)
+    assert asked.status()["ball"]["position"] != at_rest
+    assert "red.goal" in asked.status()["nodes"]["blue"]["owned"]
+    with pytest.raises(RequestRefused, match="'ball' was not added; added are ball2"):
+        asked.ask("remove", name="ball")
+    assert asked.ask("remove", name="ball2").tick == tick + 30
+    asked.ask("step", count=5)
+    assert_paused_at(house, asked, tick + 35)
+    with pytest.raises(RequestRefused, match="no free body 'ball2'; there are ball"):
+        asked.ask("push", impulse=(0.0, 0.0, 0.0), name="ball2")
+
+
+def test_a_wrong_name_is_refused_with_the_nearest_one(house: House) -> None:
+    house.up()
+    house.ticking()
+    refused = (3, "", "no robot 'red.gaol', nearest is red.goal\n")
+    assert house.run("foosim-supervisor", "move", "red.gaol", "blue") == refused
+    code, _, err = house.run("foosim-supervisor", "status", "--run", "tabel")
+    assert code == 1 and "no run 'tabel'" in err
+    with pytest.raises(RequestRefused, match="no node 'green'; there are blue, red"):
+        control.move("red.goal", "green")
+
+
+def test_a_node_that_does_not_fit_is_refused_and_costs_the_run_nothing(house: House) -> None:
+    house.up("--set", "clients={}")
+    info = house.info()
+    before = house.ticking(5)["ticks"]
+
+    def node(name: str, *arguments: str) -> tuple[int, str]:
+        code, _, err = house.run("foosim-node", "--name", name, "--connect", info.simulation, *arguments)
+        return code, err
+
+    code, err = node("red")
+    assert code == 3 and "refused by the supervisor: a node red is already here" in err
+    code, err = node("rde")
+    assert code == 3 and "no node rde is declared; declared are blue, red, nearest is red" in err
+    code, err = node("red", "--world", "chess")
+    assert code == 3 and "world chess, this is table" in err
+    code, err = node_of_version_2(house, info.simulation)
+    assert code == 3 and "protocol version 2, this is 1" in err
+    status = house.ticking(before + 1)
+    assert (status["state"], status["epoch"]) == ("running", 1)
+
+
+def node_of_version_2(house: House, address: str) -> tuple[int, str]:
+    """A node whose protocol is another one."""
+    program = "from foosim.protocol import limits; limits.PROTOCOL_VERSION = 2; "
+    program += "from foosim.node.main import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program, "--name", "red", "--connect", address],
+        cwd=house.folder,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    return done.returncode, done.stderr
+
+
+def test_the_run_waits_for_a_node_that_is_started_by_hand(house: House) -> None:
+    up = house.up("--set", "nodes.blue.launch=manual", "--for", "0.2s")
+    line = house.read_until(up.stdout, "waiting for node blue; start it on its machine: ")
+    command = line.split(": ", 1)[1].split()
+    assert command[:4] == ["foosim-node", "--name", "blue", "--connect"]
+    house.wait_for("the others", lambda: control.status()["waiting_for"] == "blue")
+    code, _, err = house.run(*command)
+    assert code == 0, err
+    code, out, _ = house.end(up)
+    assert code == 0
+    assert "the run has ended: done" in out
+
+
+def test_it_listens_where_it_is_told_the_radio_plane_one_port_higher(house: House) -> None:
+    port = free_port()
+    house.up("--listen", f"127.0.0.1:{port}")
+    info = house.info()
+    assert info.simulation.endswith(f":{port}")
+    assert info.radio.endswith(f":{port + 1}")
+    house.ticking()
+
+
+def free_port() -> int:
+    """A port that was free a moment ago, and whose next one was."""
+    with socket.socket() as one, socket.socket() as other:
+        one.bind(("127.0.0.1", 0))
+        port = int(one.getsockname()[1])
+        try:
+            other.bind(("127.0.0.1", port + 1))
+        except OSError:
+            return free_port()
+        return port
+
+
+def test_a_paused_run_sleeps(house: House) -> None:
+    """No process looks round busily: each uses less than 3 % of a core."""
+    house.up(players=True)
+    house.ticking()
+    info = house.info()
+    with control.connect() as asked:
+        assert_paused_at(house, asked, asked.ask("pause").tick)
+    pids = [info.pid, *house.processes_with(f"--connect {info.simulation}"), *house.processes_with(info.radio)]
+    assert len(pids) == 6
+
+    def uptime_s() -> float:
+        with open("/proc/uptime") as file:
+            return float(file.read().split()[0])
+
+    begun_s, before = uptime_s(), {pid: cpu_s(pid) for pid in pids}
+    house.wait_for("two seconds of CPU clocks", lambda: uptime_s() > begun_s + 2.0)
+    used = {pid: (cpu_s(pid) - before[pid]) / (uptime_s() - begun_s) for pid in pids}
+    assert max(used.values()) < 0.03, used
+
+
+def cpu_s(pid: int) -> float:
+    """The processor time of a process so far."""
+    with open(f"/proc/{pid}/stat") as file:
+        fields = file.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
