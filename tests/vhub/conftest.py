@@ -46,6 +46,8 @@ from foosim.protocol.messages import (
     Up,
 )
 from foosim.protocol.start import initial_numbers
+from foosim.vhub import capture_writer
+from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore, Keep
 from foosim.vhub.records import Closing
 
@@ -257,3 +259,33 @@ def half_closed_run() -> HubRun:
 def hub_run() -> HubRun:
     """A run of 64 ticks, with everything in it; not to be changed."""
     return drive(64)
+
+
+LOG_LINES = [("info", "kick-off", 0), ("warning", "late", 3), ("error", "gone", 63)]
+
+
+def write_capture(path: Path, run: HubRun) -> Path:
+    """Write a run's capture, with three lines of log."""
+    metadata = {"run": "run-1", "fingerprint": "00"}
+    writer = CaptureWriter(path, run.deployment, NAME, run.text, metadata)
+    for closing in run.closings:
+        writer.keep(closing)
+    for line in LOG_LINES:
+        writer.log(*line)
+    writer.finish({"reason": "enough"})
+    return path
+
+
+@pytest.fixture(scope="session")
+def path(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run's capture."""
+    return write_capture(tmp_path_factory.mktemp("captures") / "run.mcap", hub_run)
+
+
+@pytest.fixture(scope="session")
+def chunked(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The same in a file of many small chunks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(capture_writer, "BATCH_ROWS", 40)
+        patch.setattr(capture_writer, "CHUNK_BYTES", 1)
+        return write_capture(tmp_path_factory.mktemp("captures") / "chunked.mcap", hub_run).read_bytes()
