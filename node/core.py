@@ -14,11 +14,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from foosim.node.edits import check_edits
 from foosim.node.step import Stepper, Work
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.assign import Assignment, Share, reach_of
-from foosim.protocol.barrier import Barrier, Slots
+from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.deployment import Deployment
@@ -266,7 +267,14 @@ class NodeCore:
                 self._take_part(barrier, part)
         if barrier.missing:
             return False
-        self._enter(barrier.assemble(), now_ns)
+        try:
+            frame = barrier.assemble()
+        except BadParts as bad:
+            self._refused += 1
+            self.actions.append(Say("error", f"{bad}: asked for again"))
+            barrier.drop(node for node in bad.nodes if node != self.name)
+            return False
+        self._enter(frame, now_ns)
         return True
 
     def _take_part(self, barrier: Barrier, part: Part) -> None:
@@ -316,6 +324,8 @@ class NodeCore:
         if self.frame is None or order.tick < self.frame.tick or order.tick in self._orders:
             self._repeated += 1
             return
+        self._check_near(order.tick)
+        check_edits(order.edits)
         self._orders[order.tick] = order
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
@@ -324,6 +334,7 @@ class NodeCore:
         ):
             self._repeated += 1
             return
+        self._check_near(deliveries.tick)
         self._deliveries[deliveries.tick] = (payload, deliveries)
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
@@ -332,9 +343,19 @@ class NodeCore:
         if self.frame is None or part.tick <= self.frame.tick:
             self._repeated += 1
             return
-        if part.tick > self.frame.tick + limits.KEPT_TICKS or part.node == self.name:
-            raise Malformed(f"a part of tick {part.tick}, this node is at {self.frame.tick}")
-        self._parts.setdefault(part.tick, []).append(part)
+        self._check_near(part.tick)
+        if part.node not in self.roster or part.node == self.name:
+            raise Malformed(f"a part of {part.node} to {self.name}, the roster is {', '.join(self.roster)}")
+        waiting = self._parts.setdefault(part.tick, [])
+        if len(waiting) >= limits.NODES_MAX * 4:
+            raise Malformed(f"{len(waiting)} parts of tick {part.tick} wait already")
+        waiting.append(part)
+
+    def _check_near(self, tick: int) -> None:
+        """Refuse what is for a tick so far off that nobody can have reached it."""
+        own = 0 if self.frame is None else self.frame.tick
+        if tick > own + limits.KEPT_TICKS:
+            raise Malformed(f"tick {tick}, this node is at {own}")
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
         if want.kind == channels.PART.name and want.epoch == self.epoch:
@@ -385,6 +406,7 @@ class NodeCore:
         if epoch.epoch <= self.epoch or self.deployment is None or self.name not in epoch.roster:
             self._repeated += 1
             return
+        self._check_epoch(epoch)
         self.epoch = epoch.epoch
         self.roster = tuple(sorted(epoch.roster))
         self.owners = dict(epoch.owners)
@@ -405,6 +427,16 @@ class NodeCore:
             self.actions.append(Publish(channels.WANT, self.name, message))
             self._want_after_ns = limits.WANT_AFTER_NS
             self._want_ns = now_ns + self._want_after_ns
+
+    def _check_epoch(self, epoch: Epoch) -> None:
+        """Every robot has one owner, who takes part; the added entities make a layout."""
+        assert self.deployment is not None
+        owners = dict(epoch.owners)
+        if len(owners) != len(epoch.owners) or owners.keys() != self.deployment.robots.keys():
+            raise Malformed(f"epoch {epoch.epoch}: owners of {len(epoch.owners)} robots, not of each robot once")
+        if not set(owners.values()) <= set(epoch.roster) or len(set(epoch.roster)) != len(epoch.roster):
+            raise Malformed(f"epoch {epoch.epoch}: a roster of {', '.join(epoch.roster)} without every owner once")
+        self._layout_with(epoch.added)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         """The frame that the epoch starts from, when mine is not there or not the same."""

@@ -6,9 +6,11 @@ Neighbours: `rules` edits after the order; `step` goes on from the edited number
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame, layout_after
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import Frame, fitting_edits, layout_after
 from foosim.protocol.layout import Layout
 from foosim.protocol.messages import Add, Edit, Push
 from foosim.protocol.start import place_ball
@@ -18,12 +20,24 @@ def edit(frame: Frame, edits: Sequence[Edit], deployment: Deployment) -> tuple[L
     """Return layout and numbers of the edited frame; the order's edits apply in their order."""
     layout = layout_after(frame.layout, edits)
     numbers = frame.numbers.copy() if layout is frame.layout else _moved(frame, layout)
-    for change in edits:
+    for change in fitting_edits(frame.layout, edits) if edits else ():
         if isinstance(change, Add) and change.name in layout:
             place_ball(numbers, layout[change.name], change.position, change.velocity)
         elif isinstance(change, Push) and change.name in layout:
             _push(numbers, layout, change, deployment.table.ball.mass)
     return layout, numbers
+
+
+def check_edits(edits: Sequence[Edit]) -> None:
+    """Raise `Malformed` for an edit with a number that is not finite: it would spoil a frame."""
+    for change in edits:
+        numbers: tuple[float, ...] = ()
+        if isinstance(change, Add):
+            numbers = (*change.position, *change.velocity)
+        elif isinstance(change, Push):
+            numbers = change.impulse
+        if not all(isfinite(number) for number in numbers):
+            raise Malformed(f"{type(change).__name__} with numbers that are not finite: {numbers}")
 
 
 def _moved(frame: Frame, layout: Layout) -> list[float]:

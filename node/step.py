@@ -22,7 +22,7 @@ from foosim.protocol import limits
 from foosim.protocol.deployment import BallSensor, Deployment, RodRobot, RodSensor, period_ticks
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
-from foosim.protocol.messages import Delivered, Edit, Name, Payload, RobotPacket
+from foosim.protocol.messages import Delivered, Edit, OutboxPacket, RobotPacket
 
 ECHO = "echo"
 ROD_SPEED_FACTOR = 1.5
@@ -30,15 +30,6 @@ ROD_SPEED_FACTOR = 1.5
 
 STOP_DEPTH_M = 0.01
 """How far a rod may be beyond its stroke: joint stops give way a little."""
-
-
-class OutboxPacket(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, gc=False):
-    """One packet that waits in a robot's outbox for the next tick."""
-
-    destination: Name
-    channel: Name
-    payload: Payload
-
 
 _outbox_decoder = msgspec.msgpack.Decoder(list[OutboxPacket])
 _outbox_encoder = msgspec.msgpack.Encoder()

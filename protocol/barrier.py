@@ -7,18 +7,29 @@ Neighbours: `assign` decides who writes what, `frame` is the result.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from math import isfinite
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.protocol import limits
+from foosim.protocol.codec import decode_any
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
-from foosim.protocol.messages import Part
+from foosim.protocol.messages import OutboxPacket, Part
 
 Indices = NDArray[np.intp]
+_OUTBOX: Final[Any] = list[OutboxPacket]
+
+
+class BadParts(Malformed):
+    """Parts that cannot be those of one frame; `nodes` sent them."""
+
+    def __init__(self, what: str, nodes: Sequence[str]) -> None:
+        super().__init__(what)
+        self.nodes = tuple(nodes)
 
 
 class Slots:
@@ -54,7 +65,8 @@ class Slots:
     def whole(self, shares: tuple[tuple[str, tuple[int, ...]], ...]) -> Indices:
         """Return the positions of all numbers of these nodes' parts, solver's before owner's for each node.
 
-        Raises `Malformed` unless the nodes' solved entities are each entity of the layout once.
+        Raises `BadParts` unless the nodes' solved entities are each entity of the layout once; when one is nobody's,
+        all are named.
         """
         indices = self._whole.get(shares)
         if indices is None:
@@ -64,7 +76,10 @@ class Slots:
                     claims[index].append(node)
             wrong = {self.layout.entities[i].name: nodes for i, nodes in claims.items() if len(nodes) != 1}
             if wrong:
-                raise Malformed("; ".join(f"{name} solved by {nodes or 'nobody'}" for name, nodes in wrong.items()))
+                text = "; ".join(f"{name} solved by {' and '.join(nodes) or 'nobody'}" for name, nodes in wrong.items())
+                unclaimed = any(not nodes for nodes in wrong.values())
+                blamed = {node for nodes in wrong.values() for node in nodes}
+                raise BadParts(text, [node for node, _ in shares if unclaimed or node in blamed])
             runs = [array for node, solved in shares for array in (self.solver(solved), self.owner(node))]
             indices = self._whole[shares] = np.concatenate(runs)
         return indices
@@ -100,28 +115,49 @@ class Barrier:
                 f"part of {part.node}: {len(part.solver_values)} and {len(part.owner_values)} bytes of values, "
                 f"{expected[0]} and {expected[1]} expected"
             )
-        if any(outbox.index not in part.solved for outbox in part.outboxes):
-            raise Malformed(f"part of {part.node}: an outbox of an entity that it did not solve")
+        if part.outboxes:
+            self._check_outboxes(part)
         self.parts[part.node] = part
+
+    def drop(self, nodes: Iterable[str]) -> None:
+        """Forget the parts of these nodes: they are missing again."""
+        for node in nodes:
+            self.parts.pop(node, None)
+
+    def _check_outboxes(self, part: Part) -> None:
+        """Every reader of the next frame takes outboxes as they are: one that cannot be read must not get there."""
+        entities = self.slots.layout.entities
+        indices = [outbox.index for outbox in part.outboxes]
+        if indices != sorted(set(indices)) or not set(indices) <= set(part.solved):
+            raise Malformed(f"part of {part.node}: outboxes of entities {indices}: not ascending or not solved by it")
+        for outbox in part.outboxes:
+            packets = decode_any(_OUTBOX, outbox.packets)
+            if not entities[outbox.index].is_robot or len(packets) > limits.OUTBOX_PACKETS_MAX:
+                raise Malformed(f"part of {part.node}: {len(packets)} packets of {entities[outbox.index].name}")
 
     def solver_of(self, index: int) -> str:
         """Return the node whose part holds the entity, or an empty string."""
         return next((node for node, part in self.parts.items() if index in part.solved), "")
 
     def assemble(self) -> Frame:
-        """Return the frame of all parts; raise `Malformed` when a slot is missing, doubled or not finite."""
+        """Return the frame of all parts; raise `BadParts` when a slot is missing, doubled or not finite."""
         assert not self.missing
         parts = [self.parts[node] for node in self.roster]
         layout = self.slots.layout
         try:
             indices = self.slots.whole(tuple((part.node, tuple(part.solved)) for part in parts))
-        except Malformed as error:
-            raise Malformed(f"tick {self.tick}: {error}") from None
+        except BadParts as bad:
+            raise BadParts(f"tick {self.tick}: {bad}", bad.nodes) from None
         values = np.empty(layout.size)
         values[indices] = np.frombuffer(
             b"".join([raw for part in parts for raw in (part.solver_values, part.owner_values)])
         )
-        if not isfinite(np.add.reduce(values)):
-            raise Malformed(f"tick {self.tick}: numbers that are not finite")
+        if not np.isfinite(values).all():
+            nodes = [part.node for part in parts if not _is_finite(part)]
+            raise BadParts(f"tick {self.tick}: numbers of {', '.join(nodes)} that are not finite", nodes)
         outboxes = {outbox.index: outbox.packets for part in parts for outbox in part.outboxes}
         return Frame(self.tick, layout, values, outboxes)
+
+
+def _is_finite(part: Part) -> bool:
+    return bool(np.isfinite(np.frombuffer(part.solver_values + part.owner_values)).all())

@@ -12,14 +12,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from hashlib import blake2b
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foosim.protocol import codec, messages
 from foosim.protocol.errors import Malformed
-from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.layout import ADDABLE, BALL, Entity, Layout
 
 assert sys.byteorder == "little", "numbers travel as raw little-endian float64"
 
@@ -113,15 +113,37 @@ def chain_next(chain: bytes, digest: bytes) -> bytes:
     return blake2b(chain + digest, digest_size=32).digest()
 
 
+def fitting_edits(layout: Layout, edits: Sequence[messages.Edit]) -> list[messages.Edit]:
+    """Return the edits that do something to a world with this layout, in their order.
+
+    An addition of a name that is taken, the removal of what was not added and a push of what is no free body change
+    nothing: a function of the order alone, the same for all who read it.
+    """
+    models = dict(layout.models)
+    fitting: list[messages.Edit] = []
+    for edit in edits:
+        if isinstance(edit, messages.Add):
+            if edit.name in models or edit.model not in ADDABLE:
+                continue
+            models[edit.name] = edit.model
+        elif isinstance(edit, messages.Remove):
+            if edit.name == BALL or models.get(edit.name) not in ADDABLE:
+                continue
+            del models[edit.name]
+        elif isinstance(edit, messages.Push) and models.get(edit.name) not in ADDABLE:
+            continue
+        fitting.append(edit)
+    return fitting
+
+
 def layout_after(layout: Layout, edits: Sequence[messages.Edit]) -> Layout:
     """Return the layout of frame k+1 when order k carries `edits`."""
-    changes: list[Any] = [edit for edit in edits if isinstance(edit, messages.Add | messages.Remove)]
-    if not changes:
+    if not edits:
         return layout
     models = dict(layout.models)
-    for edit in changes:
+    for edit in fitting_edits(layout, edits):
         if isinstance(edit, messages.Add):
             models[edit.name] = edit.model
-        else:
-            models.pop(edit.name, None)
-    return Layout(models, layout.sensors)
+        elif isinstance(edit, messages.Remove):
+            del models[edit.name]
+    return layout if models == layout.models else Layout(models, layout.sensors)

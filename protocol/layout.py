@@ -16,6 +16,7 @@ from hashlib import blake2b
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Malformed
 
 WORLD: Final = "world"
 """Name of the entity that has no body: score and the rules' memory."""
@@ -43,6 +44,10 @@ kick-off. Orientations are quaternions x, y, z, w; positions and velocities are 
 
 BODIES: Final = frozenset({"ball", "rod"})
 ROBOTS: Final = frozenset({"rod", "camera"})
+ADDABLE: Final = frozenset({"ball"})
+"""Models of which a running world can have more."""
+BALL: Final = "ball"
+"""Name of the ball that every table has; further ones have other names and can be removed again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,10 +132,14 @@ class Layout:
 
 
 def build_layout(deployment: Deployment, added: Iterable[tuple[str, str]] = ()) -> Layout:
-    """Return the layout of a deployment's world with `added` (name, model) entities."""
-    models = {"ball": "ball", WORLD: "world", **dict(added)}
+    """Return the layout of a deployment's world with `added` (name, model) entities, or raise `Malformed`."""
+    models = {BALL: "ball", WORLD: "world"}
     sensors: dict[str, Sequence[str]] = {}
     for name, robot in deployment.robots.items():
         models[name] = robot.model
         sensors[name] = tuple(robot.sensors)
+    for name, model in added:
+        if model not in ADDABLE or name in models:
+            raise Malformed(f"{model} {name} cannot be added: {' or '.join(sorted(ADDABLE))} with a free name can be")
+        models[name] = model
     return Layout(models, sensors)

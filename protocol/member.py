@@ -14,6 +14,7 @@ from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.layout import Layout
 from foosim.protocol.messages import Build, Heartbeat, Hello, Ready, Refusal
 
@@ -55,8 +56,11 @@ class Member:
         """Take the supervisor's answer to hello; False when it is for another boot or a repeat."""
         if build.boot != self.boot or self.build is not None:
             return False
+        try:
+            self.deployment = load_deployment(build.deployment, build.deployment_name)
+        except DeploymentError as error:
+            raise Malformed(f"a build with a deployment that is not valid here:\n{error}") from None
         self.build = build
-        self.deployment = load_deployment(build.deployment, build.deployment_name)
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's says where clients find it
         self._world = self.deployment.world
         return True

@@ -125,6 +125,14 @@ class Samples(Message, frozen=True):
     packets: Annotated[list[RobotPacket], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
 
 
+class OutboxPacket(Item, frozen=True):
+    """One packet that waits in a robot's outbox for the next tick."""
+
+    destination: Name
+    channel: Name
+    payload: Payload
+
+
 class Outbox(Item, frozen=True):
     """The bytes in the outbox of the entity at `index` of the layout; entities with an empty one are left out."""
 
