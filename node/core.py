@@ -32,6 +32,7 @@ from foosim.protocol.messages import (
     Build,
     Commit,
     Deliveries,
+    Edit,
     End,
     Epoch,
     Heartbeat,
@@ -90,7 +91,7 @@ class NodeCore:
         self._term: _Term | None = None
         self._history: dict[int, Frame] = {}
         self._awaited_epoch: Epoch | None = None
-        self._orders: dict[int, Order] = {}
+        self._orders: dict[int, list[Edit]] = {}
         self._deliveries: dict[int, tuple[bytes, Deliveries]] = {}
         self._parts: dict[int, list[Part]] = {}
         self._sent_parts: dict[int, bytes] = {}
@@ -210,6 +211,15 @@ class NodeCore:
         )
 
     @property
+    def lacking(self) -> tuple[Channel, int] | None:
+        """The channel, and how many messages of it, without which the tick cannot go on; None when there is no tick."""
+        if self.frame is None or self.ended is not None or self._awaited_epoch is not None:
+            return None
+        if self._barrier is not None:
+            return channels.PART, len(self._barrier.missing)
+        return channels.DELIVERIES if self.frame.tick in self._orders else channels.ORDER, 1
+
+    @property
     def waiting_for(self) -> str:
         """What the current tick lacks, for people and for the supervisor."""
         if self.frame is None:
@@ -224,33 +234,36 @@ class NodeCore:
     # --- one tick ----------------------------------------------------------------------------------------------------
 
     def _sense(self) -> None:
-        """Step 1: say what my robots send at this frame, also when it is nothing."""
+        """Step 1: say what my robots send at this frame, also when it is nothing; at a silent tick all know that."""
         frame, term = self.frame, self._term
         assert frame is not None and term is not None
+        self._sensed = True
+        if term.stepper.sampling.is_silent(frame):
+            self._counters = []
+            return
         packets, self._counters = term.stepper.sense(frame, term.mine)
         samples = Samples(frame.tick, frame.digest, self.name, [robot.name for robot in term.mine], packets)
         payload = encode(samples)
         self._sent_samples[frame.tick] = payload
         self.actions.append(Publish(channels.SAMPLES, self.name, payload))
-        self._sensed = True
 
     def _begin(self) -> bool:
         """Steps 2 to 4: with order and deliveries, edit the frame and hand my share to the engine."""
         frame = self.frame
         assert frame is not None and self._term is not None
-        order = self._orders.get(frame.tick)
+        edits = self._orders.get(frame.tick)
         delivered = self._deliveries.get(frame.tick)
-        if order is None or delivered is None:
+        if edits is None or delivered is None:
             return False
         raw, deliveries = delivered
-        layout, numbers = self._term.stepper.edited(frame, order.edits)
+        layout, numbers = self._term.stepper.edited(frame, edits)
         if layout is not frame.layout:
             self._counters = _moved_counters(self._counters, frame.layout, layout)
             self._term = self._make_term(layout)
         term = self._term
         share: Share = term.assignment.shares(numbers)[self.name]
         outboxes = term.stepper.deliver(deliveries.packets, share.solved, numbers)
-        self._basis = basis_of(frame.digest, order.edits, raw)
+        self._basis = basis_of(frame.digest, edits, raw)
         self._barrier = Barrier(frame.tick + 1, self.roster, term.slots)
         entities = layout.entities
         islands = tuple(tuple(entities[index] for index in island) for island in share.islands)
@@ -321,12 +334,14 @@ class NodeCore:
     def _on_order(self, order: Order, payload: bytes, now_ns: int) -> None:
         if self._fenced(channels.ORDER, order, payload):
             return
-        if self.frame is None or order.tick < self.frame.tick or order.tick in self._orders:
+        last = order.tick + order.following
+        if self.frame is None or last < self.frame.tick or last in self._orders:
             self._repeated += 1
             return
-        self._check_near(order.tick)
+        self._check_near(last)
         check_edits(order.edits)
-        self._orders[order.tick] = order
+        for tick in range(order.tick, last + 1):
+            self._orders[tick] = order.edits if tick == order.tick else []
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
         if deliveries.tick in self._deliveries or (

@@ -23,6 +23,7 @@ from foosim.protocol.deployment import BallSensor, Deployment, RodRobot, RodSens
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.messages import Delivered, Edit, OutboxPacket, RobotPacket
+from foosim.protocol.sampling import Sampling
 
 ECHO = "echo"
 ROD_SPEED_FACTOR = 1.5
@@ -67,7 +68,7 @@ class Stepper:
                 )
                 for channel, settings in _sensors_of(deployment, robot.name)
             ]
-        self._periods = sorted({period for sensors in self._sensors.values() for _, period, _, _ in sensors})
+        self.sampling = Sampling(deployment)
         drive = deployment.table.drive
         self._slide_speed_max = drive.slide.speed * ROD_SPEED_FACTOR
         self._spin_speed_max = drive.spin.speed * ROD_SPEED_FACTOR
@@ -93,8 +94,6 @@ class Stepper:
         packets: list[RobotPacket] = []
         counters: list[int] = []
         tick, outboxes = frame.tick, frame.outboxes
-        if not outboxes and all(tick % period for period in self._periods):
-            return packets, counters
         for robot in robots:
             sends: list[tuple[str, str, bytes]] = []
             for channel, period, slot, sensor in self._sensors[robot.name]:

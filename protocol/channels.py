@@ -40,9 +40,9 @@ class Channel:
 
 
 def _simulation(
-    name: str, message: Any, writers: str, readers: str, rate: str, named: bool = True, group: str = ""
+    name: str, message: Any, writers: str, readers: str, rate: str, named: bool = True
 ) -> Channel:
-    key = f"foosim/simulation/{group}{name}" + ("/{name}" if named else "")
+    key = f"foosim/simulation/{name}" + ("/{name}" if named else "")
     return Channel(name, key, message, Plane.SIMULATION, writers, readers, rate, express=True)
 
 
@@ -66,12 +66,12 @@ REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the nam
 READY: Final = _simulation("ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch")
 PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
 EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
-ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False, group="tick/")
-PART: Final = _simulation("part", messages.Part, "node", "node, supervisor", "tick", group="tick/")
-SAMPLES: Final = _simulation("samples", messages.Samples, "node", "vhub", "tick", group="hub/")
-COMMIT: Final = _simulation("commit", messages.Commit, "supervisor", "the named one", "tick (vhub)", group="hub/")
+ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False)
+PART: Final = _simulation("part", messages.Part, "node", "node, supervisor", "tick")
+SAMPLES: Final = _simulation("samples", messages.Samples, "node", "vhub", "tick")
+COMMIT: Final = _simulation("commit", messages.Commit, "supervisor", "the named one", "tick (vhub)")
 DELIVERIES: Final = _simulation(
-    "deliveries", messages.Deliveries, "vhub", "node, supervisor", "tick", named=False, group="tick/"
+    "deliveries", messages.Deliveries, "vhub", "node, supervisor", "tick", named=False
 )
 WANT: Final = _simulation("want", messages.Want, "all", "all", "20 ms doubling to 1 s without progress")
 HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
@@ -126,12 +126,11 @@ CLIENT_READS: Final = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, Tr
 OPERATOR_READS: Final = ((ANSWER, True),)
 """What each role reads: (channel, whether only what is addressed to it by name)."""
 
-TICK_KEYS: Final = "foosim/simulation/tick/**"
-"""What every tick brings to nodes and supervisor: each waits in one queue for all of it."""
-HUB_KEYS: Final = "foosim/simulation/hub/**"
-"""What every tick brings to the vHub. A commit for another one passes by."""
-DOWN_KEYS: Final = "foosim/radio/down/{name}/**"
-"""What every tick brings to a client."""
+NODE_WAITS: Final = (ORDER, PART, DELIVERIES)
+SUPERVISOR_WAITS: Final = (PART, DELIVERIES)
+VHUB_WAITS: Final = (COMMIT, SAMPLES)
+CLIENT_WAITS: Final = (DOWN,)
+"""What every tick brings to each role: it waits for these itself, in the queue of the one that it lacks."""
 
 ALIVE: Final = {
     Plane.SIMULATION: "foosim/simulation/alive/{name}",

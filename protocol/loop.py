@@ -34,12 +34,11 @@ class Wire:
         self._inbox = inbox
         self._publishers: dict[str, Publisher] = {}
 
-    def read(self, reads: Sequence[tuple[Channel, bool]], at_every_tick: str = "") -> None:
+    def read(self, reads: Sequence[tuple[Channel, bool]], waits: Sequence[Channel] = ()) -> None:
         """Read these channels: (channel, whether only what is addressed to this name).
 
-        `at_every_tick` is an expression of the keys for which the reader waits itself: the shortest way.
+        `waits` are those among them for which the reader waits itself: the shortest way, for what every tick brings.
         """
-        at_every_tick = at_every_tick.replace("{name}", self.name)
         mine = {channel.key for channel, own in reads if own}
         wanted = {channel.key for channel, _ in reads}
 
@@ -49,12 +48,11 @@ class Wire:
                 return None
             return known[0].key, known[1]
 
-        prefix = at_every_tick.removesuffix("**")
-        if at_every_tick:
-            self.session.receive(at_every_tick, read_key, self._inbox)
         for channel, own in reads:
             key = channel.key_for(self.name) if own else channel.key_for_all
-            if channel.plane is self.plane and not (prefix and f"{key}/".startswith(prefix)):
+            if channel in waits:
+                self.session.receive(key, channel.key, read_key, self._inbox)
+            elif channel.plane is self.plane:
                 self.session.subscribe(key, channel.key, self._inbox)
 
     def put(self, channel: Channel, name: str, payload: bytes) -> None:
@@ -111,6 +109,9 @@ class Loop:
         """What the core does once it has its messages; it may call `perform` in between."""
         self.other: Callable[[Any], None] | None = None
         """Performs the actions that only this process has."""
+        self.lacking: Callable[[], tuple[Channel, int] | None] = lambda: None
+        """The channel, and how many messages of it, without which the core cannot go on: what else a tick brings does
+        not wake the loop."""
         self.on_alive: Callable[[Plane, str, bool], None] = lambda plane, name, is_alive: None
         """Somebody has come or gone."""
         self.on_say: Callable[[Say], None] = lambda say: None
@@ -140,7 +141,10 @@ class Loop:
         """Sleep until there is something, and do it."""
         core = self.core
         slept_ns = time.monotonic_ns()
-        items = self._inbox.take(max(0, self._wake_ns - slept_ns) / NS_PER_S)
+        lacking = self.lacking()
+        timeout_s = max(0, self._wake_ns - slept_ns) / NS_PER_S
+        channel, count = ("", 1) if lacking is None else (lacking[0].key, lacking[1])
+        items = self._inbox.take(timeout_s, channel, count)
         now_ns = time.monotonic_ns()
         self._measure(now_ns, now_ns - slept_ns)
         channels = self._channels

@@ -79,11 +79,12 @@ Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 
 class Order(Message, frozen=True):
-    """Permission to compute `tick`, with what changes the world at it."""
+    """Permission to compute `tick`, with what changes the world at it, and the `following` ticks, without edits."""
 
     epoch: Counter
     tick: Counter
     edits: Edits
+    following: Annotated[int, Meta(ge=0, le=limits.KEPT_TICKS)] = 0
 
 
 class Delivered(Item, frozen=True):

@@ -51,13 +51,14 @@ def with_nodes(text: str, name: str, nodes: int, sets: Sequence[str] = ()) -> st
     return apply_sets(text, name, [f"nodes={{{flow}}}", *sets])
 
 
-def rehearse(
+def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     text: str,
     name: str,
     ticks: int,
     nodes: int | None = 1,
     sets: Sequence[str] = (),
     settings: Settings | None = None,
+    *,
     pace: Pace | None = None,
     prepare: Callable[[System], None] | None = None,
     capture: Path | None = None,

@@ -15,7 +15,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.plan import RunOptions, make_plan
 
-app = new_app("Rehearse a deployment: the whole system in one process on virtual time.")
+app = new_app()
 
 
 @app.command()
@@ -63,4 +63,4 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
 
 def main() -> None:
     """The entry point of `foosim-rehearse`."""
-    run_app(app)
+    run_app(app, "foosim-rehearse")

@@ -15,7 +15,7 @@ from foosim.protocol.errors import BadValue
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_reader import CaptureInfo, capture_info
 
-app = new_app("Look into a capture, and simulate it again.")
+app = new_app()
 
 Capture = Annotated[Path, typer.Argument(help="The capture, an MCAP file.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
@@ -96,4 +96,4 @@ def _verdict(found: Verified) -> str:
 
 def main() -> None:
     """The entry point of `foosim-replay`."""
-    run_app(app)
+    run_app(app, "foosim-replay")

@@ -110,7 +110,7 @@ class SupervisorCore:
         """Told of every committed frame: a rehearsal's window on the run."""
         self._slots = Slots(self.frame.layout, self.owners)
         self._epoch_payload = b""
-        self._orders: dict[int, tuple[bytes, list[Edit]]] = {}
+        self._orders: dict[int, list[Edit]] = {}
         self._deliveries: dict[int, bytes] = {}
         self._parts: dict[int, list[Part]] = {}
         self._commits: dict[int, bytes] = {}
@@ -176,10 +176,10 @@ class SupervisorCore:
                 self.finished = True
 
     @property
-    def lacking(self) -> Channel:
-        """The channel without which the next commit cannot be made."""
-        complete = len(self._parts.get(self.frame.tick + 1, ())) >= len(self.members)
-        return channels.DELIVERIES if complete and self.frame.tick not in self._deliveries else channels.PART
+    def lacking(self) -> tuple[Channel, int]:
+        """The channel, and how many messages of it, without which the next commit cannot be made."""
+        missing = len(self.members) - len(self._parts.get(self.frame.tick + 1, ()))
+        return (channels.PART, missing) if missing > 0 else (channels.DELIVERIES, 1)
 
     def deadline_ns(self, now_ns: int) -> int:
         """When the shell has to call again at the latest."""
@@ -228,7 +228,7 @@ class SupervisorCore:
 
     def ordered_edits(self) -> list[Edit]:
         """Return the edits of released ticks that are not committed yet, and of those still to be released."""
-        released = [edit for tick in range(self.frame.tick, self.released) for edit in self._orders[tick][1]]
+        released = [edit for tick in range(self.frame.tick, self.released) for edit in self._orders[tick]]
         return released + self.requests.coming_edits()
 
     def removable(self, layout: Layout) -> list[str]:
@@ -249,25 +249,36 @@ class SupervisorCore:
     # --- release and commit ------------------------------------------------------------------------------------------
 
     def _release(self, now_ns: int) -> None:
-        """Release the orders that pace and clock allow."""
-        while not self.stop_at or self.released < self.stop_at:
-            if not self.pacer.may_release(self.released, self.frame.tick, now_ns):
-                return
+        """Release the orders that pace and clock allow.
+
+        What is released together and has no edits goes in one message; in fast, two ticks at a time.
+        """
+        first = self.released
+        last = self.stop_at or limits.COUNTER_MAX
+        alone = first + 1 < last and not self.pacer.may_release(first + 1, self.frame.tick, now_ns)
+        if self.pacer.is_fast and alone and self.frame.tick < first:
+            return
+        while self.released < last and self.pacer.may_release(self.released, self.frame.tick, now_ns):
             tick = self.released
-            edits = self.requests.edits_for(tick)
             self.released += 1
-            self._say_order(tick, edits)
+            edits = self.requests.edits_for(tick)
+            if edits and tick > first:
+                self._say_orders(first, tick)
+                first = tick
+            self._orders[tick] = edits
+            self._orders.pop(tick - limits.KEPT_TICKS, None)
             if tick == self.frame.tick:
                 self._progress(now_ns)
             if tick == 0:
                 self.started_ns = now_ns
             self.watch.released(tick, now_ns)
+        self._say_orders(first, self.released)
 
-    def _say_order(self, tick: int, edits: list[Edit]) -> None:
-        payload = encode(Order(self.epoch, tick, edits))
-        self._orders[tick] = payload, edits
-        self._orders.pop(tick - limits.KEPT_TICKS, None)
-        self.actions.append(Publish(channels.ORDER, channels.SUPERVISOR, payload))
+    def _say_orders(self, first: int, end: int) -> None:
+        """Publish the orders of `first` to `end` - 1, of which only the first has edits."""
+        if first < end:
+            order = Order(self.epoch, first, self._orders[first], end - 1 - first)
+            self.actions.append(Publish(channels.ORDER, channels.SUPERVISOR, encode(order)))
 
     def _commit_next(self, now_ns: int) -> bool:
         """Assemble and commit the next frame when all its parts are there; False when something is missing."""
@@ -276,7 +287,7 @@ class SupervisorCore:
         deliveries = self._deliveries.get(tick)
         if parts is None or deliveries is None or len(parts) < len(self.members) or tick not in self._orders:
             return False
-        edits = self._orders[tick][1]
+        edits = self._orders[tick]
         layout = layout_after(self.frame.layout, edits)
         slots = self._slots if layout is self.frame.layout else Slots(layout, self.owners)
         barrier = Barrier(tick + 1, self.members, slots)
@@ -370,7 +381,7 @@ class SupervisorCore:
         self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, payload))
         self._epoch_payload = payload
         for tick in range(self.frame.tick, self.released):
-            self._say_order(tick, self._orders[tick][1])
+            self._say_orders(tick, tick + 1)
         self.watch.begun(now_ns)
         self._progress(now_ns)
 
@@ -479,7 +490,7 @@ class SupervisorCore:
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
         if want.kind == channels.ORDER.name and want.tick in self._orders and want.epoch == self.epoch:
-            self.actions.append(Publish(channels.ORDER, channels.SUPERVISOR, self._orders[want.tick][0]))
+            self._say_orders(want.tick, want.tick + 1)
         elif want.kind == channels.COMMIT.name and want.tick in self._commits:
             self.actions.append(Publish(channels.COMMIT, want.sender, self._commits[want.tick]))
 

@@ -181,6 +181,12 @@ class HubCore:
         return statistics(self.state, self._malformed, self._repeated)
 
     @property
+    def lacking(self) -> tuple[Channel, int]:
+        """The channel without which the closing of the tick cannot go on (Dones come on the other plane)."""
+        world = self._world is None and self.state is not None and self.state.closed + 1 in self._commits
+        return channels.SAMPLES if world else channels.COMMIT, 1
+
+    @property
     def waiting_for(self) -> str:
         """What the closing of the current tick lacks, for people and for the supervisor."""
         if self.state is None:
@@ -208,7 +214,7 @@ class HubCore:
         if committed is None:
             return False
         _, commit, frame = committed
-        packets = world_packets((s for _, s in self._samples.get(tick, ())), commit.digest, frame.layout)
+        packets = world_packets((s for _, s in self._samples.get(tick, ())), commit.digest, frame, state.sampling)
         if packets is None or commit.last:
             return False
         leaves, self._leaves = self._leaves, []
@@ -278,7 +284,7 @@ class HubCore:
 
     def _write(self, tick: int, world: _World, admitted: dict[str, list[Sent]], deliveries: bytes) -> None:
         assert self.state is not None
-        samples = [raw for raw, message in self._samples[tick] if message.digest == world.closing.digest]
+        samples = [raw for raw, message in self._samples.get(tick, ()) if message.digest == world.closing.digest]
         record = TickRecord(
             tick,
             self._commits[tick][0],

@@ -15,8 +15,9 @@ from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
-from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit, Delivered, Deliveries, Edit, RobotPacket, Samples, Sent
+from foosim.protocol.sampling import Sampling
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState, Joining
 
@@ -63,8 +64,13 @@ class Closing:
     wall_ns: int = 0
 
 
-def world_packets(samples: Iterable[Samples], digest: bytes, layout: Layout) -> list[RobotPacket] | None:
+def world_packets(
+    samples: Iterable[Samples], digest: bytes, frame: Frame, sampling: Sampling
+) -> list[RobotPacket] | None:
     """Return what the robots sent at a frame in (robot, index) order, or None while a robot's samples are missing."""
+    if sampling.is_silent(frame):
+        return []
+    robots = frame.layout.robots
     by_robot: dict[str, list[RobotPacket]] = {}
     for message in samples:
         if message.digest != digest:
@@ -74,9 +80,9 @@ def world_packets(samples: Iterable[Samples], digest: bytes, layout: Layout) -> 
         for packet in message.packets:
             if packet.robot in fresh:
                 by_robot[packet.robot].append(packet)
-    if len(by_robot) < len(layout.robots) or any(robot.name not in by_robot for robot in layout.robots):
+    if any(robot.name not in by_robot for robot in robots):
         return None
-    return [packet for robot in layout.robots for packet in by_robot[robot.name]]
+    return [packet for robot in robots for packet in by_robot[robot.name]]
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:
@@ -97,7 +103,8 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[Hub
         commit = decode(Commit, record.commit)
         layout = layout_after(layout, commit.edits)
         frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
-        packets = world_packets([decode(Samples, samples) for samples in record.samples], commit.digest, layout)
+        samples = [decode(Samples, raw) for raw in record.samples]
+        packets = world_packets(samples, commit.digest, frame, state.sampling)
         if packets is None or frame.tick != state.closed + 1 or record.tick != frame.tick:
             raise Malformed(f"record {record.tick} of the vHub's journal does not follow on tick {state.closed}")
         closing = Closing(

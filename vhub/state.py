@@ -18,6 +18,7 @@ from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Delivered, Received, RobotPacket, Sent
+from foosim.protocol.sampling import Sampling
 from foosim.vhub.links import Link, LinkState
 from foosim.vhub.packet import Flight
 
@@ -88,6 +89,7 @@ class HubState:
         """Those that the last closing counted: an input of it, which the journal keeps."""
         self._flights: dict[int, list[Flight]] = {}
         """What is in flight, by the tick at which it arrives."""
+        self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
         self._receivers: dict[tuple[str, str], tuple[str, ...]] = {}
