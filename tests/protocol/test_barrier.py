@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from foosim.protocol import limits
 from foosim.protocol.barrier import BadParts, Barrier, Slots
@@ -26,7 +27,7 @@ LAYOUT: Final = build_layout(load_deployment(TABLE.read_text(), TABLE.name))
 ROBOTS: Final = [robot.name for robot in LAYOUT.robots]
 NODES: Final = ("n1", "n2", "n3")
 TICK: Final = 7
-VALUES: Final = np.arange(LAYOUT.size) + 0.25
+VALUES: Final[NDArray[np.float64]] = np.arange(LAYOUT.size, dtype=np.float64) + 0.25
 """Every slot has a number of its own."""
 PACKETS: Final = encode([OutboxPacket("player-red", "echo", b"x")])
 

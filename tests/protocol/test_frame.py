@@ -1,0 +1,248 @@
+"""The frame is the truth: its digest sees every bit, tick, layout and outbox; bases and chains are exact functions."""
+
+from __future__ import annotations
+
+import struct
+from hashlib import blake2b
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from foosim.protocol.codec import encode
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import (
+    CHAIN_START,
+    Frame,
+    basis_of,
+    chain_next,
+    edits_content,
+    fitting_edits,
+    frame_from_bytes,
+    layout_after,
+)
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import Add, Edit, Order, Outbox, Push, Remove, Stop
+from foosim.protocol.start import initial_frame
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
+LAYOUT: Final = build_layout(DEPLOYMENT)
+SOME: Final[NDArray[np.float64]] = np.random.default_rng(1).normal(size=LAYOUT.size)
+RED_GOAL: Final = LAYOUT["red.goal"].index
+HERE: Final = (0.1, 0.0, 0.02)
+REST: Final = (0.0, 0.0, 0.0)
+
+
+def frame(values: NDArray[np.float64] = SOME, tick: int = 5, **outboxes: bytes) -> Frame:
+    return Frame(tick, LAYOUT, values, {LAYOUT[name.replace("_", ".")].index: raw for name, raw in outboxes.items()})
+
+
+def flipped(bit: int) -> NDArray[np.float64]:
+    raw = bytearray(SOME.tobytes())
+    raw[bit // 8] ^= 1 << bit % 8
+    return np.frombuffer(bytes(raw))
+
+
+@settings(max_examples=300)
+@given(bit=st.integers(0, 64 * LAYOUT.size - 1))
+def test_any_bit_changes_the_digest_and_that_of_its_entity_alone(bit: int) -> None:
+    one, other = frame(), frame(flipped(bit))
+    assert one.digest != other.digest
+    changed = [e.name for e in LAYOUT.entities if one.entity_digest(e) != other.entity_digest(e)]
+    assert changed == [e.name for e in LAYOUT.entities if e.start <= bit // 64 < e.stop]
+    assert len(changed) == 1
+
+
+def test_the_sign_of_zero_is_a_bit() -> None:
+    zeros = np.zeros(LAYOUT.size)
+    signed = zeros.copy()
+    signed[3] = -0.0
+    assert np.array_equal(zeros, signed) and frame(zeros).digest != frame(signed).digest
+
+
+def test_the_digest_is_the_one_that_the_design_names() -> None:
+    """BLAKE2b of tick, layout and bytes as they are; what verify and other tools have to compute."""
+    expected = blake2b(struct.pack("<Q", 5) + LAYOUT.digest + SOME.tobytes(), digest_size=32)
+    assert frame().digest == expected.digest()
+    expected.update(struct.pack("<QI", RED_GOAL, 3) + b"out")
+    assert frame(red_goal=b"out").digest == expected.digest()
+
+
+def test_tick_layout_and_outboxes_change_the_digest() -> None:
+    added = build_layout(DEPLOYMENT, [("ball2", "ball")])
+    renamed = build_layout(DEPLOYMENT, [("ball3", "ball")])
+    more = np.zeros(added.size)
+    digests = [
+        frame().digest,
+        frame(tick=6).digest,
+        frame(red_goal=b"a").digest,
+        frame(red_goal=b"b").digest,
+        frame(red_goal=b"ab").digest,
+        frame(blue_goal=b"a").digest,
+        frame(red_goal=b"a", blue_goal=b"b").digest,
+        frame(red_goal=b"b", blue_goal=b"a").digest,
+        frame(red_goal=b"ab", blue_goal=b"").digest,
+        Frame(5, added, more).digest,
+        Frame(5, renamed, more).digest,
+    ]
+    assert len(set(digests)) == len(digests)
+
+
+def test_the_order_in_which_outboxes_are_given_is_nothing() -> None:
+    assert frame(red_goal=b"a", blue_goal=b"b").digest == frame(blue_goal=b"b", red_goal=b"a").digest
+
+
+def test_an_outbox_is_part_of_its_entity_alone() -> None:
+    changed = [e.name for e in LAYOUT.entities if frame().entity_digest(e) != frame(red_goal=b"a").entity_digest(e)]
+    assert changed == ["red.goal"]
+    assert len(frame().entity_digest(LAYOUT["ball"])) == 8
+
+
+@settings(max_examples=50)
+@given(
+    values=st.lists(st.floats(allow_nan=False), min_size=LAYOUT.size, max_size=LAYOUT.size),
+    outboxes=st.dictionaries(st.integers(0, len(LAYOUT.entities) - 1), st.binary(min_size=1, max_size=9)),
+)
+def test_a_frame_comes_back_from_its_bytes(values: list[float], outboxes: dict[int, bytes]) -> None:
+    one = Frame(3, LAYOUT, np.array(values), outboxes)
+    other = frame_from_bytes(3, LAYOUT, one.values.tobytes(), one.outbox_items)
+    assert other.digest == one.digest and other.outboxes == one.outboxes
+    assert struct.pack(f"<{LAYOUT.size}d", *other.numbers) == struct.pack(f"<{LAYOUT.size}d", *values)
+
+
+def test_bytes_of_another_layout_are_malformed() -> None:
+    raw = SOME.tobytes()
+    for wrong in (raw[:-8], raw + bytes(8), raw[:-1], b""):
+        with pytest.raises(Malformed, match=f"{len(wrong)} bytes of values, the layout has {len(raw)}"):
+            frame_from_bytes(1, LAYOUT, wrong, [])
+    for indices in ([1, 0], [2, 2], [len(LAYOUT.entities)], [2**62]):
+        with pytest.raises(Malformed, match="not ascending or not in the layout"):
+            frame_from_bytes(1, LAYOUT, raw, [Outbox(index, b"x") for index in indices])
+
+
+def test_numbers_have_names() -> None:
+    start = initial_frame(DEPLOYMENT)
+    radius = DEPLOYMENT.table.ball.radius
+    assert start.vector("ball", "position", 3) == [0.0, 0.0, radius]
+    assert start.at("ball", "position", 2) == radius
+    assert start.at("ball", "orientation", 3) == 1.0
+    assert start.score == (0, 0) and start.tick == 0
+    assert start.at("ball", "contacts", 2) == start.at("red.goal", "contacts", 2) == -1.0
+    assert start.at("ball", "wait_ticks") == DEPLOYMENT.table.rules.kickoff_delay_ns // DEPLOYMENT.tick_ns
+
+
+# --- basis and chain -------------------------------------------------------------------------------------------------
+
+
+def test_a_basis_is_of_digest_order_and_deliveries() -> None:
+    push = [Push("ball", (0.0, 0.01, 0.0))]
+    one = basis_of(frame().digest, push, b"deliveries")
+    assert one == basis_of(frame().digest, list(push), b"deliveries")
+    others = [
+        basis_of(frame(tick=6).digest, push, b"deliveries"),
+        basis_of(frame().digest, [], b"deliveries"),
+        basis_of(frame().digest, [Push("ball", (0.0, 0.02, 0.0))], b"deliveries"),
+        basis_of(frame().digest, [*push, *push], b"deliveries"),
+        basis_of(frame().digest, push, b"Deliveries"),
+        basis_of(frame().digest, push, b""),
+    ]
+    assert len({one, *others}) == 7
+
+
+def test_where_an_order_ends_and_deliveries_begin_is_part_of_the_basis() -> None:
+    content = edits_content([Remove("b")])
+    assert basis_of(bytes(32), [], content) != basis_of(bytes(32), [Remove("b")], b"")
+
+
+def test_the_content_of_an_order_has_no_epoch() -> None:
+    edits: list[Edit] = [Remove("b"), Stop("x")]
+    assert encode(Order(1, 2, edits)) != encode(Order(9, 2, edits))
+    assert edits_content(edits) in encode(Order(1, 2, edits))
+    assert edits_content([]) == encode([])
+
+
+def test_the_chain_is_over_digests_and_nothing_else() -> None:
+    assert bytes(32) == CHAIN_START
+    chain = chain_next(CHAIN_START, frame().digest)
+    assert chain == blake2b(bytes(32) + frame().digest, digest_size=32).digest()
+    assert chain_next(chain, frame().digest) != chain
+
+
+# --- what an order does to a layout ----------------------------------------------------------------------------------
+
+
+def added(name: str = "b2", model: str = "ball") -> Add:
+    return Add(name, model, HERE, REST)
+
+
+def test_additions_and_removals_change_the_layout() -> None:
+    bigger = layout_after(LAYOUT, [added("b2"), added("a1")])
+    assert set(bigger.names) - set(LAYOUT.names) == {"a1", "b2"}
+    assert bigger.digest == build_layout(DEPLOYMENT, [("a1", "ball"), ("b2", "ball")]).digest
+    assert layout_after(bigger, [Remove("a1"), Remove("b2")]).digest == LAYOUT.digest
+    assert layout_after(LAYOUT, [added("b2"), Remove("b2")]) is LAYOUT
+    assert layout_after(bigger, [Remove("a1"), added("a1")]) is bigger
+
+
+def test_what_leaves_the_layout_alone_gives_the_same_one() -> None:
+    for edits in ([], [Push("ball", REST)], [Stop("x")]):
+        assert layout_after(LAYOUT, edits) is LAYOUT
+
+
+NOTHING: Final[list[Edit]] = [
+    added("ball"),
+    added("world"),
+    added("red.goal"),
+    added("b2", "rod"),
+    added("b2", "world"),
+    added("b2", "dragon"),
+    Remove("ball"),
+    Remove("world"),
+    Remove("red.goal"),
+    Remove("camera"),
+    Remove("nobody"),
+    Push("red.goal", HERE),
+    Push("world", HERE),
+    Push("nobody", HERE),
+]
+
+
+@pytest.mark.parametrize("edit", NOTHING, ids=lambda edit: f"{type(edit).__name__}-{edit.name}")
+def test_an_edit_that_does_not_fit_changes_nothing(edit: Edit) -> None:
+    assert fitting_edits(LAYOUT, [edit]) == []
+    assert layout_after(LAYOUT, [edit]) is LAYOUT
+    assert fitting_edits(LAYOUT, [added("b3"), edit]) == [added("b3")]
+
+
+def test_edits_fit_in_their_order() -> None:
+    push = Push("b2", HERE)
+    assert fitting_edits(LAYOUT, [push, added("b2"), push, added("b2"), Remove("b2"), push, Remove("b2")]) == [
+        added("b2"),
+        push,
+        Remove("b2"),
+    ]
+
+
+@settings(max_examples=200)
+@given(
+    edits=st.lists(
+        st.builds(added, st.sampled_from(["b1", "b2", "ball", "red.goal"]), st.sampled_from(["ball", "rod"]))
+        | st.builds(Remove, st.sampled_from(["b1", "b2", "ball", "world"]))
+        | st.builds(Push, st.sampled_from(["b1", "ball", "camera"]), st.just(REST)),
+        max_size=12,
+    ),
+    cut=st.integers(0, 12),
+)
+def test_one_order_after_another_is_as_good_as_both_in_one(edits: list[Edit], cut: int) -> None:
+    """So supervisor, nodes and vHub, who see the same edits, never disagree about the layout."""
+    between = layout_after(LAYOUT, edits[:cut])
+    whole = layout_after(LAYOUT, edits)
+    assert layout_after(between, edits[cut:]).digest == whole.digest
+    assert fitting_edits(LAYOUT, edits) == fitting_edits(LAYOUT, edits[:cut]) + fitting_edits(between, edits[cut:])
+    assert set(LAYOUT.names) <= set(whole.names) <= {*LAYOUT.names, "b1", "b2"}
