@@ -1,1 +1,4 @@
-"""What a controller's author imports: connect, robots with their channels, lockstep, players."""
+"""Client library: what a controller's author imports.
+
+`connect` (in `client`) is for programs and people; `player` and `players` for controllers that `up` starts.
+"""

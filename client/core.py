@@ -1,0 +1,333 @@
+"""The core of a client: takes messages and the time, and keeps its side of the talk with the vHub.
+
+Hello until it is answered, Join until the first downlink. In lockstep `go` is the Go that waits for an answer, and
+`done` answers it: stop and wait, so that a Go that comes again gets the same bytes again. A free-running client takes
+`arrivals` and sends when it likes. Downlinks are numbered: repeats are dropped, gaps counted.
+Neighbours: `player` and `client` drive it; `vhub.sessions` is the other side.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from foosim.client.errors import PacketError, UnknownName
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import DeploymentError, Malformed
+from foosim.protocol.messages import (
+    ClientHello,
+    ClientRefusal,
+    ClientWelcome,
+    Done,
+    Down,
+    Go,
+    Join,
+    Received,
+    Sent,
+    Subscription,
+    Up,
+)
+from foosim.protocol.names import CHANNEL_ECHO
+
+AGAIN_NS: Final = 200_000_000
+"""After how long hello is said again; a Join's wait doubles from there, up to a second."""
+NEVER_NS: Final = limits.COUNTER_MAX
+GAPS_KEPT: Final = 1024
+"""How many numbers of missing downlinks are remembered, so that a late one is told from a repeat."""
+PACKET_OVERHEAD_BYTES: Final = 128
+"""No packet takes more in a message beside its payload: two names and two numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outgoing:
+    """A packet to send: opaque `payload` to a robot's (or another client's) `channel`."""
+
+    destination: str
+    channel: str
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class ClientStatistics:
+    """A client's account so far. `missing` downlinks were passed over and have not come since."""
+
+    downlinks: int
+    repeated: int
+    missing: int
+    malformed: int
+    overflowed: int
+    received: int
+    sent: int
+    answered: int
+
+
+class ClientCore:
+    """One client's state machine. `actions` is what the shell performs next."""
+
+    def __init__(self, name: str, boot: str, now_ns: int, world: str = "") -> None:
+        """`world` is empty when the client takes whatever world it finds."""
+        self.name = name
+        self.boot = boot
+        self.actions: list[Action] = []
+        self.welcome: ClientWelcome | None = None
+        self.deployment: Deployment | None = None
+        self.refusal = ""
+        self.go: Go | None = None
+        self.arrivals: deque[Received] = deque()
+        """What has reached a free-running client and was not taken yet, in order."""
+        self.tick = -1
+        """The newest tick that the vHub has named."""
+        self.ended = False
+        self._world = world
+        self._now_ns = now_ns
+        self._again_ns = now_ns
+        self._again_after_ns = AGAIN_NS
+        self._join = b""
+        self._period = 0
+        self._sequence = 0
+        self._downlink = 0
+        self._gaps: set[int] = set()
+        self._done = b""
+        self._done_number = -1
+        self._downlinks = self._repeated = self._missing = self._malformed = self._overflowed = 0
+        self._received = self._sent = self._answered = 0
+        self._readers: dict[type[Any], Callable[[Any], None]] = {
+            ClientWelcome: self._on_welcome,
+            ClientRefusal: self._on_refusal,
+            Go: self._on_go,
+            Down: self._on_down,
+        }
+
+    # --- what the shell calls --------------------------------------------------------------------------------------
+
+    def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+        """Take one message as it came; what does not fit is counted and dropped."""
+        self._now_ns = max(self._now_ns, now_ns)
+        try:
+            if name != self.name:
+                raise Malformed(f"addressed to {name}")
+            message = decode(channel.message, payload, channel.bytes_max)
+            reader = self._readers.get(type(message))
+            if reader is None:
+                raise Malformed(f"a client does not read the channel {channel.name}")
+            reader(message)
+        except Malformed as error:
+            self._malformed += 1
+            if self._malformed <= 3:
+                self.actions.append(Say("warning", f"refused on {channel.name}: {error}"))
+
+    def wake(self, now_ns: int) -> None:
+        """Say again what has not been answered, when it is due."""
+        self._now_ns = max(self._now_ns, now_ns)
+        if now_ns < self.deadline_ns():
+            return
+        if self.welcome is None:
+            hello = ClientHello(self.name, self.boot, limits.PROTOCOL_VERSION, self._world, self._downlink)
+            self.actions.append(Publish(channels.CLIENT_HELLO, self.name, encode(hello)))
+        else:
+            self._publish(self._join)
+            self._again_after_ns = min(2 * self._again_after_ns, limits.WANT_EVERY_NS_MAX)
+        self._again_ns = now_ns + self._again_after_ns
+
+    def deadline_ns(self) -> int:
+        """When `wake` has something to do next."""
+        waits = self.welcome is None or (self._join and self._downlinks == 0)
+        return self._again_ns if waits and not self.refusal and not self.ended else NEVER_NS
+
+    def statistics(self) -> ClientStatistics:
+        return ClientStatistics(
+            self._downlinks,
+            self._repeated,
+            self._missing,
+            self._malformed,
+            self._overflowed,
+            self._received,
+            self._sent,
+            self._answered,
+        )
+
+    # --- what the client does --------------------------------------------------------------------------------------
+
+    def join(self, period_ticks: int, subscriptions: Iterable[tuple[str, str]]) -> None:
+        """Take part: in lockstep every `period_ticks`, or free-running with 0; hear these (robot, channel).
+
+        Raises UnknownName for a robot or channel that the deployment does not have.
+        """
+        assert self.deployment is not None and self.welcome is not None, "join before a welcome"
+        assert period_ticks >= 0, period_ticks
+        wanted = sorted(set(subscriptions))
+        for robot, channel in wanted:
+            check_subscription(self.deployment, robot, channel)
+        items = [Subscription(robot, channel) for robot, channel in wanted]
+        self._join = encode(Join(self.name, self.boot, period_ticks, items))
+        self._period = period_ticks
+        self._publish(self._join)
+        self._again_after_ns = AGAIN_NS
+        self._again_ns = self._now_ns + AGAIN_NS
+
+    def done(self, packets: Sequence[Outgoing]) -> None:
+        """Answer the Go that waits, with what is sent at its tick. Raises UnknownName or PacketError, and waits on."""
+        assert self.go is not None and self.deployment is not None, "nothing to answer"
+        # A packet's stamp is its tick's time: with a wall clock's, two equal runs would not give equal bytes.
+        sent = self._numbered(packets, self.go.tick * self.deployment.tick_ns)
+        payload = encode(Done(self.name, self.boot, self.go.tick, sent))
+        if len(payload) > channels.UP.bytes_max:
+            raise PacketError(f"{len(payload)} bytes in one answer, at most {channels.UP.bytes_max} are allowed")
+        self._count_sent(sent)
+        self._done, self._done_number = payload, self.go.number
+        self.go = None
+        self._answered += 1
+        self._publish(payload)
+
+    def send(self, packets: Sequence[Outgoing], stamp_ns: int = 0) -> None:
+        """Send packets, free-running; `stamp_ns` is the client's own clock. Raises UnknownName or PacketError."""
+        assert self.welcome is not None, "send before a welcome"
+        sent = self._numbered(packets, stamp_ns)
+        self._count_sent(sent)
+        for part in _split(sent, channels.UP.bytes_max):
+            self._publish(encode(Up(self.name, self.boot, part)))
+
+    # --- messages --------------------------------------------------------------------------------------------------
+
+    def _on_welcome(self, welcome: ClientWelcome) -> None:
+        if not self._is_for_me(welcome) or self.welcome is not None or self.refusal:
+            self._repeated += 1
+            return
+        try:
+            deployment = load_deployment(welcome.deployment, welcome.deployment_name)
+        except DeploymentError as error:
+            self._refused(f"the vHub's deployment is not valid here:\n{error}")
+            return
+        self.welcome = welcome
+        self.deployment = deployment
+        self._sequence = welcome.sequence
+        self._downlink = welcome.downlink
+
+    def _on_refusal(self, refusal: ClientRefusal) -> None:
+        if not self._is_for_me(refusal) or self.welcome is not None or self.refusal:
+            self._repeated += 1
+            return
+        self._refused(refusal.reason)
+
+    def _refused(self, reason: str) -> None:
+        self.refusal = reason or "no reason given"
+        self.actions.append(Say("error", f"refused by the vHub: {self.refusal}"))
+
+    def _is_for_me(self, message: ClientWelcome | ClientRefusal) -> bool:
+        if message.name != self.name:
+            raise Malformed(f"a message on the key of {self.name} that names {message.name}")
+        return message.boot == self.boot
+
+    def _on_go(self, go: Go) -> None:
+        if go.number == self._done_number:
+            self._repeated += 1
+            self._publish(self._done)
+            return
+        if not self._is_new(go):
+            return
+        if self._period == 0 or go.tick % self._period != 0:
+            raise Malformed(f"Go for tick {go.tick} to a client with a period of {self._period} ticks")
+        if go.tick <= self.tick or self.ended:
+            self._repeated += 1
+            return
+        self._take_number(go.number)
+        self.tick = go.tick
+        self.go = go
+        self._received += len(go.packets)
+
+    def _on_down(self, down: Down) -> None:
+        if not self._is_new(down):
+            return
+        self._take_number(down.number)
+        self.tick = max(self.tick, down.tick)
+        self._received += len(down.packets)
+        room = limits.INBOX_MESSAGES_MAX - len(self.arrivals)
+        self.arrivals.extend(down.packets[: max(0, room)])
+        self._overflowed += max(0, len(down.packets) - room)
+        if down.ended:
+            self.ended = True
+            self.go = None
+
+    def _is_new(self, downlink: Go | Down) -> bool:
+        """Whether a downlink has not come before; one that nobody asked for is refused."""
+        if self.welcome is None:
+            raise Malformed("a downlink before the welcome")
+        if downlink.number > self._downlink or downlink.number in self._gaps:
+            return True
+        self._repeated += 1
+        return False
+
+    def _take_number(self, number: int) -> None:
+        self._downlinks += 1
+        if number <= self._downlink:
+            self._gaps.remove(number)
+            self._missing -= 1
+            return
+        gap = number - self._downlink - 1
+        if gap:
+            self._missing += gap
+            self._gaps.update(range(max(self._downlink + 1, number - GAPS_KEPT), number))
+            if len(self._gaps) > GAPS_KEPT:
+                self._gaps = set(sorted(self._gaps)[-GAPS_KEPT:])
+        self._downlink = number
+
+    # --- sending ---------------------------------------------------------------------------------------------------
+
+    def _numbered(self, packets: Sequence[Outgoing], stamp_ns: int) -> list[Sent]:
+        """Return the packets with their numbers, checked; nothing is counted yet."""
+        assert self.deployment is not None
+        if len(packets) > limits.PACKETS_PER_MESSAGE_MAX:
+            raise PacketError(f"{len(packets)} packets at once, at most {limits.PACKETS_PER_MESSAGE_MAX} are allowed")
+        for packet in packets:
+            self._check(packet, self.deployment)
+        return [
+            Sent(self._sequence + index, packet.destination, packet.channel, stamp_ns, packet.payload)
+            for index, packet in enumerate(packets, 1)
+        ]
+
+    def _check(self, packet: Outgoing, deployment: Deployment) -> None:
+        destination = packet.destination
+        if not (destination in deployment.robots or destination in deployment.players or destination in deployment.clients):
+            raise UnknownName("unknown destination", destination, deployment.endpoints())
+        if not 1 <= len(packet.channel) <= limits.NAME_LENGTH_MAX:
+            raise PacketError(f"channel {packet.channel!r}: not 1 to {limits.NAME_LENGTH_MAX} characters")
+        if len(packet.payload) > limits.PAYLOAD_BYTES_MAX:
+            raise PacketError(f"{len(packet.payload)} bytes in one packet, at most {limits.PAYLOAD_BYTES_MAX} are allowed")
+
+    def _count_sent(self, sent: Sequence[Sent]) -> None:
+        self._sequence += len(sent)
+        self._sent += len(sent)
+
+    def _publish(self, payload: bytes) -> None:
+        self.actions.append(Publish(channels.UP, self.name, payload))
+
+
+def check_subscription(deployment: Deployment, robot: str, channel: str) -> None:
+    """Raise UnknownName unless the deployment has this robot and the robot has this channel to hear."""
+    if robot not in deployment.robots:
+        raise UnknownName("unknown robot", robot, deployment.robots)
+    heard = [*deployment.robots[robot].sensors, CHANNEL_ECHO]
+    if channel not in heard:
+        raise UnknownName(f"{robot} has no such channel to hear", channel, heard)
+
+
+def _split(sent: Sequence[Sent], bytes_max: int) -> Iterator[list[Sent]]:
+    """Yield the packets in as many messages as their sizes need."""
+    part: list[Sent] = []
+    size = 0
+    for packet in sent:
+        bytes_more = len(packet.payload) + PACKET_OVERHEAD_BYTES
+        if part and size + bytes_more > bytes_max - PACKET_OVERHEAD_BYTES:
+            yield part
+            part, size = [], 0
+        part.append(packet)
+        size += bytes_more
+    if part:
+        yield part

@@ -1,0 +1,119 @@
+"""The process `foosim-player`: a player that the deployment declares, between its class and the radio plane.
+
+One address is all that it needs: its class, rate, robots and parameters come with the welcome. Neighbours: `core`,
+`player` (the loop that the rehearsal shares), `protocol.loop`.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated
+
+import typer
+
+from foosim.client.core import ClientCore
+from foosim.client.player import PlayerLoop
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Say
+from foosim.protocol.channels import VHUB, Plane
+from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.errors import BadValue
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.loop import Loop, Wire
+from foosim.protocol.names import is_name
+from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
+from foosim.protocol.session import Session, use_client_runtime
+
+CONNECT_S = 60.0
+
+
+class PlayerProcess:
+    """One player on one session, until the run ends, the vHub is gone, or `stop`."""
+
+    def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
+        self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
+        self.stopped = False
+        self._player = PlayerLoop(self.core)
+        self._inbox = inbox
+        self._is_present = False
+        self._wire = Wire(session, Plane.RADIO, inbox, name)
+        self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
+        self._loop.connect(self._wire)
+        self._loop.turn = self._turn
+        self._loop.on_alive = self._on_alive
+        self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
+        self._wire.watch_alive(VHUB)
+
+    def run(self) -> int:
+        """Take part until the end; return the exit code."""
+        self._loop.run(self._is_over)
+        self._loop.perform()
+        if self.core.refusal:
+            return REFUSED
+        return DONE if self.core.ended else FAILED
+
+    def stop(self) -> None:
+        """Have `run` return soon; a signal handler may call this."""
+        self.stopped = True
+        self._inbox.wake()
+
+    def _is_over(self) -> bool:
+        return self.stopped or self.core.ended or bool(self.core.refusal)
+
+    def _turn(self, now_ns: int) -> None:
+        if self.core.deployment is not None and not self._is_present:
+            self._is_present = True
+            self._wire.declare_alive()
+        self._player.step(now_ns)
+
+    def _deadline_ns(self, now_ns: int) -> int:
+        return min(self.core.deadline_ns(), self._player.deadline_ns())
+
+    def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        if not is_alive and name == VHUB and not self.core.ended:
+            self.core.actions.append(Say("error", "lost the vHub"))
+            self.stop()
+
+
+def run_player(name: str, connect: str, world: str = "") -> int:
+    """Run a declared player until its run ends; return the exit code.
+
+    Raises Refused when there is nobody to connect to, PlayerError when its class cannot be loaded or fails.
+    """
+    if not is_name(name):
+        raise BadValue("not a name for a player", name)
+    use_client_runtime()
+    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+    stop = Stop()
+    with Session.client(connect, CONNECT_S, limits.RADIO_MESSAGE_BYTES_MAX, stop.is_set) as session:
+        player = PlayerProcess(name, session, inbox, world)
+        stop.then(player.stop)
+        return player.run()
+
+
+app = new_app()
+
+
+@app.command()
+def player(
+    name: Annotated[str, typer.Option(help="Its name, as the deployment declares it under players.")],
+    connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT.")],
+    world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    version: VersionOption = False,
+) -> None:
+    """Play in a run: load the class that the deployment names and let it act.
+
+    The process ends with the run; it exits with 0 when the run ended, with 1 when the player failed or the vHub was
+    lost, and with 3 when the vHub would not have it.
+    """
+    die_with_parent()
+    raise typer.Exit(run_player(name, connect, world))
+
+
+def main() -> None:
+    """Entry of `foosim-player`."""
+    run_app(app, "foosim-player")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,180 @@
+"""Players: what a controller's class looks like, how it is loaded, and the loop that runs it.
+
+A player is a class with `act(tick, samples) -> commands`; the deployment names it as `module:Class`, with a rate, the
+robots it may command and hear, and parameters. The loop turns each Go into samples, calls `act`, and answers. The
+process `foosim-player` and the rehearsal run this same loop. Neighbours: `core`, `payloads`; `players` has a team.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Final, Protocol
+
+from foosim.client.core import NEVER_NS, ClientCore, Outgoing
+from foosim.client.errors import PlayerError, UnknownName
+from foosim.client.payloads import Command, Value, channel_kind, decode_payload, encode_command
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment import Player as Declaration
+from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.messages import Received
+from foosim.protocol.names import CHANNEL_POSITION
+
+NS_PER_S: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One packet of a robot's channel: its value, and when it was sent and due (simulated ns)."""
+
+    robot: str
+    channel: str
+    sequence: int
+    sent_ns: int
+    due_ns: int
+    value: Value
+
+
+Samples = Mapping[tuple[str, str], Sample]
+"""The newest sample of each (robot, channel) that has arrived up to now; what has not come yet is absent."""
+Commands = Mapping[str, Command]
+"""What each robot shall do, by name; a robot that is left out keeps its last command."""
+
+
+class Player(Protocol):
+    """A controller. It sees packets only: samples are as old as the network made them, and some never come."""
+
+    def act(self, tick: int, samples: Samples) -> Commands:
+        """Return commands at `tick`. Equal calls in equal order must give equal commands: use no clock, no dice."""
+
+
+PlayerFactory = Callable[[Deployment, Mapping[str, Any]], Player]
+"""Makes a player from the deployment and its own parameters; usually the player's class."""
+
+
+def load_player(path: str) -> PlayerFactory:
+    """Return the class that `module:Class` names. Raises PlayerError, which says what is missing."""
+    module_name, colon, class_name = path.partition(":")
+    if not (module_name and colon and class_name):
+        raise PlayerError(f"player {path!r}: not of the form module:Class")
+    try:
+        module = import_module(module_name)
+    except ModuleNotFoundError as error:
+        missing = "" if error.name == module_name else f" (it imports {error.name})"
+        raise PlayerError(f"player {path}: there is no module {error.name}{missing}") from error
+    except Exception as error:
+        raise PlayerError(f"player {path}: importing {module_name} failed: {_describe(error)}") from error
+    made: Any = getattr(module, class_name, None)
+    if made is None:
+        classes = [name for name, value in vars(module).items() if inspect.isclass(value) and hasattr(value, "act")]
+        unknown = UnknownName(f"player {path}: no such class in {module_name}", class_name, classes)
+        raise PlayerError(unknown.what)
+    if not inspect.isclass(made) or not callable(getattr(made, "act", None)):
+        raise PlayerError(f"player {path}: {class_name} is no class with a method act(tick, samples)")
+    factory: PlayerFactory = made
+    return factory
+
+
+class PlayerLoop:
+    """Runs the player that the deployment declares under the core's name. `step` after every message and wake."""
+
+    def __init__(self, core: ClientCore, load: Callable[[str], PlayerFactory] = load_player) -> None:
+        self.core = core
+        self.samples: dict[tuple[str, str], Sample] = {}
+        self.malformed = 0
+        """Samples that did not fit their channel."""
+        self._load = load
+        self._declaration: Declaration | None = None
+        self._player: Player | None = None
+        self._kinds: dict[tuple[str, str], str] = {}
+        self._beat_ns = NEVER_NS
+        self._period_ns = 0
+
+    def step(self, now_ns: int) -> None:
+        """Do what can be done now: begin after the welcome, then act when it is the player's turn.
+
+        Raises PlayerError for a player that cannot be loaded, fails, or commands what it must not.
+        """
+        core = self.core
+        if core.deployment is None or core.ended:
+            return
+        if self._player is None:
+            self._begin(core.deployment, now_ns)
+        if core.go is not None:
+            self._take(core.go.packets)
+            core.done(self._act(core.go.tick))
+        elif self._period_ns:
+            self._take(core.arrivals)
+            core.arrivals.clear()
+            if now_ns >= self._beat_ns:
+                core.send(self._act(max(core.tick, 0)), now_ns)
+                self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
+
+    def deadline_ns(self) -> int:
+        """When a free-running player acts next."""
+        return NEVER_NS if self.core.ended else self._beat_ns
+
+    def _begin(self, deployment: Deployment, now_ns: int) -> None:
+        name = self.core.name
+        if name not in deployment.players:
+            raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)
+        declared = self._declaration = deployment.players[name]
+        factory = self._load(declared.class_)
+        try:
+            self._player = factory(deployment, declared.parameters)
+        except Refused as error:
+            raise PlayerError(f"player {name}: {error}") from error
+        except Exception as error:
+            raise PlayerError(f"player {name}: {declared.class_} cannot be made: {_describe(error)}") from error
+        wanted = [(robot, channel) for robot, heard in sorted(declared.robots.items()) for channel in heard]
+        self._kinds = {pair: channel_kind(deployment, *pair) for pair in wanted}
+        if declared.lockstep:
+            self.core.join(deployment.ticks(declared.rate_hz), wanted)
+        else:
+            self.core.join(0, wanted)
+            self._period_ns = int(NS_PER_S / declared.rate_hz)
+            self._beat_ns = now_ns + self._period_ns
+
+    def _take(self, packets: Iterable[Received]) -> None:
+        """Keep the newest sample of each channel; what was sent later may have come earlier."""
+        for packet in packets:
+            pair = (packet.source, packet.channel)
+            kind = self._kinds.get(pair)
+            known = self.samples.get(pair)
+            if kind is None or (known is not None and known.sequence >= packet.sequence):
+                continue
+            try:
+                value = decode_payload(kind, packet.payload)
+            except Malformed:
+                self.malformed += 1
+                continue
+            self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
+
+    def _act(self, tick: int) -> list[Outgoing]:
+        """Ask the player, and check and pack what it commands, in the robots' name order."""
+        deployment, declared = self.core.deployment, self._declaration
+        assert self._player is not None and deployment is not None and declared is not None
+        where = f"player {self.core.name} at tick {tick}"
+        try:
+            commands = self._player.act(tick, self.samples)
+        except Exception as error:
+            raise PlayerError(f"{where}: act failed: {_describe(error)}") from error
+        packets = []
+        for robot, command in sorted(commands.items()):
+            if robot not in declared.robots:
+                raise PlayerError(f"{where}: {UnknownName('not one of its robots', robot, declared.robots)}")
+            if not isinstance(command, Command):
+                raise PlayerError(f"{where}: {robot} gets a {type(command).__name__}, not a Command")
+            try:
+                payload = encode_command(deployment, robot, command)
+            except Refused as error:
+                raise PlayerError(f"{where}: {error}") from error
+            packets.append(Outgoing(robot, CHANNEL_POSITION, payload))
+        return packets
+
+
+def _describe(error: Exception) -> str:
+    """An error of somebody's own code on one line."""
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
