@@ -38,7 +38,7 @@ class NodeProcess:
         self._wire = Wire(session, Plane.SIMULATION, inbox, name)
         self._inbox = inbox
         self._is_present = False
-        self._loop = Loop(self.core, inbox, start_log(name), lambda now_ns: self.core.deadline_ns())
+        self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
         self._loop.connect(self._wire)
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking
@@ -75,7 +75,13 @@ class NodeProcess:
             self._loop.perform()
             self._solver.solve(core.work)
             core.advance(now_ns)
-        self._solver.build_wanted()
+        if core.frame is None:
+            self._solver.build_wanted()
+        else:
+            self._solver.build_some()  # between two ticks, for a layout to come
+
+    def _deadline_ns(self, now_ns: int) -> int:
+        return now_ns if self._solver.is_building else self.core.deadline_ns()
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         if not is_alive and name == SUPERVISOR and self.core.ended is None:

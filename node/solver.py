@@ -5,39 +5,84 @@ Shared by the node's process and the rehearsal. Neighbours: `core` hands out wor
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from hashlib import blake2b
+from typing import Final
 
 import numpy as np
 
 from foosim.node.core import NodeCore
-from foosim.node.engines import ENGINES
+from foosim.node.engines import ENGINES, build_in_steps, prepare_spares
 from foosim.node.engines.interface import Engine, EngineFactory
 from foosim.node.step import Stepper, Work
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Layout
 from foosim.protocol.start import initial_numbers
 
-FINGERPRINT_TICKS = 32
+FINGERPRINT_TICKS: Final = 32
+ENGINES_KEPT: Final = 3
+"""The layout of the tick, the one before (an epoch may go back to it), and the next one."""
 
 
 class Solver:
-    """Builds what a node's core wants and solves its work."""
+    """Builds what a node's core wants and solves its work. The engines that were used last are kept."""
 
     def __init__(self, core: NodeCore, factory: EngineFactory | None = None) -> None:
         """`factory` overrides the deployment's engine."""
         self._core = core
         self._factory = factory
         self._engines: dict[bytes, Engine] = {}
+        """By layout, the one that was used last at the end."""
+        self._told = 0
+        """For how many of the layouts that the core wants it was told of an engine."""
+        self._building: tuple[Layout, Generator[None, None, Engine]] | None = None
         self._fingerprint = b""
+
+    # --- building ----------------------------------------------------------------------------------------------------
 
     def build_wanted(self) -> None:
         """Build an engine for every layout that is wanted and has none; the first one gives the fingerprint."""
-        for layout in self._core.layouts_wanted:
-            if layout.digest not in self._engines:
-                engine = self._engines[layout.digest] = self._make(layout)
-                if not self._fingerprint:
-                    self._fingerprint = engine_fingerprint(engine, self._core.stepper(layout))
-                self._core.engine_ready(layout, self._fingerprint)
+        while self.build_some():
+            continue
+
+    def build_some(self) -> bool:
+        """Do one step of building what is wanted; False when there is nothing to build."""
+        if self._building is None:
+            wanted = self._core.layouts_wanted
+            if self._told == len(wanted):
+                return False
+            while len(self._engines) >= ENGINES_KEPT:
+                self._engines.pop(next(iter(self._engines))).close()
+            self._building = wanted[self._told], self._steps(wanted[self._told])
+        layout, steps = self._building
+        try:
+            next(steps)
+        except StopIteration as end:
+            self._building = None
+            self._take(layout, end.value)
+        return True
+
+    @property
+    def is_building(self) -> bool:
+        return self._building is not None
+
+    def _steps(self, layout: Layout) -> Generator[None, None, Engine]:
+        deployment = self._core.deployment
+        assert deployment is not None
+        if self._factory is not None:
+            yield
+            return self._factory(deployment, layout)
+        if not self._fingerprint:
+            prepare_spares(deployment)
+        return (yield from build_in_steps(deployment, layout))
+
+    def _take(self, layout: Layout, engine: Engine) -> None:
+        """Keep a new engine and tell the core."""
+        self._engines[layout.digest] = engine
+        if not self._fingerprint:
+            self._fingerprint = engine_fingerprint(engine, self._core.stepper(layout))
+        self._told += 1
+        self._core.engine_ready(layout, self._fingerprint)
 
     def rebuild(self) -> None:
         """Replace every engine by a new one: nothing that matters is lost."""
@@ -47,20 +92,29 @@ class Solver:
                 old.close()
                 self._engines[layout.digest] = self._make(layout)
 
+    def _make(self, layout: Layout) -> Engine:
+        """Build an engine at once."""
+        deployment = self._core.deployment
+        assert deployment is not None
+        return (self._factory or ENGINES[deployment.engine])(deployment, layout)
+
+    # --- solving -----------------------------------------------------------------------------------------------------
+
+    def engine_for(self, layout: Layout) -> Engine:
+        """Return the engine of a layout; one that went, or never came, is built at once."""
+        engine = self._engines.pop(layout.digest, None) or self._make(layout)
+        self._engines[layout.digest] = engine
+        return engine
+
     def solve(self, work: Work) -> None:
         """Solve a tick's work and give it back to the core."""
-        self._core.stepper(work.layout).solve(self._engines[work.layout.digest], work)
+        self._core.stepper(work.layout).solve(self.engine_for(work.layout), work)
         self._core.solved(work)
 
     def close(self) -> None:
         for engine in self._engines.values():
             engine.close()
         self._engines.clear()
-
-    def _make(self, layout: Layout) -> Engine:
-        deployment = self._core.deployment
-        assert deployment is not None
-        return (self._factory or ENGINES[deployment.engine])(deployment, layout)
 
 
 def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:

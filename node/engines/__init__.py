@@ -5,7 +5,7 @@ Another engine is one file with a class that has `interface.Engine`'s methods, a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from typing import Final
 
 from foosim.node.engines.interface import Engine, EngineFactory
@@ -26,3 +26,24 @@ def _pure(deployment: Deployment, layout: Layout) -> Engine:
 
 
 ENGINES: Final[Mapping[str, EngineFactory]] = {"bullet": _bullet, "pure": _pure}
+
+SPARES: Final = 2
+"""Engines that a node may build before the first one is given back: the next layout's, and the one after that."""
+
+
+def prepare_spares(deployment: Deployment) -> None:
+    """Get ready what would hold up the ticks later, when another engine is built beside them."""
+    if deployment.engine == "bullet":
+        from foosim.node.engines.bullet import connect_spares
+
+        connect_spares(SPARES)
+
+
+def build_in_steps(deployment: Deployment, layout: Layout) -> Generator[None, None, Engine]:
+    """Build the deployment's engine in steps, each short enough to do between two ticks."""
+    if deployment.engine == "bullet":
+        from foosim.node.engines.bullet import BulletEngine
+
+        return (yield from BulletEngine.in_steps(deployment, layout))
+    yield
+    return ENGINES[deployment.engine](deployment, layout)

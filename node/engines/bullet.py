@@ -9,7 +9,7 @@ built).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Sequence
 from math import fsum, sqrt
 from typing import Any, Final
 
@@ -26,6 +26,7 @@ BALL_GROUP: Final = 1
 ROD_GROUP: Final = 2
 SCENERY_GROUP: Final = 4
 
+SPARES_MAX: Final = 4
 PARKING_Z_M: Final = 100.0
 PARKING_STEP_M: Final = 10.0
 """Parked bodies stand this far apart, far above the table: no pair of theirs can touch."""
@@ -38,24 +39,70 @@ SPEED_MAX: Final = 1000.0
 """Bullet clamps each coordinate's velocity of a multibody at 100 by default: a ball could not roll above 1.75 m/s."""
 
 
+_spare_clients: list[int] = []
+"""Connected clients without bodies. Emptied, a client is as new; the laws are tested with such ones, too."""
+
+
+def connect_spares(count: int) -> None:
+    """Have this many clients at hand, so that an engine can be built while ticks go on."""
+    while len(_spare_clients) < count:
+        _spare_clients.append(_connect())
+
+
+def _connect() -> int:
+    client: int = p.connect(p.DIRECT)
+    assert client >= 0, "no physics client is left"
+    return client
+
+
+def _take_client() -> int:
+    return _spare_clients.pop() if _spare_clients else _connect()
+
+
+def _give_client(client: int) -> None:
+    if len(_spare_clients) < SPARES_MAX:
+        p.resetSimulation(physicsClientId=client)
+        _spare_clients.append(client)
+    else:
+        p.disconnect(physicsClientId=client)
+
+
 class BulletEngine:
     """The bodies of one layout in a physics client of their own."""
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
-        """Build scenery and bodies, all parked. Takes about 10 ms for the table, holding the GIL."""
+        """Build scenery and bodies, all parked. Takes about 20 ms for the table, holding the interpreter."""
+        for _ in self._build(deployment, layout):
+            pass
+
+    @classmethod
+    def in_steps(cls, deployment: Deployment, layout: Layout) -> Generator[None, None, BulletEngine]:
+        """Build one a body at a time, with ticks of another engine in between; a step takes up to 0.5 ms.
+
+        So long as there is a spare client: connecting one takes 15 ms.
+        """
+        engine = cls.__new__(cls)
+        yield from engine._build(deployment, layout)
+        return engine
+
+    def _build(self, deployment: Deployment, layout: Layout) -> Iterator[None]:
         self._table = deployment.table
         self._substeps = deployment.substeps
         self._dt = deployment.tick_ns / 1e9 / deployment.substeps
-        self._client: int = p.connect(p.DIRECT)
-        assert self._client >= 0, "no physics client is left"
+        self._client: int = _take_client()
         p.setGravity(0.0, 0.0, -deployment.table.gravity, physicsClientId=self._client)
         p.setPhysicsEngineParameter(**self._settings(), physicsClientId=self._client)
+        yield
         scene = build_scene(deployment, layout)
-        self._scenery_ids = {self._make_scenery(shape): shape.surface for shape in scene.scenery}
+        self._scenery_ids: dict[int, str] = {}
+        for shape in scene.scenery:
+            self._scenery_ids[self._make_scenery(shape)] = shape.surface
+            yield
         self._ids: dict[str, int] = {}
         for name in self._build_order(list(scene.bodies)):
             body = scene.bodies[name]
             self._ids[name] = self._make_ball(body) if body.model == "ball" else self._make_rod(body)
+            yield
         self._bases = {name: body.position for name, body in scene.bodies.items()}
         self._balls = [entity.name for entity in layout.balls]
         self._rods = [entity.name for entity in layout.rods]
@@ -396,7 +443,7 @@ class BulletEngine:
             state[at : at + 3] = self._logs.get(entity.name, NO_CONTACT)
 
     def close(self) -> None:
-        """Free the physics client."""
+        """Empty the physics client and keep it for the next engine."""
         if self._client >= 0:
-            p.disconnect(physicsClientId=self._client)
+            _give_client(self._client)
             self._client = -1
