@@ -53,8 +53,8 @@ ZENOHS_OWN: Final = "()"
 class Way:
     """One way to receive and send, and Zenoh's threads in the router and in its clients.
 
-    The reader `waits` for the channel that it `lacks` (others do not wake it), for `any` of its channels in one queue,
-    or for `threads`, one for each channel.
+    The reader `waits` for all that it `lacks` of one channel (nothing else wakes it), for `any` message of its channels
+    in one queue, or for `threads`, one for each channel.
     """
 
     name: str
@@ -137,15 +137,16 @@ class Member:
     def put(self, channel: str, tick: int) -> None:
         self.publishers[channel].put(tick.to_bytes(8, "little") + self.filling)
 
-    def take(self, lacking: str = "") -> None:
-        for channel, sender, payload in self.inbox.take(WANT_AFTER_NS / 1e9, lacking):
+    def take(self, lacking: str = "", count: int = 1) -> None:
+        for channel, sender, payload in self.inbox.take(WANT_AFTER_NS / 1e9, lacking, count):
             self.heard.add((channel, sender, int.from_bytes(payload[:8], "little")))
 
     def wait_for(self, *wanted: tuple[str, str, int]) -> None:
         """Return when all of these have been heard; what comes last stands last."""
         since = time.monotonic()
         while missing := [want for want in wanted if want not in self.heard]:
-            self.take(missing[-1][0])
+            lacking = missing[-1][0]
+            self.take(lacking, sum(channel == lacking for channel, _, _ in missing))
             assert time.monotonic() - since < SILENCE_S, f"{self.role} has not heard {missing}"
         self.heard.difference_update(wanted)
 

@@ -86,12 +86,15 @@ class Inbox:
         `lacking` is the channel without `count` messages of which the reader cannot go on: fewer do not end the wait,
         nor does what comes in the queues of other sources. An empty list says that nothing came.
         """
+        sources = self._sources  # a session that closes takes them away
         received: list[Item] = []
-        for source in self._sources.values():
+        for source in sources.values():
             received += source.poll()
-        if self._sources:
-            self._source = self._sources.get(lacking) or next(iter(self._sources.values()))
-            self._count = count if lacking in self._sources else 1
+        if sources:
+            self._source = sources.get(lacking) or next(iter(sources.values()))
+            self._count = count if lacking in sources else 1
+            if self._sources is not sources:
+                self._source = None
         if received or self._items or (timeout_s is not None and timeout_s <= 0):
             return self._hand_over(received)
         deadline_ns = None if timeout_s is None else time.monotonic_ns() + int(timeout_s * _NS)

@@ -31,9 +31,11 @@ class QueueSource:
             if item is not None:
                 items.append(item)
 
-    def wait(self) -> list[Item]:
-        item = self.queue.get()
-        return [*([] if item is None else [item]), *self.poll()]
+    def wait(self, count: int) -> list[Item]:
+        items: list[Item] = []
+        while len(items) < count and (item := self.queue.get()) is not None:
+            items.append(item)
+        return items + self.poll()
 
     def ring(self) -> None:
         self.queue.put(None)
@@ -274,6 +276,37 @@ def test_what_others_send_does_not_wake_a_reader_that_lacks_something() -> None:
     sources["order"].queue.put(order)
     assert inbox.take(LONG_S, "unknown") == [order]
     assert inbox.take(0.002, "part") == []
+
+
+def test_fewer_than_the_reader_lacks_do_not_wake_it() -> None:
+    inbox, source = Inbox(ALL), QueueSource()
+    inbox.attach(source, "part")
+    read: list[list[Item]] = []
+    for wanted in (2, 3):
+        reader = threading.Thread(target=lambda count=wanted: read.append(inbox.take(LONG_S, "part", count)))
+        reader.start()
+        while not inbox._waiting:
+            time.sleep(0)
+        for number in range(wanted):
+            source.queue.put(item("a", number))
+        reader.join()
+    assert read == [[item("a", number) for number in range(wanted)] for wanted in (2, 3)]
+
+
+def test_what_there_is_of_the_lacking_comes_at_the_deadline_or_with_an_offer() -> None:
+    inbox, source = Inbox(ALL), QueueSource()
+    inbox.attach(source, "part")
+    for end in (lambda: inbox.offer(item("timer")), inbox.wake, lambda: None):
+        read: list[list[Item]] = []
+        reader = threading.Thread(target=lambda read=read: read.append(inbox.take(0.1, "part", 2)))
+        reader.start()
+        while not inbox._waiting:
+            time.sleep(0)
+        source.queue.put(item("a"))
+        end()
+        reader.join()
+        assert [*read[0], *inbox.take(0)][0] == item("a")
+        assert inbox.take(0) == []
 
 
 def test_an_offer_wakes_a_reader_whatever_it_lacks() -> None:
