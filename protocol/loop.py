@@ -143,8 +143,8 @@ class Loop:
         slept_ns = time.monotonic_ns()
         lacking = self.lacking()
         timeout_s = max(0, self._wake_ns - slept_ns) / NS_PER_S
-        channel, count = ("", 1) if lacking is None else (lacking[0].key, lacking[1])
-        items = self._inbox.take(timeout_s, channel, count)
+        lacks, count = ("", 1) if lacking is None else (lacking[0].key, lacking[1])
+        items = self._inbox.take(timeout_s, lacks, count)
         now_ns = time.monotonic_ns()
         self._measure(now_ns, now_ns - slept_ns)
         channels = self._channels
