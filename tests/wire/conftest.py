@@ -30,7 +30,7 @@ LIMIT_S: Final = 100.0
 T = TypeVar("T")
 
 
-def wait_for(what: str, found: Callable[[], T]) -> T:
+def wait_for(what: str, found: Callable[[], T | None]) -> T:
     """Return the first true value of `found`."""
     deadline_s = time.monotonic() + LIMIT_S
     while time.monotonic() < deadline_s:
