@@ -20,6 +20,7 @@ class QueueSource:
 
     def __init__(self) -> None:
         self.queue: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
+        self.counts: list[int] = []
 
     def poll(self) -> list[Item]:
         items: list[Item] = []
@@ -32,6 +33,7 @@ class QueueSource:
                 items.append(item)
 
     def wait(self, count: int) -> list[Item]:
+        self.counts.append(count)
         items: list[Item] = []
         while len(items) < count and (item := self.queue.get()) is not None:
             items.append(item)
@@ -291,6 +293,9 @@ def test_fewer_than_the_reader_lacks_do_not_wake_it() -> None:
             source.queue.put(item("a", number))
         reader.join()
     assert read == [[item("a", number) for number in range(wanted)] for wanted in (2, 3)]
+    assert inbox.take(0.002) == inbox.take(0.002, "other", 4) == []
+    assert source.counts[:2] == [2, 3]
+    assert set(source.counts[2:]) == {1}
 
 
 def test_what_there_is_of_the_lacking_comes_at_the_deadline_or_with_an_offer() -> None:
