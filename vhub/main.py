@@ -73,6 +73,7 @@ class HubProcess:
         self._radio.read(channels.VHUB_READS)
         self._wire.watch_alive(SUPERVISOR)
         self._radio.watch_alive()
+        self._radio.declare_alive()
 
     def run(self) -> int:
         """Take part until the end, close the capture, say farewell; return the exit code."""
