@@ -3,12 +3,11 @@
 Threads that receive only offer to it; the loop takes everything that is there, decides, and sleeps until there is more
 or its deadline has come. Nothing else may happen in a receiving thread: the rest of the world waits behind it.
 
-A waiting reader costs a wake-up for each message, and a receiving thread between network and reader costs a second one
-(7 us on the machines of the bench, in every process, for every message). So an inbox can have `Source`s, in one of
-whose queues the reader waits itself: in that of the channel without which it cannot go on, so that nothing else wakes
-it for nothing. It looks into the others whenever it is awake; what threads offer rings the bell of the queue that it
-waits in.
-Neighbours: `session` fills it and has the source; `bench/barrier.py` measures both ways.
+A waiting reader costs a wake-up for each message, and a receiving thread between network and reader costs a second one:
+a quarter more for all that a tick's messages cost (`bench/barrier.py`). So an inbox can have `Source`s, in one of whose
+queues the reader waits itself: in that of the channel without which it cannot go on, so that nothing else wakes it for
+nothing. It looks into the others whenever it is awake; what threads offer rings the bell of the queue that it waits in.
+Neighbours: `session` fills it and has the sources.
 """
 
 from __future__ import annotations
