@@ -20,6 +20,7 @@ class TableRules:
 
     goal_x_m: float
     goal_y_m: float
+    goal_z_m: float
     end_x_m: float
     side_y_m: float
     kickoff_speed: float
@@ -37,6 +38,7 @@ class TableRules:
         return cls(
             goal_x_m=table.field.length / 2 + table.ball.radius,
             goal_y_m=table.goal.width / 2,
+            goal_z_m=table.goal.height,
             end_x_m=table.field.length / 2 + table.walls.thickness + table.goal.depth,
             side_y_m=table.field.width / 2,
             kickoff_speed=table.rules.kickoff_speed,
@@ -62,7 +64,7 @@ class TableRules:
             return
         start = ball.offsets["position"]
         x, y, z = numbers[start : start + 3]
-        if abs(x) > self.goal_x_m and abs(y) < self.goal_y_m and 0.0 < z < 2 * self.goal_y_m:
+        if self.goal_x_m < abs(x) <= self.end_x_m and abs(y) < self.goal_y_m and 0.0 < z < self.goal_z_m:
             scorer = 0 if x > 0.0 else 1
             numbers[layout[WORLD].offsets["score"] + scorer] += 1.0
             self._to_the_spot(numbers, ball)

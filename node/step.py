@@ -78,6 +78,8 @@ class Stepper:
         self._x_max = table.field.length / 2 + margin
         self._y_max = table.field.width / 2 + margin
         self._z_min, self._z_max = -margin, table.walls.height + margin
+        tick_s = deployment.tick_ns / 1e9
+        self._slide_reach_m, self._spin_reach_rad = self._slide_speed_max * tick_s, self._spin_speed_max * tick_s
         self._rods: dict[int, tuple[int, int, float]] = {}
         for entity in layout.rods:
             spec = deployment.robots[entity.name]
@@ -87,7 +89,7 @@ class Stepper:
                 entity.offsets["joint_velocities"],
                 table.lines[spec.line].half_stroke + STOP_DEPTH_M,
             )
-        self._ball_reach_m = self._ball_speed_max * deployment.tick_ns / 1e9
+        self._ball_reach_m = self._ball_speed_max * tick_s
 
     def sense(self, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], list[int]]:
         """Return what these robots send at the frame's tick, and the counters of the sensors that sampled."""
@@ -152,6 +154,9 @@ class Stepper:
         numbers = work.numbers
         bodies = [entity for island in work.islands for entity in island]
         if any(numbers[entity.offsets["quarantined"]] != 0.0 for entity in bodies):
+            for entity in bodies:
+                if numbers[entity.offsets["quarantined"]] != 0.0:
+                    _clear_log(entity, numbers)
             bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] == 0.0]
         if not bodies:
             return
@@ -161,26 +166,30 @@ class Stepper:
         engine.step(self.substeps)
         before = numbers.copy()
         engine.read(bodies, numbers)
-        self._quarantine(work, before)
+        if not (isfinite(sum(numbers)) and all(self._plausible(entity, numbers, before) for entity in bodies)):
+            self._quarantine(work, before)
 
     def _quarantine(self, work: Work, before: list[float]) -> None:
-        """An island with a result that cannot be keeps its edited state; the bad entities are marked."""
+        """An island with a result that cannot be keeps its edited state; the bad entities are marked.
+
+        Who was in quarantine before was copied: its state, which may be as bad as ever, says nothing of the others.
+        """
         numbers = work.numbers
-        if isfinite(sum(numbers)) and all(
-            self._plausible(entity, numbers, before) for island in work.islands for entity in island
-        ):
-            return
         for island in work.islands:
             bad = [
                 entity
                 for entity in island
-                if not isfinite(sum(numbers[entity.start : entity.split]))
-                or not self._plausible(entity, numbers, before)
+                if before[entity.offsets["quarantined"]] == 0.0
+                and not (
+                    all(map(isfinite, numbers[entity.start : entity.split]))
+                    and self._plausible(entity, numbers, before)
+                )
             ]
             if not bad:
                 continue
             for entity in island:
                 numbers[entity.start : entity.split] = before[entity.start : entity.split]
+                _clear_log(entity, numbers)
             for entity in bad:
                 numbers[entity.offsets["quarantined"]] = 1.0
 
@@ -191,6 +200,8 @@ class Stepper:
             slide, speed, slide_max = rod
             return (
                 -slide_max <= numbers[slide] <= slide_max
+                and abs(numbers[slide] - before[slide]) <= self._slide_reach_m
+                and abs(numbers[slide + 1] - before[slide + 1]) <= self._spin_reach_rad
                 and -self._slide_speed_max <= numbers[speed] <= self._slide_speed_max
                 and -self._spin_speed_max <= numbers[speed + 1] <= self._spin_speed_max
             )
@@ -206,6 +217,12 @@ class Stepper:
             and vx * vx + vy * vy + vz * vz <= self._ball_speed_max * self._ball_speed_max
             and dx * dx + dy * dy + dz * dz <= self._ball_reach_m * self._ball_reach_m
         )
+
+
+def _clear_log(entity: Entity, numbers: list[float]) -> None:
+    """Empty the contact log of a body that was not solved: a contact happens once."""
+    start = entity.offsets["contacts"]
+    numbers[start : start + 3] = (0.0, 0.0, -1.0)
 
 
 def _sensors_of(deployment: Deployment, robot: str) -> list[tuple[str, RodSensor | BallSensor]]:

@@ -1,0 +1,107 @@
+"""The position actuator: which commands it takes, and what it tells the motors."""
+
+from __future__ import annotations
+
+import struct
+from math import inf, nan
+from pathlib import Path
+from typing import Final
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foosim.node.actuators.position import ANGLE_RAD_MAX, PositionActuator
+from foosim.node.step import Stepper
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import Delivered
+from foosim.protocol.start import initial_numbers
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
+LAYOUT: Final = build_layout(DEPLOYMENT)
+ROD: Final = LAYOUT["red.goal"]
+STROKE: Final = DEPLOYMENT.table.lines["goal"].half_stroke
+DRIVE: Final = DEPLOYMENT.table.drive
+
+
+def packed(slide: float, spin: float) -> bytes:
+    return struct.pack("<2d", slide, spin)
+
+
+def wanted(numbers: list[float]) -> tuple[float, float]:
+    at = ROD.offsets["wanted"]
+    return numbers[at], numbers[at + 1]
+
+
+REFUSED: Final[dict[str, bytes]] = {
+    "empty": b"",
+    "a byte too few": packed(0.01, 0.0)[:-1],
+    "a byte too many": packed(0.01, 0.0) + b"\x00",
+    "one number": struct.pack("<d", 0.01),
+    "three numbers": struct.pack("<3d", 0.01, 0.0, 0.0),
+    "slide is no number": packed(nan, 0.0),
+    "spin is no number": packed(0.01, nan),
+    "slide without end": packed(inf, 0.0),
+    "spin without end": packed(0.01, -inf),
+    "beyond the stroke": packed(STROKE + 1e-9, 0.0),
+    "beyond the other stroke": packed(-STROKE - 1e-9, 0.0),
+    "too many turns": packed(0.0, ANGLE_RAD_MAX + 1e-9),
+    "too many turns back": packed(0.0, -ANGLE_RAD_MAX - 1e-9),
+    "great": packed(1.7e308, -1.7e308),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_no_command_is_refused_counted_and_changes_nothing(what: str) -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    assert PositionActuator(DEPLOYMENT, ROD).accept(packed(0.05, 1.0), numbers)
+    before = numbers.copy()
+    assert not PositionActuator(DEPLOYMENT, ROD).accept(REFUSED[what], numbers)
+    assert numbers == before
+    packet = Delivered(0, "player-red", 1, 0, "red.goal", "position", REFUSED[what])
+    Stepper(DEPLOYMENT, LAYOUT).deliver([packet, packet], [ROD.index], numbers)
+    assert numbers[ROD.offsets["refused"]] == 2.0
+    numbers[ROD.offsets["refused"]] = 0.0
+    assert numbers == before
+
+
+@settings(max_examples=100)
+@given(slide=st.floats(-STROKE, STROKE), spin=st.floats(-ANGLE_RAD_MAX, ANGLE_RAD_MAX))
+def test_a_command_within_reach_is_the_actuators_memory(slide: float, spin: float) -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    assert PositionActuator(DEPLOYMENT, ROD).accept(packed(slide, spin), numbers)
+    assert wanted(numbers) == (slide, spin)
+    numbers[ROD.offsets["wanted"] : ROD.offsets["wanted"] + 2] = [0.0, 0.0]
+    assert numbers == initial_numbers(DEPLOYMENT, LAYOUT), "and nothing else changes"
+
+
+@settings(max_examples=200)
+@given(
+    wants=st.tuples(st.floats(-STROKE, STROKE), st.floats(-ANGLE_RAD_MAX, ANGLE_RAD_MAX)),
+    position=st.tuples(st.floats(-STROKE, STROKE), st.floats(-1e4, 1e4)),
+)
+def test_the_loop_is_proportional_and_limited(wants: tuple[float, float], position: tuple[float, float]) -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    at = ROD.offsets["joint_positions"]
+    numbers[at : at + 2] = position
+    actuator = PositionActuator(DEPLOYMENT, ROD)
+    assert actuator.accept(packed(*wants), numbers)
+    (slide, force), (spin, torque) = actuator.command(numbers)
+    assert (force, torque) == (DRIVE.slide.force, DRIVE.spin.torque)
+    for speed, gain, limit, error in (
+        (slide, DRIVE.slide.gain, DRIVE.slide.speed, wants[0] - position[0]),
+        (spin, DRIVE.spin.gain, DRIVE.spin.speed, wants[1] - position[1]),
+    ):
+        assert abs(speed) <= limit
+        assert speed == max(-limit, min(limit, gain * error))
+
+
+def test_each_line_has_its_own_stroke() -> None:
+    for name, stroke in (("red.midfield", "midfield"), ("blue.defence", "defence")):
+        numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+        actuator = PositionActuator(DEPLOYMENT, LAYOUT[name])
+        reach = DEPLOYMENT.table.lines[stroke].half_stroke  # type: ignore[index]
+        assert actuator.accept(packed(-reach, 0.0), numbers)
+        assert not actuator.accept(packed(-reach - 1e-6, 0.0), numbers)

@@ -1,0 +1,180 @@
+"""Sensors: keyed Gaussian noise, rates in whole ticks, and nothing but frame, seed and names in a sample."""
+
+from __future__ import annotations
+
+import struct
+from math import sqrt
+from pathlib import Path
+from statistics import NormalDist, fmean
+from typing import Final
+
+import numpy as np
+import pytest
+
+from foosim.node.sensors import SENSORS, make_sensor
+from foosim.node.step import Stepper
+from foosim.protocol.deployment import Deployment, RodSensor
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.draws import draw_key, draw_words, gaussian
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import RobotPacket
+from foosim.protocol.start import initial_numbers
+
+TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
+DEPLOYMENT: Final = load_deployment(TEXT, "table.yaml")
+LAYOUT: Final = build_layout(DEPLOYMENT)
+NUMBERS: Final = initial_numbers(DEPLOYMENT, LAYOUT)
+COUNT: Final = 20_000
+CELLS: Final = 64
+CHI2_63_999: Final = 103.44
+
+
+def deployed(*sets: str) -> Deployment:
+    return load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+
+
+def samples(robot: str, channel: str, numbers: list[float], deployment: Deployment = DEPLOYMENT) -> list[list[float]]:
+    settings = deployment.robots[robot].sensors[channel]
+    sensor = make_sensor(settings, LAYOUT, LAYOUT[robot], channel, deployment.seed)
+    drawn = [sensor.sample(numbers, tick) for tick in range(COUNT)]
+    return [list(struct.unpack(f"<{len(raw) // 8}d", raw)) for raw in drawn]
+
+
+def assert_gaussian(errors: list[float], sd: float) -> None:
+    """Mean, variance and the whole distribution (chi-squared, 64 cells), each at 99.9 % for fixed seeds."""
+    assert abs(fmean(errors)) < 3.29 * sd / sqrt(COUNT)
+    assert abs(fmean(error * error for error in errors) / sd**2 - 1.0) < 3.29 * sqrt(2 / COUNT)
+    counts = [0] * CELLS
+    for error in errors:
+        counts[int(NormalDist(0.0, sd).cdf(error) * CELLS)] += 1
+    expected = COUNT / CELLS
+    assert sum((count - expected) ** 2 / expected for count in counts) < CHI2_63_999
+
+
+def correlation(one: list[float], other: list[float]) -> float:
+    products = fmean(a * b for a, b in zip(one, other, strict=True))
+    return products / sqrt(fmean(a * a for a in one) * fmean(b * b for b in other))
+
+
+def test_an_encoder_measures_slide_and_spin_with_noise_of_its_own_on_each() -> None:
+    numbers = NUMBERS.copy()
+    at = LAYOUT["red.goal"].offsets["joint_positions"]
+    numbers[at : at + 2] = [0.05, -2.5]
+    settings = DEPLOYMENT.robots["red.goal"].sensors["encoder"]
+    assert isinstance(settings, RodSensor)
+    drawn = samples("red.goal", "encoder", numbers)
+    slides, spins = [slide - 0.05 for slide, _ in drawn], [spin + 2.5 for _, spin in drawn]
+    assert_gaussian(slides, settings.position_noise)
+    assert_gaussian(spins, settings.angle_noise)
+    assert abs(correlation(slides, spins)) < 3.29 / sqrt(COUNT)
+    assert abs(correlation(slides[1:], slides[:-1])) < 3.29 / sqrt(COUNT), "noise does not remember"
+
+
+def test_the_camera_measures_the_ball_with_noise_along_the_field_only() -> None:
+    numbers = NUMBERS.copy()
+    at = LAYOUT["ball"].offsets["position"]
+    numbers[at : at + 3] = [0.3, -0.2, 0.04]
+    drawn = samples("camera", "ball", numbers)
+    xs, ys = [x - 0.3 for x, _, _ in drawn], [y + 0.2 for _, y, _ in drawn]
+    assert_gaussian(xs, 0.0015)
+    assert_gaussian(ys, 0.0015)
+    assert abs(correlation(xs, ys)) < 3.29 / sqrt(COUNT)
+    assert {z for _, _, z in drawn} == {0.04}
+
+
+def test_noise_is_keyed_by_seed_robot_and_channel() -> None:
+    """Any tick alone gives what it gives in a row; another seed, robot or channel gives another luck."""
+    settings = DEPLOYMENT.robots["red.goal"].sensors["encoder"]
+    alone = make_sensor(settings, LAYOUT, LAYOUT["red.goal"], "encoder", 1).sample(NUMBERS, 777)
+    words = draw_words(draw_key(1, "noise", "red.goal", "encoder"), 777)
+    assert isinstance(settings, RodSensor)
+    assert struct.unpack("<2d", alone) == (
+        settings.position_noise * gaussian(words[0]),
+        settings.angle_noise * gaussian(words[1]),
+    )
+    others = [
+        make_sensor(settings, LAYOUT, LAYOUT["red.goal"], "encoder", 2),
+        make_sensor(settings, LAYOUT, LAYOUT["red.attack"], "encoder", 1),
+        make_sensor(settings, LAYOUT, LAYOUT["red.goal"], "second", 1),
+    ]
+    assert len({alone, *(sensor.sample(NUMBERS, 777) for sensor in others)}) == 4
+
+
+def test_noise_does_not_depend_on_what_is_measured() -> None:
+    moved = NUMBERS.copy()
+    at = LAYOUT["ball"].offsets["position"]
+    moved[at] = 0.25
+    sensor = make_sensor(DEPLOYMENT.robots["camera"].sensors["ball"], LAYOUT, LAYOUT["camera"], "ball", 1)
+    still, there = (struct.unpack("<3d", sensor.sample(numbers, 9)) for numbers in (NUMBERS, moved))
+    assert there[0] - still[0] == pytest.approx(0.25, abs=1e-15) and there[1:] == still[1:]
+
+
+def test_without_noise_a_sample_is_the_frame() -> None:
+    quiet = deployed("robots.camera.sensors.ball.noise=0 mm")
+    seen = {tuple(sample) for sample in samples("camera", "ball", NUMBERS, quiet)}
+    assert seen == {(0.0, 0.0, DEPLOYMENT.table.ball.radius)}
+
+
+def test_every_kind_of_the_deployment_has_its_sensor() -> None:
+    kinds = {sensor.kind for robot in DEPLOYMENT.robots.values() for sensor in robot.sensors.values()}
+    assert kinds == set(SENSORS)
+
+
+def sensed(deployment: Deployment, ticks: int) -> dict[tuple[str, str], list[int]]:
+    """The ticks at which each channel sends."""
+    layout = build_layout(deployment)
+    stepper = Stepper(deployment, layout)
+    values = np.array(initial_numbers(deployment, layout))
+    sent: dict[tuple[str, str], list[int]] = {}
+    for tick in range(ticks):
+        packets, counters = stepper.sense(Frame(tick, layout, values), layout.robots)
+        assert len(counters) == len(packets)
+        for packet in packets:
+            sent.setdefault((packet.robot, packet.channel), []).append(tick)
+    return sent
+
+
+def test_each_sensor_sends_at_its_own_rate_from_tick_zero() -> None:
+    mixed = deployed("robots.camera.sensors.ball.rate=50 Hz", "robots.red.goal.sensors.encoder.rate=500 Hz")
+    sent = sensed(mixed, 60)
+    assert sent.pop(("camera", "ball")) == list(range(0, 60, 10))
+    assert sent.pop(("red.goal", "encoder")) == list(range(60))
+    assert len(sent) == 7 and all(ticks == list(range(0, 60, 5)) for ticks in sent.values())
+
+
+def test_a_rate_is_whole_ticks_whatever_the_tick() -> None:
+    assert set(map(tuple, sensed(deployed("tick=5 ms", "substeps=10"), 12).values())) == {tuple(range(0, 12, 2))}
+
+
+def test_counters_of_samples_are_the_owners_slots() -> None:
+    stepper = Stepper(DEPLOYMENT, LAYOUT)
+    robots = [LAYOUT["camera"], LAYOUT["red.goal"]]
+    packets, counters = stepper.sense(Frame(0, LAYOUT, np.array(NUMBERS)), robots)
+    assert [packet.robot for packet in packets] == ["camera", "red.goal"]
+    assert counters == [LAYOUT["camera"].offsets["sampled.ball"], LAYOUT["red.goal"].offsets["sampled.encoder"]]
+    assert all(robot.split <= slot < robot.stop for robot, slot in zip(robots, counters, strict=True))
+
+
+def test_what_a_robot_sends_is_numbered_in_the_order_of_channels() -> None:
+    two = deployed(
+        "robots.red.goal.sensors={zeta: {kind: encoder, rate: 100 Hz, position_noise: 0 mm, angle_noise: 0 deg}, "
+        "alpha: {kind: encoder, rate: 100 Hz, position_noise: 0 mm, angle_noise: 0 deg}}",
+        "players={}",
+    )
+    layout = build_layout(two)
+    frame = Frame(0, layout, np.array(initial_numbers(two, layout)))
+    packets, _ = Stepper(two, layout).sense(frame, [layout["red.goal"]])
+    payload = struct.pack("<2d", 0.0, 0.0)
+    assert packets == [
+        RobotPacket("red.goal", 0, "", "alpha", payload),
+        RobotPacket("red.goal", 1, "", "zeta", payload),
+    ]
+
+
+def test_who_senses_and_beside_whom_changes_no_sample() -> None:
+    stepper = Stepper(DEPLOYMENT, LAYOUT)
+    frame = Frame(10, LAYOUT, np.array(NUMBERS))
+    together, _ = stepper.sense(frame, LAYOUT.robots)
+    apart = [packet for robot in LAYOUT.robots for packet in stepper.sense(frame, [robot])[0]]
+    assert together == apart and len(together) == len(LAYOUT.robots)

@@ -1,0 +1,213 @@
+"""The pure parts of a tick: what an order changes, what a packet changes, and that nothing else does."""
+
+from __future__ import annotations
+
+import struct
+from math import inf, nan
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pytest
+
+from foosim.node.edits import check_edits
+from foosim.node.engines import ENGINES
+from foosim.node.step import Stepper, Work
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.messages import Add, Delivered, Edit, Push, Remove, Stop
+from foosim.protocol.start import initial_frame, initial_numbers, place_ball
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
+LAYOUT: Final = build_layout(DEPLOYMENT)
+STEPPER: Final = Stepper(DEPLOYMENT, LAYOUT)
+EVERY: Final = tuple(range(len(LAYOUT.entities)))
+MASS: Final = DEPLOYMENT.table.ball.mass
+HERE: Final = (0.1, -0.2, 0.03)
+THERE: Final = (1.0, 2.0, -3.0)
+REST: Final = (0.0, 0.0, 0.0)
+
+
+def in_play(layout: Layout = LAYOUT, tick: int = 7) -> Frame:
+    """A frame in which the ball rolls and a rod turns, so that nothing is zero by chance."""
+    numbers = initial_numbers(DEPLOYMENT, layout)
+    for number, ball in enumerate(layout.balls):
+        place_ball(numbers, ball, (0.2 - 0.1 * number, 0.1, 0.0175), (-1.5, 0.3, 0.0))
+    numbers[layout["red.goal"].offsets["joint_velocities"]] = 0.4
+    return Frame(tick, layout, np.array(numbers))
+
+
+def slots(numbers: list[float], layout: Layout, name: str, field: str, count: int) -> list[float]:
+    start = layout[name].offsets[field]
+    return numbers[start : start + count]
+
+
+def delivered(destination: str, payload: bytes = b"", channel: str = "position", **more: Any) -> Delivered:
+    return Delivered(more.get("due", 0), "player-red", more.get("sequence", 1), 0, destination, channel, payload)
+
+
+def command(slide: float, spin: float) -> bytes:
+    return struct.pack("<2d", slide, spin)
+
+
+# --- what an order does ----------------------------------------------------------------------------------------------
+
+
+def test_without_edits_and_rules_at_work_the_frame_is_as_it_was() -> None:
+    frame = in_play()
+    layout, numbers = STEPPER.edited(frame, [])
+    assert layout is LAYOUT and numbers == frame.numbers and numbers is not frame.numbers
+
+
+def test_an_added_ball_is_there_at_once() -> None:
+    frame = in_play()
+    layout, numbers = STEPPER.edited(frame, [Add("a2", "ball", HERE, THERE)])
+    assert layout.digest == build_layout(DEPLOYMENT, [("a2", "ball")]).digest
+    assert slots(numbers, layout, "a2", "position", 3) == list(HERE)
+    assert slots(numbers, layout, "a2", "linear_velocity", 3) == list(THERE)
+    assert slots(numbers, layout, "a2", "orientation", 4) == [0.0, 0.0, 0.0, 1.0]
+    for entity in LAYOUT.entities:
+        moved = layout[entity.name]
+        assert numbers[moved.start : moved.stop] == frame.numbers[entity.start : entity.stop], entity.name
+
+
+def test_a_removed_ball_is_gone_and_the_others_stay() -> None:
+    bigger = build_layout(DEPLOYMENT, [("a2", "ball"), ("c2", "ball")])
+    frame = in_play(bigger)
+    layout, numbers = Stepper(DEPLOYMENT, bigger).edited(frame, [Remove("a2")])
+    assert "a2" not in layout and layout.size == bigger.size - (bigger["a2"].stop - bigger["a2"].start)
+    for entity in layout.entities:
+        old = bigger[entity.name]
+        assert numbers[entity.start : entity.stop] == frame.numbers[old.start : old.stop], entity.name
+
+
+def test_a_push_is_impulse_over_mass_and_adds_up() -> None:
+    frame = in_play()
+    impulse = (0.021, -0.0042, 0.0)
+    _, once = STEPPER.edited(frame, [Push("ball", impulse)])
+    before = frame.vector("ball", "linear_velocity", 3)
+    expected = [v + p / MASS for v, p in zip(before, impulse, strict=True)]
+    assert slots(once, LAYOUT, "ball", "linear_velocity", 3) == expected
+    _, twice = STEPPER.edited(frame, [Push("ball", impulse), Push("ball", impulse)])
+    assert slots(twice, LAYOUT, "ball", "linear_velocity", 3) == [
+        v + p / MASS for v, p in zip(expected, impulse, strict=True)
+    ]
+    changed = [i for i, (a, b) in enumerate(zip(once, frame.numbers, strict=True)) if a != b]
+    start = LAYOUT["ball"].offsets["linear_velocity"]
+    assert changed == [start, start + 1]
+
+
+def test_edits_apply_in_their_order() -> None:
+    _, numbers = STEPPER.edited(in_play(), [Add("a2", "ball", HERE, REST), Push("a2", (MASS, 0.0, 0.0))])
+    layout = build_layout(DEPLOYMENT, [("a2", "ball")])
+    assert slots(numbers, layout, "a2", "linear_velocity", 3) == [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [Add("ball", "ball", HERE, THERE), Push("red.goal", HERE), Push("nobody", HERE), Remove("ball"), Stop("now")],
+    ids=lambda edit: type(edit).__name__,
+)
+def test_an_edit_that_does_not_fit_changes_nothing(edit: Edit) -> None:
+    frame = in_play()
+    layout, numbers = STEPPER.edited(frame, [edit])
+    assert layout is LAYOUT and numbers == frame.numbers
+
+
+@pytest.mark.parametrize("bad", [nan, inf, -inf])
+def test_edits_with_numbers_that_are_not_finite_are_malformed(bad: float) -> None:
+    check_edits([Add("a2", "ball", HERE, THERE), Push("ball", HERE), Remove("a2"), Stop("x")])
+    wrong: list[Edit] = [
+        Add("a2", "ball", (0.0, bad, 0.0), REST),
+        Add("a2", "ball", HERE, (0.0, 0.0, bad)),
+        Push("ball", (bad, 0.0, 0.0)),
+    ]
+    for edit in wrong:
+        with pytest.raises(Malformed, match="not finite"):
+            check_edits([Remove("a2"), edit])
+
+
+# --- what packets do -------------------------------------------------------------------------------------------------
+
+
+def test_deliveries_apply_in_their_order_so_that_the_last_command_counts() -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    packets = [delivered("red.goal", command(0.01 * n, float(n)), sequence=n) for n in range(1, 5)]
+    assert STEPPER.deliver(packets, EVERY, numbers) == {}
+    assert slots(numbers, LAYOUT, "red.goal", "wanted", 2) == [0.04, 4.0]
+    assert slots(numbers, LAYOUT, "red.goal", "refused", 1) == [0.0]
+    STEPPER.deliver(packets[::-1], EVERY, numbers)
+    assert slots(numbers, LAYOUT, "red.goal", "wanted", 2) == [0.01, 1.0]
+
+
+def test_a_node_applies_what_is_for_the_robots_that_it_solves() -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    packets = [delivered("red.goal", command(0.01, 0.0)), delivered("blue.goal", command(0.02, 0.0))]
+    STEPPER.deliver(packets, [LAYOUT["blue.goal"].index], numbers)
+    assert slots(numbers, LAYOUT, "red.goal", "wanted", 2) == [0.0, 0.0]
+    assert slots(numbers, LAYOUT, "blue.goal", "wanted", 2) == [0.02, 0.0]
+
+
+@pytest.mark.parametrize("destination", ["ball", "world", "nobody", "player-blue"])
+def test_what_is_for_no_robot_changes_nothing(destination: str) -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    for channel in ("position", "echo"):
+        assert STEPPER.deliver([delivered(destination, command(0.01, 0.0), channel)], EVERY, numbers) == {}
+    assert numbers == initial_numbers(DEPLOYMENT, LAYOUT)
+
+
+@pytest.mark.parametrize(("robot", "channel"), [("red.goal", "encoder"), ("red.goal", "none"), ("camera", "position")])
+def test_a_channel_that_a_robot_does_not_hear_is_refused_and_counted(robot: str, channel: str) -> None:
+    numbers = initial_numbers(DEPLOYMENT, LAYOUT)
+    assert STEPPER.deliver([delivered(robot, command(0.01, 0.0), channel)] * 3, EVERY, numbers) == {}
+    assert slots(numbers, LAYOUT, robot, "refused", 1) == [3.0]
+
+
+# --- solving ---------------------------------------------------------------------------------------------------------
+
+
+def work_on(frame: Frame, *names: str) -> Work:
+    island = tuple(sorted((LAYOUT[name] for name in names), key=lambda entity: entity.index))
+    return Work(frame.tick, LAYOUT, (island,), tuple(entity.index for entity in island), frame.numbers.copy(), {})
+
+
+def test_solving_writes_the_solved_bodies_and_nothing_else() -> None:
+    frame = in_play()
+    engine = ENGINES["pure"](DEPLOYMENT, LAYOUT)
+    work = work_on(frame, "ball", "red.goal")
+    STEPPER.solve(engine, work)
+    changed = {e.name for e in LAYOUT.entities if work.numbers[e.start : e.stop] != frame.numbers[e.start : e.stop]}
+    assert changed == {"ball", "red.goal"}
+    x, y, _ = work.numbers[LAYOUT["ball"].start : LAYOUT["ball"].start + 3]
+    tick_s = DEPLOYMENT.tick_ns / 1e9
+    assert x == pytest.approx(0.2 - 1.5 * tick_s, abs=1e-4) and y == pytest.approx(0.1 + 0.3 * tick_s, abs=1e-4)
+
+
+def test_solving_again_gives_the_same_bits_whatever_the_engine_did_before() -> None:
+    frame = in_play()
+    engine = ENGINES["pure"](DEPLOYMENT, LAYOUT)
+    results = []
+    for names in (("ball", "red.attack"), ("blue.goal",), ("ball", "red.attack")):
+        work = work_on(frame, *names)
+        STEPPER.solve(engine, work)
+        results.append(work.numbers)
+    assert results[0] == results[2]
+
+
+def test_a_share_without_bodies_needs_no_engine() -> None:
+    frame = initial_frame(DEPLOYMENT)
+    work = Work(0, LAYOUT, (), (LAYOUT["camera"].index, LAYOUT["world"].index), frame.numbers.copy(), {})
+    STEPPER.solve(None, work)  # type: ignore[arg-type]
+    assert work.numbers == frame.numbers
+
+
+def test_the_frame_that_a_tick_starts_from_is_not_touched() -> None:
+    frame = in_play()
+    digest, raw = frame.digest, frame.values.tobytes()
+    layout, numbers = STEPPER.edited(frame, [Push("ball", HERE)])
+    STEPPER.deliver([delivered("red.goal", command(0.01, 1.0))], EVERY, numbers)
+    STEPPER.sense(frame, layout.robots)
+    assert frame.values.tobytes() == raw and Frame(frame.tick, LAYOUT, np.array(frame.numbers)).digest == digest
