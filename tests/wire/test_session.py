@@ -5,7 +5,6 @@ be known to a publisher, the publisher repeats.
 """
 
 import os
-import re
 import signal
 import socket
 import subprocess
@@ -17,12 +16,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 import pytest
-import zenoh
 
-from foosim.protocol import session as sessions
-from foosim.protocol.errors import BadValue
 from foosim.protocol.inbox import Inbox, Item
-from foosim.protocol.session import ConnectError, ListenError, Publisher, Session
+from foosim.protocol.session import Publisher, Session
 
 LONG_S = 30.0
 ANY_PORT = "tcp/127.0.0.1:0"
@@ -83,11 +79,6 @@ def read_key(key: str) -> tuple[str, str] | None:
     _, channel, name = key.split("/")
     assert channel != "wrong", "a key that the table does not have"
     return None if channel == "bad" else (channel, name)
-
-
-def run_python(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", program, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=2 * LONG_S, check=False)
 
 
 def test_a_message_comes_with_its_channel_and_the_name_in_its_key(plane: Plane, inbox: Inbox) -> None:
@@ -320,23 +311,6 @@ def test_garbage_on_the_port_harms_nobody(plane: Plane, inbox: Inbox) -> None:
         connection.close()
 
 
-def test_a_client_waits_for_a_router_that_starts_later() -> None:
-    port = free_port()
-    routers: list[Session] = []
-
-    def start_the_router_after_one_attempt() -> bool:
-        asked.append(len(routers))
-        if len(asked) == 2:
-            routers.append(Session.router(f"tcp/127.0.0.1:{port}"))
-        return False
-
-    asked: list[int] = []
-    with Session.client(f"127.0.0.1:{port}", LONG_S, give_up=start_the_router_after_one_attempt) as client:
-        assert client.locator == routers[0].locator == f"tcp/127.0.0.1:{port}"
-    assert asked[:2] == [0, 0]
-    routers[0].close()
-
-
 RUN_A_ROUTER = """
 import sys, time
 from foosim.protocol.session import Session
@@ -376,155 +350,6 @@ def test_links_presence_and_subscriptions_come_back_with_the_router(inbox: Inbox
             assert inbox.take(LONG_S) == [("alive", "blue", b"+")]
     finally:
         stop(router)
-
-
-def test_what_cannot_be_listened_on_is_said(plane: Plane) -> None:
-    with pytest.raises(ListenError) as caught:
-        Session.router(plane.router.locator)
-    assert str(caught.value) == f"cannot listen on {plane.router.locator}: Address already in use"
-    with pytest.raises(ListenError, match=r"cannot listen on tcp/192\.0\.2\.1:7447: Cannot assign requested address"):
-        Session.router("192.0.2.1:7447")
-    with pytest.raises(BadValue, match="not an address"):
-        Session.router("udp/127.0.0.1:7447")
-
-
-def test_a_router_that_does_not_answer_is_named() -> None:
-    address = f"tcp/127.0.0.1:{free_port()}"
-    with pytest.raises(ConnectError) as caught:
-        Session.client(address, 0.1)
-    assert str(caught.value) == (
-        f"no router answers at {address} within 0.1 s: it is not started, listens elsewhere, or a firewall is between"
-    )
-    with pytest.raises(ConnectError, match=re.escape(f"gave up before a router answered at {address}")):
-        Session.client(address, LONG_S, give_up=lambda: True)
-    for wrong in (ANY_PORT, "0.0.0.0:7447", "127.0.0.1"):
-        with pytest.raises(BadValue, match="not an address to connect to"):
-            Session.client(wrong, LONG_S)
-
-
-def test_closing_is_prompt_and_repeatable_and_the_reader_sleeps_on(
-    plane: Plane, inbox: Inbox, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    waits: list[int] = []
-    wait = sessions._Source.wait
-
-    def counted(source: sessions._Source, count: int) -> list[Item]:
-        waits.append(count)
-        return wait(source, count)
-
-    monkeypatch.setattr(sessions._Source, "wait", counted)
-    client = plane.client()
-    client.receive("w/part/*", "part", read_key, inbox)
-    client.subscribe("w/s/*", "w", inbox)
-    client.declare_alive("alive/blue")
-    read: list[list[Item]] = []
-    reader = threading.Thread(target=lambda: read.append(inbox.take(None)))
-    reader.start()
-    assert client.close()
-    assert client.close()
-    assert inbox.offer(("timer", "one", b""))
-    reader.join()
-    assert read == [[("timer", "one", b"")]]
-    assert len(waits) <= 1, "the reader went round and round in a queue that is gone"
-    with pytest.raises(AssertionError, match="closed"):
-        client.subscribe("w/s/*", "w", inbox)
-
-
-def test_a_close_that_hangs_is_left_to_itself(plane: Plane, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Zenoh's own close hung for 10 s when packets were lost."""
-    client, hang = plane.client(), threading.Event()
-    close = client._close
-    monkeypatch.setattr(client, "_close", lambda: (hang.wait(), close()))
-    monkeypatch.setattr(sessions, "CLOSE_S", 0.01)
-    assert client.close() is False
-    hang.set()
-
-
-LEAVE_IT_OPEN = """
-import sys, time
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.session import Session
-session = Session.client(sys.argv[1], 30.0)
-inbox = Inbox(10)
-session.subscribe("w/*", "w", inbox)
-session.receive("n/*", "n", lambda key: ("n", key), inbox)
-session.watch_alive("alive/*", "alive", Inbox(10))
-session.declare_alive("alive/blue")
-assert inbox.take(0.001) == []
-
-class Lingering:
-    def __del__(self, sleep=time.sleep):
-        sleep(0.3)  # the interpreter is ending: a thread that returns to it from Zenoh now aborts the process
-
-sys.modules["lingering"] = Lingering()
-sys.exit(int(sys.argv[2]))
-"""
-
-
-@pytest.mark.parametrize("code", [0, 3])
-def test_a_process_that_forgets_to_close_ends_with_its_own_code(plane: Plane, code: int) -> None:
-    done = run_python(LEAVE_IT_OPEN, plane.router.locator, str(code))
-    assert (done.returncode, done.stderr) == (code, "")
-
-
-FORK = """
-import os, sys
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.session import Session
-session = Session.router("tcp/127.0.0.1:0")
-publisher = session.publisher("w/a")
-uses = [lambda: publisher.put(b""), lambda: session.subscribe("w/*", "w", Inbox(1)), session.close]
-child = os.fork()
-if child == 0:
-    for use in uses:
-        try:
-            use()
-        except AssertionError as error:
-            assert "fork" in str(error)
-        else:
-            os._exit(1)
-    os._exit(7)
-sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-"""
-
-
-def test_a_session_is_not_used_in_a_forked_child() -> None:
-    """There a put returns, and nothing arrives."""
-    done = run_python(FORK)
-    assert (done.returncode, done.stderr) == (7, "")
-
-
-CLIENT_RUNTIME = """
-import os, sys
-from foosim.protocol.session import CLIENT_RUNTIME, ROUTER_RUNTIME, Session, use_client_runtime
-if sys.argv[1] == "client":
-    use_client_runtime()
-with Session.router("tcp/127.0.0.1:0") as router, Session.client(router.locator, 30.0) as client:
-    assert client.alive("nobody/*") == set()
-    threads = {open(f"/proc/self/task/{task}/comm").read().strip() for task in os.listdir("/proc/self/task")}
-print(sorted(thread for thread in threads if thread.startswith("rx")), os.environ.get("ZENOH_RUNTIME"))
-try:
-    use_client_runtime()
-except AssertionError:
-    print("too late")
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="reads the names of threads in /proc")
-@pytest.mark.parametrize(("kind", "receiving"), [("client", 0), ("router", sessions.ROUTER_THREADS)])
-def test_a_router_has_a_receiving_thread_for_each_stuck_link(kind: str, receiving: int) -> None:
-    """With two, one stuck client stopped healthy ones for seconds."""
-    done = run_python(CLIENT_RUNTIME, kind)
-    threads = [f"rx-{number}" for number in range(receiving)]
-    assert done.stdout.splitlines() == [f"{threads} None", "too late"], done.stderr
-
-
-def test_settings_that_zenoh_does_not_take_as_they_are_stop_us() -> None:
-    with pytest.raises(zenoh.ZError):
-        sessions._open({"transport/link/tx/leese": 1000})
-    undone = {"adminspace/permissions": {"read": True, "write": False}, "adminspace/permissions/write": True}
-    with pytest.raises(AssertionError, match="adminspace/permissions"):
-        sessions._open(undone)
 
 
 def free_port() -> int:
