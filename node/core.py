@@ -43,6 +43,7 @@ from foosim.protocol.messages import (
     Samples,
     Want,
 )
+from foosim.protocol.patience import Patience
 from foosim.protocol.start import initial_frame
 
 FRAMES_KEPT: Final = 4
@@ -101,9 +102,7 @@ class NodeCore:
         self._barrier: Barrier | None = None
         self._basis = b""
         self._sensed = False
-        self._progress_ns = now_ns
-        self._want_after_ns = limits.WANT_AFTER_NS
-        self._want_ns = now_ns
+        self._patience = Patience(now_ns)
         self._solved_ticks = self._refused = self._repeated = self._diverged = 0
         self._readers: dict[str, Callable[[Any, bytes, int], None]] = {
             channels.ORDER.name: self._on_order,
@@ -182,14 +181,14 @@ class NodeCore:
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again."""
         self.member.wake(now_ns, self._heartbeat)
-        if self.frame is not None and self.ended is None and now_ns >= self._want_ns and self.work is None:
+        if self.frame is not None and self.ended is None and self._patience.is_over(now_ns) and self.work is None:
             self._ask_again(now_ns)
 
     def deadline_ns(self) -> int:
         """When `wake` has something to do next."""
         if self.frame is None or self.ended is not None:
             return self.member.deadline_ns
-        return min(self.member.deadline_ns, self._want_ns)
+        return min(self.member.deadline_ns, self._patience.at_ns)
 
     @property
     def layouts_wanted(self) -> list[Layout]:
@@ -306,18 +305,13 @@ class NodeCore:
         self.frame = frame
         self._barrier = None
         self._sensed = False
-        self._progress(now_ns)
+        assert self.deployment is not None
+        self._patience.progress(self.deployment.tick_ns, now_ns)
         self._history[frame.tick] = frame
         self._history.pop(frame.tick - FRAMES_KEPT, None)
         old = frame.tick - limits.KEPT_TICKS
         for kept in (self._orders, self._deliveries, self._sent_parts, self._sent_samples):
             kept.pop(old, None)
-
-    def _progress(self, now_ns: int) -> None:
-        self._progress_ns = now_ns
-        assert self.deployment is not None
-        self._want_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
-        self._want_ns = now_ns + self._want_after_ns
 
     # --- messages of the tick ----------------------------------------------------------------------------------------
 
@@ -397,8 +391,7 @@ class NodeCore:
         for kind, wanted in kinds:
             message = encode(Want(self.name, kind, wanted, self.epoch))
             self.actions.append(Publish(channels.WANT, self.name, message))
-        self._want_after_ns = min(2 * self._want_after_ns, limits.WANT_EVERY_NS_MAX)
-        self._want_ns = now_ns + self._want_after_ns
+        self._patience.asked(now_ns)
 
     # --- epochs, layouts, start and end ------------------------------------------------------------------------------
 
@@ -440,8 +433,7 @@ class NodeCore:
         else:
             message = encode(Want(self.name, channels.COMMIT.name, epoch.tick, epoch.epoch))
             self.actions.append(Publish(channels.WANT, self.name, message))
-            self._want_after_ns = limits.WANT_AFTER_NS
-            self._want_ns = now_ns + self._want_after_ns
+            self._patience.progress(self.deployment.tick_ns, now_ns)
 
     def _check_epoch(self, epoch: Epoch) -> None:
         """Every robot has one owner, who takes part; the added entities make a layout."""

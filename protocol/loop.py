@@ -7,6 +7,7 @@ share of the time it did not. Neighbours: `session` and `inbox` (the wire), `act
 
 from __future__ import annotations
 
+import gc
 import logging
 import time
 from collections.abc import Callable, Sequence
@@ -19,6 +20,7 @@ from foosim.protocol.session import Publisher, Session
 
 BUSY_WINDOW_NS: Final = 1_000_000_000
 NS_PER_S: Final = 1_000_000_000
+GC_THRESHOLDS: Final = (20_000, 20, 100)
 _BY_KEY: Final = {channel.key.removesuffix("/{name}"): channel for channel in CHANNELS}
 _NAMED: Final = "/{name}"
 _LEVELS: Final = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
@@ -134,6 +136,10 @@ class Loop:
 
     def run(self, until: Callable[[], bool]) -> None:
         """Go round until `until` says so; `Inbox.wake` makes it look."""
+        # What is loaded by now stays: collections need not walk through it, nor come every few ticks.
+        gc.collect()
+        gc.freeze()
+        gc.set_threshold(*GC_THRESHOLDS)
         while not until():
             self.go_round()
 

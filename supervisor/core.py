@@ -41,10 +41,11 @@ from foosim.protocol.messages import (
     Tempo,
     Want,
 )
+from foosim.protocol.patience import Patience
 from foosim.protocol.start import initial_frame
 from foosim.protocol.units import Pace
 from foosim.supervisor.pacing import Pacer
-from foosim.supervisor.records import RunRecord
+from foosim.supervisor.records import HeadRecord, RunRecord
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.watch import Watch
@@ -114,8 +115,8 @@ class SupervisorCore:
         self._deliveries: dict[int, bytes] = {}
         self._parts: dict[int, list[Part]] = {}
         self._commits: dict[int, bytes] = {}
-        self._prepare_ns = self._want_ns = now_ns
-        self._want_after_ns = limits.WANT_AFTER_NS
+        self._prepare_ns = now_ns
+        self._patience = Patience(now_ns)
         self._refused = self._repeated = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Hello: self._on_hello,
@@ -127,8 +128,8 @@ class SupervisorCore:
             Request: self.requests.take,
             Farewell: self._on_farewell,
         }
-        run = RunRecord(settings.run, settings.deployment_name, settings.deployment_text)
-        self.actions.append(Journal(encode(run)))
+        self._run = RunRecord(settings.run, settings.deployment_name, settings.deployment_text)
+        self.actions.append(Journal(encode(self._run)))
 
     # --- what the shell calls --------------------------------------------------------------------------------------
 
@@ -164,7 +165,7 @@ class SupervisorCore:
             lost = self.watch.lost(self, now_ns)
             if lost:
                 self.finish(f"lost {lost}", failed=True)
-            elif self._lacks and now_ns >= self._want_ns:
+            elif self._lacks and self._patience.is_over(now_ns):
                 self._ask_again(now_ns)
             if now_ns >= self._prepare_ns:
                 self.requests.prepare()
@@ -185,7 +186,7 @@ class SupervisorCore:
         """When the shell has to call again at the latest."""
         deadline = now_ns + limits.HEARTBEAT_NS
         if self._lacks:
-            deadline = min(deadline, self._want_ns)
+            deadline = min(deadline, self._patience.at_ns)
         if self.epoch > 0 and self.end is None and self.released <= self.frame.tick + limits.RELEASE_AHEAD:
             release_ns = self.pacer.release_ns(self.released)
             if release_ns is not None and (not self.stop_at or self.released < self.stop_at):
@@ -231,20 +232,23 @@ class SupervisorCore:
         released = [edit for tick in range(self.frame.tick, self.released) for edit in self._orders[tick]]
         return released + self.requests.coming_edits()
 
-    def removable(self, layout: Layout) -> list[str]:
-        """Return the names of the entities that were added."""
+    def added_to(self, layout: Layout) -> list[AddedEntity]:
+        """Return the entities of a layout beside the deployment's."""
         base = build_layout(self.deployment)
-        return [name for name in layout.names if name not in base]
+        return [AddedEntity(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
 
     def unready_nodes(self, layout: bytes) -> list[str]:
         """Return the nodes that have no engine for a layout yet."""
         return [name for name in self.members if layout not in self.roster.by_name[name].ready]
 
-    @property
-    def added(self) -> list[AddedEntity]:
-        """Entities of the committed frame's layout beside the deployment's."""
-        base = build_layout(self.deployment)
-        return [AddedEntity(e.name, e.model) for e in self.frame.layout.entities if e.name not in base]
+    def head(self) -> bytes:
+        """Return the record with which a further journal file starts: what those before say and is still needed."""
+        coming, answers = self.requests.journalled()
+        orders = {tick: self._orders[tick] for tick in range(self.frame.tick, self.released)}
+        edits = sorted((tick, edits) for tick, edits in {**orders, **coming}.items() if edits)
+        added = self.added_to(self.frame.layout)
+        commit = self._commits.get(self.frame.tick, b"")
+        return encode(HeadRecord(self._run, added, self._epoch_payload, commit, edits, answers))
 
     # --- release and commit ------------------------------------------------------------------------------------------
 
@@ -268,7 +272,7 @@ class SupervisorCore:
             self._orders[tick] = edits
             self._orders.pop(tick - limits.KEPT_TICKS, None)
             if tick == self.frame.tick:
-                self._progress(now_ns)
+                self._patience.progress(self.deployment.tick_ns, now_ns)
             if tick == 0:
                 self.started_ns = now_ns
             self.watch.released(tick, now_ns)
@@ -320,7 +324,7 @@ class SupervisorCore:
         self.frame = frame
         self.chain = chain_next(self.chain, frame.digest)
         self.committed_ns = now_ns
-        self._progress(now_ns)
+        self._patience.progress(self.deployment.tick_ns, now_ns)
         self._say_commit(edits)
         if self.on_commit is not None:
             self.on_commit(frame)
@@ -357,12 +361,7 @@ class SupervisorCore:
             wants.append(Want(channels.SUPERVISOR, channels.PART.name, tick + 1, self.epoch))
         for want in wants:
             self.actions.append(Publish(channels.WANT, channels.SUPERVISOR, encode(want)))
-        self._want_after_ns = min(2 * self._want_after_ns, limits.WANT_EVERY_NS_MAX)
-        self._want_ns = now_ns + self._want_after_ns
-
-    def _progress(self, now_ns: int) -> None:
-        self._want_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
-        self._want_ns = now_ns + self._want_after_ns
+        self._patience.asked(now_ns)
 
     # --- epochs ------------------------------------------------------------------------------------------------------
 
@@ -373,9 +372,8 @@ class SupervisorCore:
         self.members = tuple(sorted(self.deployment.nodes))
         self._parts.clear()
         self._slots = Slots(self.frame.layout, owners)
-        epoch = Epoch(
-            self.epoch, self.frame.tick, self.frame.digest, list(self.members), sorted(owners.items()), self.added
-        )
+        frame, added = self.frame, self.added_to(self.frame.layout)
+        epoch = Epoch(self.epoch, frame.tick, frame.digest, list(self.members), sorted(owners.items()), added)
         payload = encode(epoch)
         self.actions.append(Journal(payload))
         self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, payload))
@@ -383,7 +381,7 @@ class SupervisorCore:
         for tick in range(self.frame.tick, self.released):
             self._say_orders(tick, tick + 1)
         self.watch.begun(now_ns)
-        self._progress(now_ns)
+        self._patience.progress(self.deployment.tick_ns, now_ns)
 
     def _start_if_ready(self, now_ns: int) -> None:
         """Open the first epoch when every declared process has built the world."""
@@ -401,9 +399,7 @@ class SupervisorCore:
 
     def prepare(self, layout: Layout) -> None:
         """Have every node build an engine for a layout."""
-        base = build_layout(self.deployment)
-        added = [AddedEntity(e.name, e.model) for e in layout.entities if e.name not in base]
-        self.actions.append(Publish(channels.PREPARE, channels.SUPERVISOR, encode(Prepare(added))))
+        self.actions.append(Publish(channels.PREPARE, channels.SUPERVISOR, encode(Prepare(self.added_to(layout)))))
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
@@ -412,21 +408,19 @@ class SupervisorCore:
         if reason:
             self._refuse(hello.role, hello.name, hello.boot, reason)
             return
-        if self.end is not None:
-            self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+        if self._has_ended():
             return
         self.roster.take(hello, now_ns)
-        settings = self.settings
-        build = Build(
-            hello.name,
-            hello.boot,
-            settings.run,
-            settings.deployment_name,
-            settings.deployment_text,
-            str(self.pacer.pace),
-            self.added,
-        )
+        run, pace, added = self.settings, str(self.pacer.pace), self.added_to(self.frame.layout)
+        deployment = run.deployment_name, run.deployment_text
+        build = Build(hello.name, hello.boot, run.run, *deployment, pace, added)
         self.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
+
+    def _has_ended(self) -> bool:
+        """Whether the run is over; say it again to who comes late."""
+        if self.end is not None:
+            self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+        return self.end is not None
 
     def _refuse(self, role: str, name: str, boot: str, reason: str) -> None:
         self.actions.append(Say("warning", f"{role} {name} refused: {reason}"))
@@ -438,8 +432,7 @@ class SupervisorCore:
             self._repeated += 1
             return
         process.heard_ns = now_ns
-        if self.end is not None:
-            self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+        if self._has_ended():
             return
         reason = self.roster.note_ready(process, ready)
         if reason:

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from foosim.protocol.codec import decode_any
+from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
-from foosim.protocol.messages import Answer, Commit, Edit, Epoch
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, Epoch
 from foosim.protocol.start import initial_frame
 
 
@@ -34,7 +35,21 @@ class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request",
     answer: Answer
 
 
-Record = RunRecord | RequestRecord | Epoch | Commit
+class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
+    """Where a further file of a journal starts: what the files before say and is still needed, so that they can go.
+
+    `added` is the layout of the last commit beside the deployment's; epoch and commit are as they were published.
+    """
+
+    run: RunRecord
+    added: list[AddedEntity]
+    epoch: bytes
+    commit: bytes
+    edits: list[tuple[int, list[Edit]]]
+    answers: list[Answer]
+
+
+Record = RunRecord | HeadRecord | RequestRecord | Epoch | Commit
 
 
 @dataclass(slots=True)
@@ -50,11 +65,9 @@ class History:
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
-    """Return what the records of a journal, in order, say about the run."""
+    """Return what the records of a journal, in order and from the start of one of its files, say about the run."""
     iterator = iter(records)
-    run = decode_any(Record, next(iterator))
-    assert isinstance(run, RunRecord), "a journal starts with its run"
-    history = History(run, initial_frame(deployment))
+    history = _begin(deployment, decode_any(Record, next(iterator)))
     layout = history.frame.layout
     for raw in iterator:
         record = decode_any(Record, raw)
@@ -68,4 +81,21 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
             history.answers[record.answer.id] = record.answer
             if record.edits:
                 history.edits.setdefault(record.tick, []).extend(record.edits)
+    return history
+
+
+def _begin(deployment: Deployment, first: object) -> History:
+    """Return the history that a file's first record stands for."""
+    if isinstance(first, RunRecord):
+        return History(first, initial_frame(deployment))
+    assert isinstance(first, HeadRecord), "a file starts with the run or with what was before it"
+    history = History(first.run, initial_frame(deployment))
+    if first.commit:
+        commit = decode(Commit, first.commit)
+        layout = build_layout(deployment, [(entity.name, entity.model) for entity in first.added])
+        history.frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+    if first.epoch:
+        history.epoch = decode(Epoch, first.epoch)
+    history.edits = {tick: list(edits) for tick, edits in first.edits}
+    history.answers = {answer.id: answer for answer in first.answers}
     return history

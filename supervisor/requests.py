@@ -108,6 +108,10 @@ class Requests:
         """Return what requests add to ticks that are not released yet."""
         return [edit for tick in sorted(self._edits) for edit in self._edits[tick]]
 
+    def journalled(self) -> tuple[dict[int, list[Edit]], list[Answer]]:
+        """Return what of the requests a further journal file has to say again: edits to come by tick, answers."""
+        return self._edits, list(self._answers.values())
+
     def _next_layout(self) -> Layout:
         """Return the layout after everything that is already ordered."""
         return layout_after(self._core.frame.layout, self._core.ordered_edits())
@@ -165,7 +169,7 @@ class Requests:
     def _remove(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
         name = str(arguments.get("name", ""))
         layout = self._next_layout()
-        removable = self._core.removable(layout)
+        removable = [entity.name for entity in self._core.added_to(layout)]
         if name not in removable:
             raise Refused(f"{name!r} was not added; added are {', '.join(removable) or 'none'}")
         self._wait_for_engines(request, Remove(name))

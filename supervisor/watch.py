@@ -88,7 +88,7 @@ class Watch:
         return waiting.removeprefix(DONE_OF).partition(",")[0] if waiting.startswith(DONE_OF) else VHUB
 
     def waiting_for(self, core: SupervisorCore) -> str:
-        """Return who is waited for now, for people: a name, or several, or an empty string."""
+        """Return who is being waited for, for people: a name, or several, or an empty string."""
         if core.epoch == 0:
             return ", ".join(self.roster.missing(core.frame.layout.digest))
         tick = core.frame.tick

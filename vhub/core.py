@@ -38,6 +38,7 @@ from foosim.protocol.messages import (
     Up,
     Want,
 )
+from foosim.protocol.patience import Patience
 from foosim.protocol.units import parse_pace
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.records import Closing, HeadRecord, TickRecord, world_packets
@@ -89,8 +90,7 @@ class HubCore:
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
         self._leaves: list[str] = []
-        self._want_after_ns = limits.WANT_AFTER_NS
-        self._want_ns = now_ns
+        self._patience = Patience(now_ns)
         self._end_ns = 0
         self._malformed = self._repeated = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
@@ -146,7 +146,7 @@ class HubCore:
         if self._world is not None and self._world.waited:
             self.sessions.repeat(self._world.waited, now_ns)
             self._check_deadlines(now_ns)
-        if now_ns >= self._want_ns and self._epoch > 0 and self.ended is None:
+        if self._patience.is_over(now_ns) and self._epoch > 0 and self.ended is None:
             self._ask_again(now_ns)
         self._release(now_ns)
         if self.ended is not None and not self.finished and now_ns >= self._end_ns:
@@ -156,7 +156,7 @@ class HubCore:
         """When `wake` has something to do next."""
         deadline = self.member.deadline_ns
         if self._epoch > 0 and not self.finished:
-            deadline = min(deadline, self._want_ns if self.ended is None else self._end_ns)
+            deadline = min(deadline, self._patience.at_ns if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
         if self._world is not None:
@@ -279,7 +279,7 @@ class HubCore:
         self._world = None
         self._commits.pop(tick - limits.KEPT_TICKS, None)
         self._samples.pop(tick, None)
-        self._progress(now_ns)
+        self._patience.progress(state.tick_ns, now_ns)
         return True
 
     def _write(self, tick: int, world: _World, admitted: dict[str, list[Sent]], deliveries: bytes) -> None:
@@ -352,7 +352,7 @@ class HubCore:
         if first:
             self._sent[0] = encode(Deliveries(0, []))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[0]))
-            self._progress(now_ns)
+            self._patience.progress(self.state.tick_ns, now_ns)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         # A commit up to the epoch's start is as good under its old epoch: what is committed never changes.
@@ -433,11 +433,6 @@ class HubCore:
 
     # --- time --------------------------------------------------------------------------------------------------------
 
-    def _progress(self, now_ns: int) -> None:
-        assert self.deployment is not None
-        self._want_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
-        self._want_ns = now_ns + self._want_after_ns
-
     def _ask_again(self, now_ns: int) -> None:
         assert self.state is not None
         tick = self.state.closed + 1
@@ -445,8 +440,7 @@ class HubCore:
         if self._world is None:
             want = Want(channels.VHUB, kind, tick, self._epoch)
             self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
-        self._want_after_ns = min(2 * self._want_after_ns, limits.WANT_EVERY_NS_MAX)
-        self._want_ns = now_ns + self._want_after_ns
+        self._patience.asked(now_ns)
 
     def _check_deadlines(self, now_ns: int) -> None:
         assert self._world is not None
