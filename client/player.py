@@ -11,7 +11,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, cast
 
 from foosim.client.core import NEVER_NS, ClientCore, Outgoing
 from foosim.client.errors import PlayerError, UnknownName
@@ -73,8 +73,7 @@ def load_player(path: str) -> PlayerFactory:
         raise PlayerError(unknown.what)
     if not inspect.isclass(made) or not callable(getattr(made, "act", None)):
         raise PlayerError(f"player {path}: {class_name} is no class with a method act(tick, samples)")
-    factory: PlayerFactory = made
-    return factory
+    return cast(PlayerFactory, made)
 
 
 class PlayerLoop:
