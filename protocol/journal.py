@@ -53,6 +53,12 @@ def journal_files(folder: Path, stem: str) -> list[Path]:
     return [path for _, path in _numbered(folder, stem)]
 
 
+def remove_journal(folder: Path, stem: str) -> None:
+    """Remove the files of a journal whose run has ended in order: nothing is left to recover from them."""
+    for path in [*journal_files(folder, stem), folder / f"{stem}.lock"]:
+        path.unlink(missing_ok=True)
+
+
 def _numbered(folder: Path, stem: str) -> list[tuple[int, Path]]:
     found = []
     for path in folder.glob(f"{stem}-*.journal"):

@@ -17,7 +17,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal
+from foosim.protocol.journal import Journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.process import Stop, die_with_parent, start_log
 from foosim.protocol.session import Session
@@ -47,7 +47,8 @@ class SupervisorProcess:
         wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
         self._loop = Loop(self.core, inbox, start_log(SUPERVISOR), self.core.deadline_ns)
         self._loop.connect(wire)
-        self._loop.journal = journal
+        self._journal = self._loop.journal = journal
+        self._turned_tick = 0
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
@@ -73,9 +74,18 @@ class SupervisorProcess:
         if self._is_told_to_end:
             self._is_told_to_end = False
             self.core.stop()
+        if not self.core.actions:
+            self._turn_journal()
         self.core.advance(now_ns)
         if not self._info.radio:
             self._note_radio()
+
+    def _turn_journal(self) -> None:
+        """Begin a new file when one is full; the one before it stays until the next turn, when this one is synced."""
+        tick = self.core.frame.tick
+        if self._journal.rotate_if_full(self.core.head, tick):
+            self._journal.forget_before(self._turned_tick)
+            self._turned_tick = tick
 
     def _note_radio(self) -> None:
         """Write into the run file where clients find the vHub, once it has told."""
@@ -100,4 +110,7 @@ def serve(plan: Plan, folder: RunFolder) -> int:
     with Journal(folder.journals, SUPERVISOR) as journal, Session.router(str(plan.address)) as session:
         supervisor = SupervisorProcess(plan, folder, session, inbox, journal)
         stop.then(supervisor.stop)
-        return supervisor.run()
+        code = supervisor.run()
+    if code == DONE:
+        remove_journal(folder.journals, SUPERVISOR)
+    return code

@@ -24,7 +24,7 @@ from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_ap
 from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal
+from foosim.protocol.journal import Journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
@@ -168,6 +168,8 @@ class HubProcess:
             self._capture.finish({"reason": reason, "ended": wall.now_text()})
         if self._journal is not None:
             self._journal.close()
+            if self.core.finished and self.core.ended is not None and not self.core.ended.failed:
+                remove_journal(self._journal.folder, VHUB)
 
 
 def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions) -> int:

@@ -54,6 +54,8 @@ def test_two_nodes_and_two_players_compute_what_a_rehearsal_computes(house: Hous
     assert_finished(house, content)
     assert "capture captures/table-" in err, "people are told where it is"
     assert house.processes_with(str(house.folder)) == {}
+    (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
+    assert list((run / "journals").iterdir()) == [], "nothing is left to recover"
 
     rehearsed = rehearse(house.table.read_text(), "table.yaml", 1000, nodes=None, pace=parse_pace("fast")).json
     for same in ("digest", "packets", "nodes", "handovers", "score"):
@@ -120,6 +122,9 @@ def test_a_process_that_is_lost_ends_the_run_in_order_and_is_named(house: House,
         content = last_json(out)
         assert content["reason"] == f"lost {process}: its connection closed"
         assert content["failed"]
+    (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
+    journals = {path.name for path in (run / "journals").iterdir()}
+    assert journals >= {"supervisor-000001.journal", "vhub-000001.journal"}
     capture = next((house.folder / "captures").iterdir())
     if process == "vhub":
         assert f"{capture.name} (unfinished)" in err

@@ -1,0 +1,104 @@
+"""The supervisor's journal: a fold of its records gives the run, from the start of any of its files."""
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from foosim.protocol.codec import encode
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.units import Pace
+from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.core import RunSettings
+from foosim.supervisor.records import History, fold
+
+TEXT = apply_sets(
+    (Path(__file__).parent.parent.parent / "deploy" / "table.yaml").read_text(),
+    "table.yaml",
+    ["engine=pure", "players={}"],
+)
+DEPLOYMENT = load_deployment(TEXT, "table.yaml")
+TICKS = 60
+
+
+class Watched(System):
+    """A rehearsal that asks, each time the supervisor has done all it had to, for the head of a further file."""
+
+    def __init__(self) -> None:
+        self.records: list[bytes] = []
+        self.heads: dict[int, bytes] = {}
+        """By the number of records before it."""
+        settings = Settings(on_journal=self._note)
+        super().__init__(RunSettings("run", "table.yaml", TEXT, Pace("fast"), TICKS), settings)
+
+    def _note(self, process: str, record: bytes) -> None:
+        if process == "supervisor":
+            self.records.append(record)
+
+    def _perform(self, process: Any) -> None:
+        super()._perform(process)
+        if process.core is self.supervisor and self.records:
+            self.heads[len(self.records)] = self.supervisor.head()
+
+
+def ask(system: System, verb: str, arguments: dict[str, Any]) -> None:
+    """Ask the supervisor for something."""
+    system.request(verb, **arguments)
+
+
+@pytest.fixture(scope="module")
+def watched() -> Watched:
+    """A run in which everything was asked for that changes the world or who computes it."""
+    system = Watched()
+    asked: dict[int, tuple[str, dict[str, Any]]] = {
+        10: ("push", {"impulse": [0.02, 0.0, 0.0]}),
+        12: ("add", {"position": [0.1, 0.1, 0.0175]}),
+        20: ("move", {"robot": "red.goal", "node": "blue"}),
+        30: ("push", {"name": "ball2", "impulse": [0.0, 0.02, 0.0]}),
+        40: ("remove", {"name": "ball2"}),
+    }
+    for tick, (verb, arguments) in asked.items():
+        system.at_tick(tick, partial(ask, system, verb, arguments))
+    system.run()
+    system.close()
+    assert [answer.accepted for answer in system.answers.values()] == [True] * len(asked)
+    return system
+
+
+def content(history: History) -> tuple[object, ...]:
+    """Everything in a history, in a form that compares."""
+    frame = history.frame
+    edits = {tick: edits for tick, edits in history.edits.items() if edits}
+    epoch = None if history.epoch is None else encode(history.epoch)
+    return history.run, frame.tick, frame.digest, frame.layout.names, epoch, edits, history.answers
+
+
+def test_a_fold_of_all_records_gives_the_last_commit_and_every_answer(watched: Watched) -> None:
+    history = fold(DEPLOYMENT, watched.records)
+    assert (history.frame.tick, history.frame.digest) == (TICKS, watched.supervisor.frame.digest)
+    assert history.epoch is not None
+    assert (history.epoch.epoch, dict(history.epoch.owners)["red.goal"]) == (2, "blue")
+    assert history.answers == watched.answers
+    assert history.run.deployment == TEXT
+
+
+def test_a_request_is_in_the_journal_before_the_tick_at_which_it_takes_effect(watched: Watched) -> None:
+    pushed = watched.answers["request-1"]
+    cut = next(
+        count
+        for count in range(1, len(watched.records))
+        if pushed.id in fold(DEPLOYMENT, watched.records[:count]).answers
+    )
+    history = fold(DEPLOYMENT, watched.records[:cut])
+    assert history.frame.tick <= pushed.tick
+    assert [edit.name for edit in history.edits[pushed.tick]] == ["ball"]  # type: ignore[union-attr]
+
+
+def test_a_further_file_says_what_the_ones_before_said(watched: Watched) -> None:
+    """At every place where a file may begin, and after every record that follows it there."""
+    assert len(watched.heads) > TICKS // 2
+    for before, head in watched.heads.items():
+        for after in {before, min(before + 7, len(watched.records)), len(watched.records)}:
+            whole = fold(DEPLOYMENT, watched.records[:after])
+            assert content(fold(DEPLOYMENT, [head, *watched.records[before:after]])) == content(whole), (before, after)
