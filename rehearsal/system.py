@@ -80,7 +80,7 @@ class System:
         self.players: dict[str, PlayerLoop] = {}
         self.answers: dict[str, Answer] = {}
         self._requests = 0
-        self._at_tick: dict[int, list[Callable[[], None]]] = {}
+        self._at_tick: dict[int, list[Callable[[], object]]] = {}
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
         self.supervisor.on_commit = self._committed
@@ -233,7 +233,7 @@ class System:
 
     # --- from outside ------------------------------------------------------------------------------------------------
 
-    def at_tick(self, tick: int, action: Callable[[], None]) -> None:
+    def at_tick(self, tick: int, action: Callable[[], object]) -> None:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
 

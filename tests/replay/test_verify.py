@@ -10,7 +10,6 @@ import pytest
 from typer.testing import CliRunner
 
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.messages import Delivered
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.replay_command import app
 from foosim.rehearsal.system import System
@@ -76,8 +75,8 @@ def flipped(ticks: Sequence[CapturedTick], at: int) -> list[CapturedTick]:
     tick = changed[at]
     packet = tick.delivered[0]
     payload = bytes([packet.payload[0] ^ 1]) + packet.payload[1:]
-    delivered = [Delivered(*[getattr(packet, name) for name in Delivered.__struct_fields__[:-1]], payload)]
-    changed[at] = CapturedTick(tick.tick, tick.digest, tick.entities, tick.edits, delivered + tick.delivered[1:])
+    delivered = [msgspec.structs.replace(packet, payload=payload), *tick.delivered[1:]]
+    changed[at] = CapturedTick(tick.tick, tick.digest, tick.entities, tick.edits, delivered)
     return changed
 
 
