@@ -31,6 +31,8 @@ class PacketError(Refused):
 class PlayerError(Refused):
     """A player that cannot be loaded, or that did something that players must not do."""
 
+    exit_code = 1
+
 
 class ConnectionRefused(Refused):
     """The vHub will not have this client, and why."""

@@ -37,6 +37,8 @@ _SERIAL: Final = re.compile(r"(\d{6,})\.journal")
 class JournalError(Refused):
     """A journal cannot be written or read: the file, and what is wrong with it."""
 
+    exit_code = 1
+
 
 @dataclass(frozen=True, slots=True)
 class JournalStatistics:

@@ -59,9 +59,13 @@ _opened = False
 class ListenError(Refused):
     """The address cannot be listened on."""
 
+    exit_code = 1
+
 
 class ConnectError(Refused):
     """No router answers at the address."""
+
+    exit_code = 1
 
 
 def use_client_runtime() -> None:

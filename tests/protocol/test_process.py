@@ -1,0 +1,99 @@
+"""What every process does around its loop: told to end, it does, also while it connects; its log is dated lines."""
+
+import logging
+import re
+import signal
+import socket
+import subprocess
+import sys
+from typing import IO
+
+import pytest
+
+from foosim.protocol import process
+from foosim.protocol.process import new_boot, start_log
+
+NODE = "from foosim.node.main import main; main()"
+PLAYER = "from foosim.client.main import main; main()"
+ASLEEP = """
+import threading, time
+from foosim.protocol.process import Stop
+stop = Stop()
+told = threading.Event()
+if {late}:
+    stop.then(told.set)
+print("ready", flush=True)
+while not stop.is_set():
+    time.sleep(0.01)
+stop.then(told.set)
+print("told" if told.is_set() else "not told", flush=True)
+while {stays}:
+    time.sleep(0.01)
+"""
+
+
+def start(program: str, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", program, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def line_of(stream: IO[str] | None) -> str:
+    assert stream is not None
+    return stream.readline().strip()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize("late", [False, True])
+def test_whoever_is_to_be_told_is_told_once_also_later(number: signal.Signals, late: bool) -> None:
+    child = start(ASLEEP.format(late=late, stays=False))
+    assert line_of(child.stdout) == "ready"
+    child.send_signal(number)
+    assert line_of(child.stdout) == "told"
+    assert child.wait(100) == 0
+    child.communicate()
+
+
+def test_a_second_ctrl_c_ends_a_process_at_once() -> None:
+    child = start(ASLEEP.format(late=False, stays=True))
+    assert line_of(child.stdout) == "ready"
+    child.send_signal(signal.SIGTERM)
+    assert line_of(child.stdout) == "told"
+    child.send_signal(signal.SIGTERM)
+    child.send_signal(signal.SIGINT)
+    assert child.wait(100) == 130
+    child.communicate()
+
+
+@pytest.mark.parametrize("program", [NODE, PLAYER])
+def test_it_can_be_ended_while_nobody_answers(program: str) -> None:
+    """The address is listened on, so that the process is known to be connecting, and nothing is ever said there."""
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        port = listening.getsockname()[1]
+        child = start(program, "--name", "red", "--connect", f"tcp/127.0.0.1:{port}")
+        connection, _ = listening.accept()
+        with connection:
+            child.send_signal(signal.SIGTERM)
+            _, err = child.communicate(timeout=100)
+    assert (child.returncode, err) == (1, f"gave up before a router answered at tcp/127.0.0.1:{port}\n")
+
+
+def test_a_child_whose_launcher_is_gone_does_not_even_start() -> None:
+    program = "from foosim.protocol.process import die_with_parent; die_with_parent(); print('alive')"
+    environment = {process.PARENT_VARIABLE: "1:0"}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+
+
+def test_a_line_of_the_log_has_its_time_in_utc(capsys: pytest.CaptureFixture[str]) -> None:
+    log = start_log("red")
+    log.info("tick %d", 7)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z INFO    red: tick 7", line), line
+    assert start_log("red").handlers != [] and len(logging.getLogger("red").handlers) == 1
+
+
+def test_two_starts_have_two_boots() -> None:
+    assert len({new_boot() for _ in range(100)}) == 100
