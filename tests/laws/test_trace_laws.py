@@ -122,8 +122,7 @@ class _HastyHub(HubCore):
 
     def advance(self, now_ns: int) -> None:
         super().advance(now_ns)
-        spoken = [action for action in self.actions if isinstance(action, Publish)]
-        self.actions[:] = spoken + [action for action in self.actions if not isinstance(action, Publish)]
+        self.actions.sort(key=lambda action: not isinstance(action, Publish))
 
 
 class _HastySupervisor(SupervisorCore):
@@ -131,8 +130,7 @@ class _HastySupervisor(SupervisorCore):
 
     def advance(self, now_ns: int) -> None:
         super().advance(now_ns)
-        written = [action for action in self.actions if isinstance(action, Journal)]
-        self.actions[:] = [action for action in self.actions if not isinstance(action, Journal)] + written
+        self.actions.sort(key=lambda action: isinstance(action, Journal))
 
 
 def test_speaking_before_writing_is_seen() -> None:
