@@ -25,13 +25,15 @@ def simulated_s(status: dict[str, Any]) -> float:
 
 
 def lag_text(status: dict[str, Any]) -> str:
-    """`lag 0.3 ms (p99 1.2)`, with the name that the last late tick waited for; nothing when time is not kept."""
-    lag = status["lag_ms"]
+    """`lag 0.3 ms (p50 0.1, p99 1.2, max 3.4), waited for red`: of the last tick, or of the last late one by number."""
+    lag, late = status["lag_ms"], status["late"]
     if lag is None:
         return ""
-    late = status["late"]
     text = f"lag {late['lag_ms']:.1f} ms (p50 {lag['p50']:.1f}, p99 {lag['p99']:.1f}, max {lag['max']:.1f})"
-    return f"{text}, waited for {late['waited_for']}" if late["waited_for"] else text
+    if not late["waited_for"]:
+        return text
+    which = "" if late["tick"] == status["ticks"] else f"tick {late['tick']} "
+    return f"{text}, {which}waited for {late['waited_for']}"
 
 
 def pace_text(status: dict[str, Any]) -> str:
@@ -75,7 +77,7 @@ def plain_line(status: dict[str, Any]) -> str:
 
 def render(status: dict[str, Any]) -> RenderableType:
     """Return the whole table."""
-    return Group(_head(status), _processes(status), _links(status))
+    return Group(_head(status), Text(), _processes(status), Text(), _links(status))
 
 
 def _head(status: dict[str, Any]) -> Text:

@@ -58,7 +58,9 @@ class SupervisorProcess:
 
     def run(self) -> int:
         """Serve the run until it has ended; write how, and return the exit code."""
-        self._folder.write_info(self._info)
+        info = self._info
+        self._folder.write_info(info)
+        self.core.say("info", f"run {info.run} listens at {info.simulation}; its folder is {self._folder.path}")
         self._loop.run(lambda: self.core.finished)
         self._loop.perform()
         self._folder.write_result(result(self.core))

@@ -31,7 +31,7 @@ def running() -> dict[str, Any]:
         "waiting_for": "red",
         "score": {"red": 2, "blue": 1},
         "lag_ms": {"p50": 0.31, "p99": 1.62, "max": 7.4},
-        "late": {"lag_ms": 0.7, "waited_for": "player-blue", "tick": 6169},
+        "late": {"lag_ms": 0.7, "waited_for": "player-blue", "tick": 6170},
         "ball": {"position": [0.123, -0.045, 0.0175], "solver": "red"},
         "packets": {"offered": 22510, "delivered": 22390, "dropped": 113, "in_flight": 7, "refused": 0},
         "nodes": {
@@ -60,6 +60,13 @@ def test_the_table_has_time_pace_lag_score_and_ball(running: dict[str, Any]) -> 
     assert "12.34 s · tick 6170 · realtime 1.00x" in text
     assert "red 2 : 1 blue · ball at +0.123 -0.045 +0.018 m, solved by red · 41 hand-overs, 2 moves" in text
     assert "lag 0.7 ms (p50 0.3, p99 1.6, max 7.4), waited for player-blue" in text
+
+
+def test_when_the_last_tick_was_in_time_the_last_late_one_is_named_by_its_number(running: dict[str, Any]) -> None:
+    running["late"] |= {"lag_ms": 0.0, "tick": 6042}
+    assert "lag 0.0 ms (p50 0.3, p99 1.6, max 7.4), tick 6042 waited for player-blue" in render_text(running)
+    running["late"] |= {"waited_for": "", "tick": -1}
+    assert "waited for" not in plain_line(running)
 
 
 def test_a_row_for_each_node_with_what_it_owns_solved_and_its_load(running: dict[str, Any]) -> None:

@@ -1,0 +1,65 @@
+"""What is asked for, checked: a plan has everything that was asked for, and the child is asked for the same."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from foosim.protocol.addresses import Address, Insecure
+from foosim.protocol.errors import BadValue
+from foosim.supervisor import cli
+from foosim.supervisor.plan import Plan, RunOptions, make_plan
+from foosim.supervisor.run_folder import RunFolder
+
+TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
+EVERYTHING = RunOptions(
+    TABLE, "2x", "1.5 s", 7, ("engine=pure", "table.ball.mass=27 g"), "0.0.0.0:7447", insecure=True
+)
+
+
+def test_a_plan_has_what_was_asked_for() -> None:
+    plan = make_plan(EVERYTHING)
+    assert (plan.deployment.seed, plan.deployment.engine, plan.deployment.table.ball.mass) == (7, "pure", 0.027)
+    assert (str(plan.pace), plan.ticks, plan.address) == ("2x", 750, Address("0.0.0.0", 7447))
+
+
+def test_what_is_not_asked_for_is_what_the_file_says() -> None:
+    plan = make_plan(RunOptions(TABLE))
+    assert (plan.deployment.seed, str(plan.pace), plan.ticks) == (1, "realtime", 0)
+    assert plan.address.is_loopback and plan.address.port == 0
+
+
+def test_a_time_that_ends_within_a_tick_lasts_to_its_end() -> None:
+    assert make_plan(RunOptions(TABLE, duration="1 ns")).ticks == 1
+    assert make_plan(RunOptions(TABLE, duration="2 ms")).ticks == 1
+    assert make_plan(RunOptions(TABLE, duration="2001 us")).ticks == 2
+
+
+def test_what_cannot_be_is_refused() -> None:
+    with pytest.raises(Insecure):
+        make_plan(RunOptions(TABLE, listen="0.0.0.0"))
+    with pytest.raises(BadValue):
+        make_plan(RunOptions(TABLE, duration="0 s"))
+
+
+@pytest.mark.parametrize("options", [RunOptions(TABLE), EVERYTHING], ids=["bare", "everything"])
+def test_the_supervisors_process_makes_the_same_plan(
+    options: RunOptions, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["foosim-supervisor", "run", *options.arguments(), "--run", "mine"])
+    served: list[Any] = []
+
+    def serve(plan: Plan, folder: RunFolder) -> int:
+        served.extend((plan, folder.name))
+        return 0
+
+    monkeypatch.setattr(cli, "serve", serve)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 0
+    plan, name = served
+    assert name == "mine"
+    for field in ("text", "deployment", "pace", "ticks", "address"):
+        assert getattr(plan, field) == getattr(make_plan(options), field)
