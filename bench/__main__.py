@@ -1,0 +1,113 @@
+"""`python -m bench [names...] [--seconds S] [--json]`: runs the benches, prints tables, and JSON in the last line."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, is_dataclass
+from typing import Any, Final
+
+from bench import barrier, distributed, echo, hub, machine, realtime, table_one_process
+from bench.runs import BenchError
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """A row of the table of benches. `run` takes the seconds of simulated time, None for its own."""
+
+    name: str
+    title: str
+    run: Callable[[float | None], Any]
+    lines: Callable[[Any], list[str]]
+
+
+def with_default(measure: Callable[..., Any]) -> Callable[[float | None], Any]:
+    """Return a bench whose seconds may be left out."""
+    return lambda seconds: measure() if seconds is None else measure(seconds)
+
+
+def run_barrier(seconds: float | None) -> list[dict[str, Any]]:
+    """Compare all ways, for about as many ticks as fit into the seconds."""
+    ticks = 1500 if seconds is None else max(100, round(1000 * seconds))
+    load = barrier.Load(ticks, message_bytes=1200, node_us=0, server_us=0)
+    return barrier.compare(barrier.WAYS, load, turns=1)
+
+
+def barrier_lines(rows: list[dict[str, Any]]) -> list[str]:
+    """Return the figures for people."""
+    return [f"{row['way']:36}{row['ticks_per_s']:7} ticks/s{row['cpu_us']:7} us of processor a tick" for row in rows]
+
+
+BENCHES: Final = (
+    Bench(
+        "table",
+        "the table in one process (rehearsal, one node, no capture)",
+        with_default(table_one_process.table_one_process),
+        table_one_process.lines,
+    ),
+    Bench(
+        "distributed",
+        "two nodes, vHub recording, supervisor, two lockstep players, as fast as it goes",
+        with_default(distributed.distributed),
+        distributed.lines,
+    ),
+    Bench("realtime", "the same in real time", with_default(realtime.realtime), realtime.lines),
+    Bench("hub", "packets through the vHub's core", with_default(hub.hub), hub.lines),
+    Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
+    Bench("barrier", "the messages of a tick alone", run_barrier, barrier_lines),
+)
+
+
+def plain(value: Any) -> Any:
+    """Return a figure as JSON takes it."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    return [plain(item) for item in value] if isinstance(value, list) else value
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the benches that are named, or all of them, until one fails; return the exit code."""
+    names = [bench.name for bench in BENCHES]
+    parser = argparse.ArgumentParser(prog="python -m bench", description="How fast foosim is on this machine.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}; all by default")
+    parser.add_argument("--seconds", type=float, help="simulated time of each run, instead of each bench's own")
+    parser.add_argument("--json", action="store_true", help="JSON only")
+    chosen = parser.parse_args(arguments)
+    unknown = sorted(set(chosen.names) - set(names))
+    if unknown:
+        parser.error(f"no bench {', '.join(unknown)}; there are {', '.join(names)}")
+    people = sys.stderr if chosen.json else sys.stdout
+    here = machine.this_machine()
+    print(
+        f"{here.cores} cores, {here.cpu}, Python {here.python}, load {here.load:.2f} before the bench",
+        file=people,
+        flush=True,
+    )
+    figures: dict[str, Any] = {}
+    failed = False
+    with tempfile.TemporaryDirectory() as state:
+        os.environ["XDG_STATE_HOME"] = state  # the user's own runs keep their folders
+        for bench in BENCHES:
+            if chosen.names and bench.name not in chosen.names:
+                continue
+            begun_s = time.monotonic()
+            try:
+                found = bench.run(chosen.seconds)
+            except BenchError as error:
+                print(f"\n{bench.name}: {error}", file=sys.stderr)
+                failed = True
+                break
+            figures[bench.name] = plain(found)
+            print(f"\n{bench.name}: {bench.title} [{time.monotonic() - begun_s:.0f} s]", file=people)
+            print("\n".join(f"  {line}" for line in bench.lines(found)), file=people, flush=True)
+    print(json.dumps({"machine": asdict(here), **figures}))
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

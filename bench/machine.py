@@ -1,0 +1,86 @@
+"""The machine that a figure belongs to, and what its processes use, read from /proc.
+
+Neighbours: `runs` asks for processes, `__main__` prints the machine.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import socket
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+PROC: Final = Path("/proc")
+TICKS_PER_S: Final = os.sysconf("SC_CLK_TCK")
+PAGE_BYTES: Final = os.sysconf("SC_PAGE_SIZE")
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What was measured on. `load` is the average over the last minute, before the bench began."""
+
+    cores: int
+    cpu: str
+    python: str
+    system: str
+    load: float
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """What a process has used up to now: processor time of all its threads, and resident memory."""
+
+    cpu_s: float
+    rss_mb: float
+
+
+def this_machine() -> Machine:
+    """Return what there is to know of this machine."""
+    return Machine(
+        len(os.sched_getaffinity(0)), _cpu_model(), platform.python_version(), platform.platform(), os.getloadavg()[0]
+    )
+
+
+def _cpu_model() -> str:
+    for line in (PROC / "cpuinfo").read_text().splitlines():
+        key, _, value = line.partition(":")
+        if key.strip() == "model name":
+            return value.strip()
+    return platform.machine()
+
+
+def children() -> dict[int, list[str]]:
+    """Return the command lines of this process's children by process id."""
+    found: dict[int, list[str]] = {}
+    for task in (PROC / "self" / "task").iterdir():
+        for pid in map(int, (task / "children").read_text().split()):
+            try:
+                found[pid] = (PROC / str(pid) / "cmdline").read_bytes().decode().split("\0")
+            except (FileNotFoundError, ProcessLookupError):
+                continue
+    return found
+
+
+def use_of(pid: int) -> Use | None:
+    """Return what a process has used, or None when it is gone."""
+    try:
+        fields = (PROC / str(pid) / "stat").read_text().rpartition(")")[2].split()
+        pages = int((PROC / str(pid) / "statm").read_text().split()[1])
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    return Use((int(fields[11]) + int(fields[12])) / TICKS_PER_S, pages * PAGE_BYTES / 1e6)
+
+
+def free_ports() -> int:
+    """Return a port that was free a moment ago, as the one above it: both planes of a run."""
+    while True:
+        with socket.socket() as first, socket.socket() as second:
+            first.bind(("127.0.0.1", 0))
+            port = int(first.getsockname()[1])
+            try:
+                second.bind(("127.0.0.1", port + 1))
+            except (OSError, OverflowError):
+                continue
+            return port

@@ -1,0 +1,163 @@
+"""Runs of real processes, as `foosim-supervisor up` makes them, watched from here.
+
+The watch stands where the display stands: it sees each status, and at the same time reads what every child has used.
+Neighbours: `distributed`, `realtime` and `echo` measure by it.
+"""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from bench.machine import Use, children, free_ports, use_of
+from foosim.supervisor.display import Display
+from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.up import Up
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+TABLE: Final = ROOT / "deploy" / "table.yaml"
+ANSWER_S: Final = 30.0
+EAGER_S: Final = 0.02
+"""How often the status is asked for until the first tick is there."""
+
+Helpers = Callable[[str, str], Sequence[list[str]]]
+"""Gives the command lines of processes that the bench adds, from the addresses of both planes."""
+
+
+class BenchError(Exception):
+    """A run that was to be measured went wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """One look at a running system: when, how far it was, and what its processes had used."""
+
+    wall_s: float
+    ticks: int
+    uses: dict[str, Use]
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessCost:
+    """What one process cost between the first look and the last."""
+
+    name: str
+    cpu_us_per_tick: float
+    rss_mb_start: float
+    rss_mb_end: float
+
+
+@dataclass(slots=True)
+class Watched:
+    """A run that is over: its result, the looks at it, when it had its first tick, and what the helpers printed."""
+
+    result: dict[str, Any]
+    looks: list[Look]
+    first_tick_s: float
+    capture_mb: float
+    printed: list[str] = field(default_factory=list)
+
+    @property
+    def tick_s(self) -> float:
+        return float(self.result["tick_ns"]) / 1e9
+
+    def costs(self) -> list[ProcessCost]:
+        """Return what each process cost, in the order of their names."""
+        first, last = self.looks[0], self.looks[-1]
+        ticks = last.ticks - first.ticks
+        if ticks <= 0:
+            raise BenchError("too short a run: fewer than two looks at it")
+        return [
+            ProcessCost(
+                name,
+                round((last.uses[name].cpu_s - first.uses[name].cpu_s) / ticks * 1e6, 1),
+                round(first.uses[name].rss_mb, 1),
+                round(last.uses[name].rss_mb, 1),
+            )
+            for name in sorted(first.uses.keys() & last.uses.keys())
+        ]
+
+
+class Watch(Display):
+    """A display that shows nothing and remembers."""
+
+    def __init__(self, every_s: float) -> None:
+        super().__init__(io.StringIO())
+        self.looks: list[Look] = []
+        self.first_tick_s = 0.0
+        self.every_s = EAGER_S
+        self._later_every_s = every_s
+
+    def show(self, status: dict[str, Any], now_s: float) -> None:
+        if status["state"] != "running" or status["ticks"] < 1:
+            return
+        seen_s = time.monotonic()
+        if not self.looks:
+            computed_s = 0.0 if status["pace"] != "realtime" else status["ticks"] * status["tick_ns"] / 1e9
+            self.first_tick_s = seen_s - computed_s
+            self.every_s = self._later_every_s
+        self.looks.append(Look(seen_s, status["ticks"], uses_of_children()))
+
+
+def uses_of_children() -> dict[str, Use]:
+    """Return what the processes of the run have used, by their names in the run."""
+    found = {}
+    for pid, command in children().items():
+        name, use = name_of(command), use_of(pid)
+        if name and use is not None:
+            found[name] = use
+    return found
+
+
+def name_of(command: Sequence[str]) -> str:
+    """Return the name of a process in its run, as its command line tells it; empty for any other process."""
+    if "--name" in command[:-1]:
+        return command[command.index("--name") + 1]
+    programs = [Path(word).name for word in command[:2]]
+    return next((name.removeprefix("foosim-") for name in programs if name.startswith("foosim-")), "")
+
+
+def watch(
+    pace: str,
+    duration_s: float,
+    sets: Sequence[str] = (),
+    every_s: float = 0.25,
+    helpers: Helpers | None = None,
+) -> Watched:
+    """Run the table with a capture, and with the helpers beside it. Raises BenchError when it did not end in order."""
+    port = free_ports()
+    options = RunOptions(
+        TABLE, pace, f"{round(duration_s * 1000)} ms", None, tuple(sets), listen=f"tcp/127.0.0.1:{port}"
+    )
+    begun_s = time.monotonic()
+    plan = make_plan(options)
+    commands = [] if helpers is None else helpers(f"tcp/127.0.0.1:{port}", f"tcp/127.0.0.1:{port + 1}")
+    with tempfile.TemporaryDirectory() as folder:
+        capture = Path(folder) / "run.mcap"
+        watching = Watch(every_s)
+        beside = [
+            subprocess.Popen([sys.executable, *command], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+            for command in commands
+        ]
+        try:
+            outcome = Up(plan, capture, watching).run()
+            if outcome.failed or outcome.result is None:
+                raise BenchError("\n".join(outcome.lines))
+            if outcome.result["ticks"] != plan.ticks:
+                raise BenchError(f"{outcome.lines[0]}, at {outcome.result['ticks']} of {plan.ticks} ticks")
+            printed = [process.communicate(timeout=ANSWER_S)[0] for process in beside]
+        finally:
+            for process in beside:
+                process.kill()
+                process.wait()
+        if not watching.looks:
+            raise BenchError("the run was over before it was seen running")
+        size_mb = capture.stat().st_size / 1e6
+    return Watched(outcome.result, watching.looks, watching.first_tick_s - begun_s, size_mb, printed)
