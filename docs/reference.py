@@ -1,0 +1,205 @@
+"""Writes the generated parts of the docs: `python docs/reference.py`.
+
+A generated part stands between the comments `<!-- generated: NAME -->` and `<!-- end -->` of a page in this folder. It
+says what the code says: the deployment's schema, the commands' options, the table of channels, the rows of a capture.
+tests/test_readme.py fails when a page and the code differ.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import typer.main
+
+from foosim.client.main import app as player_app
+from foosim.node.main import app as node_app
+from foosim.protocol import limits, units
+from foosim.protocol.channels import CHANNELS
+from foosim.protocol.deployment import deployment_schema
+from foosim.rehearsal.rehearse_command import app as rehearse_app
+from foosim.rehearsal.replay_command import app as replay_app
+from foosim.supervisor.cli import app as supervisor_app
+from foosim.vhub.main import app as vhub_app
+from foosim.vhub.rows import ROW_TYPES, row_schema
+
+DOCS: Final = Path(__file__).parent
+COMMANDS: Final[Mapping[str, Any]] = {
+    "foosim-supervisor": supervisor_app,
+    "foosim-rehearse": rehearse_app,
+    "foosim-replay": replay_app,
+    "foosim-vhub": vhub_app,
+    "foosim-node": node_app,
+    "foosim-player": player_app,
+}
+_PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
+
+
+def commands() -> Iterator[tuple[str, Any]]:
+    """Yield every command that can be typed, with what typer knows of it: `foosim-replay verify` and the like."""
+    for name, app in COMMANDS.items():
+        command = typer.main.get_command(app)
+        subcommands = getattr(command, "commands", None)
+        if subcommands is None:
+            yield name, command
+            continue
+        for subname, subcommand in subcommands.items():
+            yield f"{name} {subname}", subcommand
+
+
+def write_commands() -> Iterator[str]:
+    """Yield a section for each command: what it does, its arguments and options."""
+    for name, command in commands():
+        words = [_argument(parameter) for parameter in command.params if parameter.param_type_name == "argument"]
+        yield f"### `{' '.join([name, *words])}`\n\n"
+        yield re.sub(r"(?m)^ +", "", command.help.strip()) + "\n\n"
+        options = [p for p in command.params if p.param_type_name == "option" and p.name != "version"]
+        if options:
+            yield "| option | |\n|---|---|\n"
+        for option in options:
+            required = " Required." if option.required else ""
+            yield f"| `{' '.join(option.opts)}` | {_cell(option.help or '')}{required} |\n"
+        yield "\n" if options else ""
+
+
+def _argument(parameter: Any) -> str:
+    name = parameter.name.upper() if parameter.nargs == 1 else "X Y Z"
+    return name if parameter.required else f"[{name}]"
+
+
+def write_deployment() -> Iterator[str]:
+    """Yield a table for each kind of mapping in a deployment file, in the order in which they are met."""
+    schema = deployment_schema()
+    definitions = schema["$defs"]
+    waiting, met = ["the file"], {"the file"}
+    while waiting:
+        name = waiting.pop(0)
+        part = schema if name == "the file" else definitions[name]
+        if "properties" not in part:
+            continue
+        yield f"### {name[0].upper() + name[1:]}\n\n{part['description']}\n\n| key | value | default |\n|---|---|---|\n"
+        for key, value in part["properties"].items():
+            default = "required" if key in part.get("required", ()) else _default(value)
+            yield f"| `{key}` | {_cell(_value(value))} | {default} |\n"
+            for found in re.findall(r"#/\$defs/(\w+)", str(value)):
+                if found not in met:
+                    met.add(found)
+                    waiting.append(found)
+        yield "\n"
+
+
+def _default(value: Mapping[str, Any]) -> str:
+    default = value.get("default", "")
+    return "" if default in ("", None, {}, []) else f"`{str(default).lower() if default in (True, False) else default}`"
+
+
+def _value(value: Mapping[str, Any]) -> str:  # noqa: PLR0911  # a line for each kind of schema
+    """Return what a schema accepts, in words."""
+    if "$ref" in value:
+        name = value["$ref"].rpartition("/")[2]
+        return "anything" if name == "JsonValue" else f"see {name}"
+    for choice in ("anyOf", "oneOf"):
+        if choice in value:
+            return " or ".join(_value(one) for one in value[choice] if one.get("type") != "null")
+    if "patternProperties" in value:
+        return f"names, each with: {_value(next(iter(value['patternProperties'].values())))}"
+    if "additionalProperties" in value:
+        names = value.get("propertyNames", {}).get("enum", ())
+        inner = value["additionalProperties"]
+        return f"{', '.join(f'`{name}`' for name in names) or 'keys'}, each with: {_value(inner)}"
+    if "description" in value:
+        return str(value["description"]).partition(":")[0]
+    if "const" in value:
+        return f"`{value['const']}`"
+    if "enum" in value:
+        return ", ".join(f"`{one}`" for one in value["enum"])
+    if value.get("type") == "array":
+        return f"a list of: {_value(value['items'])}"
+    if "minimum" in value or "maximum" in value:
+        whole = "a whole number" if value["type"] == "integer" else "a number"
+        return f"{whole}, {value['minimum']} to {value['maximum']}"
+    return _TEXTS.get(value.get("title", ""), {"string": "text", "boolean": "`true` or `false`"}[value["type"]])
+
+
+_TEXTS: Final = {
+    "World": "a name",
+    "Id": "a name",
+    "Pace": "`realtime`, `fast`, or a factor such as `2x`",
+    "Class": "`module:Class`",
+}
+
+
+def write_units() -> Iterator[str]:
+    """Yield the units of every dimension."""
+    yield "| a | is written with |\n|---|---|\n"
+    for dimension in vars(units).values():
+        if isinstance(dimension, units.Dimension):
+            yield f"| {dimension.name} | {', '.join(f'`{unit}`' for unit in dimension.units)} |\n"
+
+
+def write_channels() -> Iterator[str]:
+    """Yield the table of channels."""
+    yield "| plane | channel | written by | read by | how often |\n|---|---|---|---|---|\n"
+    for channel in CHANNELS:
+        plane = channel.plane.name.lower()
+        yield f"| {plane} | `{channel.name}` | {channel.writers} | {channel.readers} | {channel.rate} |\n"
+
+
+def write_rows() -> Iterator[str]:
+    """Yield the fields of every kind of row."""
+    for topic, kind in ROW_TYPES.items():
+        schema = row_schema(kind)
+        yield f"### `{topic}`\n\n{_cell(schema['description'])}\n\n| field | type |\n|---|---|\n"
+        for name, value in schema["properties"].items():
+            yield f"| `{name}` | {_row_type(value)} |\n"
+        yield "\n"
+
+
+def _row_type(value: Mapping[str, Any]) -> str:
+    if value["type"] == "array":
+        inner = value["items"]
+        return f"list of {_row_type(inner)}"
+    if value["type"] == "object":
+        return "{" + ", ".join(value["properties"]) + "}"
+    if "enum" in value:
+        return ", ".join(f"`{one}`" for one in value["enum"])
+    return "bytes, in base64" if value.get("contentEncoding") == "base64" else str(value["type"])
+
+
+def write_limits() -> Iterator[str]:
+    """Yield the limits by name."""
+    yield "| limit | value |\n|---|---|\n"
+    for name, value in vars(limits).items():
+        if name.isupper():
+            yield f"| `{name}` | {'2^63 - 1' if value == limits.COUNTER_MAX else f'{value:,}'} |\n"
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+WRITERS: Final[Mapping[str, Callable[[], Iterator[str]]]] = {
+    "commands": write_commands,
+    "deployment": write_deployment,
+    "units": write_units,
+    "channels": write_channels,
+    "rows": write_rows,
+    "limits": write_limits,
+}
+
+
+def regenerated(page: str) -> str:
+    """Return a page with its generated parts written anew."""
+
+    def write(match: re.Match[str]) -> str:
+        name = match["name"]
+        return f"<!-- generated: {name} -->\n{''.join(WRITERS[name]()).rstrip()}\n<!-- end -->\n"
+
+    return _PART.sub(write, page)
+
+
+if __name__ == "__main__":
+    for path in sorted(DOCS.glob("*.md")):
+        path.write_text(regenerated(path.read_text()))

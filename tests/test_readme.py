@@ -1,0 +1,213 @@
+"""The README and the docs are true: their code runs, their commands parse, their files, names and options exist.
+
+What stands in the tutorials is extracted and run as a reader would run it, through the rehearsal on the pure engine.
+The generated parts of the docs are those that docs/reference.py writes today.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import json
+import re
+import shlex
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+import pytest
+import yaml
+
+from foosim.client.payloads import decode_payload
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.rehearsal.rehearse import rehearse
+from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.vhub.capture_reader import open_capture
+
+ROOT: Final = Path(__file__).parents[1]
+PAGES: Final = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
+OTHER_OPTIONS: Final = {"--help", "--version", "--strict", "--hypothesis-profile"}
+"""Options that belong to no command of ours, or to all."""
+
+pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+
+
+@cache
+def reference() -> ModuleType:
+    """docs/reference.py as a module."""
+    spec = importlib.util.spec_from_file_location("reference", ROOT / "docs" / "reference.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """The fenced blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL)
+
+
+def spans(page: Path) -> list[str]:
+    """What stands between backquotes in the text."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    return re.findall(r"`([^`\n]+)`", text)
+
+
+def typed_lines(page: Path) -> list[list[str]]:
+    """The command lines of foosim in a page's blocks, as words, without what stands before and behind them."""
+    lines = "\n".join(blocks(page, "sh")).splitlines()
+    lines += [line[4:] for line in page.read_text().splitlines() if line.startswith("    ")]
+    words = [shlex.split(line, comments=True) for line in lines if re.search(r"(^|=\. )foosim-[a-z]+ ", line)]
+    return [line[next(index for index, word in enumerate(line) if word.startswith("foosim-")) :] for line in words]
+
+
+def command_of(words: list[str]) -> tuple[Any, list[str]]:
+    """What typer knows of the command that is typed, and its arguments."""
+    known = dict(reference().commands())
+    for used in (2, 1):
+        if " ".join(words[:used]) in known:
+            return known[" ".join(words[:used])], words[used:]
+    raise AssertionError(f"no command {' '.join(words)}; there are {', '.join(known)}")
+
+
+# --- the tutorials ---------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A reader's folder: deploy/table.yaml, the README's player, and the capture of its first game."""
+    folder = tmp_path_factory.mktemp("house")
+    (folder / "deploy").symlink_to(ROOT / "deploy")
+    player, _ = blocks(ROOT / "README.md", "python")
+    (folder / "follower.py").write_text(player)
+    (words,) = typed_lines(ROOT / "README.md")
+    command, arguments = command_of(words)
+    asked = command.make_context("readme", arguments).params
+    assert asked["engine"] == "pure"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.syspath_prepend(str(folder))
+        plan = make_plan(RunOptions(asked["file"], "fast", asked["duration"], None, (*asked["sets"], "engine=pure")))
+        result = rehearse(plan.text, str(asked["file"]), plan.ticks, asked["nodes"], capture=asked["capture"]).json
+        assert not result["failed"] and result["ticks"] == 2500
+        yield folder
+    sys.modules.pop("follower", None)
+
+
+def test_the_readmes_player_plays(house: Path) -> None:
+    """It commands its four rods, swings back and kicks, and its rods meet the ball."""
+    capture = open_capture(house / "follower.mcap")
+    sent = capture.packets.where(capture.packets.source == "player-red")
+    rods = [f"red.{line}" for line in ("goal", "defence", "midfield", "attack")]
+    assert set(sent.destination) == set(rods)
+    assert {decode_payload("position", payload)[1] for payload in sent.payload} == {0.5, -1.2}
+    assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/capture.md", "docs/writing_a_player.md"])
+def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    """Each page's last block of Python; it prints what it found."""
+    program = blocks(ROOT / name, "python")[-1]
+    exec(compile(program, name, "exec"), {"__name__": "page"})
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) >= program.count("print(") >= 1
+
+
+def test_a_players_declaration_is_valid() -> None:
+    (text,) = blocks(ROOT / "docs" / "writing_a_player.md", "yaml")
+    ((name, declared),) = yaml.safe_load(text)["players"].items()
+    table = (ROOT / "deploy" / "table.yaml").read_text()
+    changed = apply_sets(table, "table.yaml", [f"players.{name}={json.dumps(declared)}"])
+    assert load_deployment(changed, "table.yaml").players[name].class_ == "follower:Follower"
+
+
+# --- what is named exists --------------------------------------------------------------------------------------------
+
+
+@pages
+def test_generated_parts_are_current(page: Path) -> None:
+    text = page.read_text()
+    assert reference().regenerated(text) == text, "write it anew: python docs/reference.py"
+
+
+def test_every_part_that_can_be_generated_stands_in_a_page() -> None:
+    text = "".join(page.read_text() for page in PAGES)
+    assert sorted(re.findall(r"<!-- generated: (\w+) -->", text)) == sorted(reference().WRITERS)
+
+
+@pages
+def test_command_lines_parse(page: Path) -> None:
+    for words in typed_lines(page):
+        command, arguments = command_of(words)
+        command.make_context(words[0], arguments)
+
+
+@pages
+def test_commands_and_options_exist(page: Path) -> None:
+    options = {option for _, command in reference().commands() for one in command.params for option in one.opts}
+    named = spans(page)
+    for span in named:
+        assert not set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", span)) - options - OTHER_OPTIONS, span
+    inline = [span.split() for span in named if re.match(r"foosim-[a-z]+( [a-z]+)?( |$)", span)]
+    groups = {name.split()[0] for name, _ in reference().commands()}
+    for words in inline:
+        assert words[0] in groups, words
+        if len(words) > 1:
+            command_of(words)
+
+
+@pages
+def test_targets_of_make_exist(page: Path) -> None:
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"(?:^    |`)make ([a-z]+)", page.read_text(), re.MULTILINE)) <= targets
+
+
+@cache
+def names_in(path: Path) -> frozenset[str]:
+    """Everything that a module defines, members of classes as `Class.member`."""
+    found = set()
+    for node in ast.parse(path.read_text()).body:
+        for name in _defined(node):
+            found.add(name)
+            if isinstance(node, ast.ClassDef):
+                found |= {f"{name}.{member}" for inner in node.body for member in _defined(inner)}
+    return frozenset(found)
+
+
+def _defined(node: ast.stmt) -> list[str]:
+    if isinstance(node, ast.ClassDef | ast.FunctionDef):
+        return [node.name]
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    return [target.id for target in targets if isinstance(target, ast.Name)]
+
+
+@cache
+def all_names() -> frozenset[str]:
+    sources = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
+    return frozenset(name for path in sources for name in names_in(path))
+
+
+@pages
+def test_files_and_names_exist(page: Path) -> None:
+    missing = []
+    for span in spans(page):
+        path = re.fullmatch(r"(?P<path>[a-z][\w.-]*(/[\w.-]+)*(/|\.(py|yaml|json|md)))(:(?P<name>[\w.]+))?", span)
+        if path is not None and "/" in path["path"]:
+            file = ROOT / path["path"]
+            if not file.exists() or (path["name"] and path["name"] not in names_in(file)):
+                missing.append(span)
+        elif re.fullmatch(r"[A-Z][A-Za-z]+\._?[a-z]\w*", span) and span not in all_names():
+            missing.append(span)
+    for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
+        if not (page.parent / link).is_file():
+            missing.append(link)
+    assert not missing
+
+
+def test_every_page_is_linked_from_the_readme() -> None:
+    links = set(re.findall(r"\]\(docs/([^)]+)\)", PAGES[0].read_text()))
+    assert links == {page.name for page in PAGES[1:]}
