@@ -1,0 +1,109 @@
+"""Faults that law 1 must catch, planted one at a time: what the partition may not touch, touched.
+
+Each test first sees the law hold, then plants the fault and sees it fail. Faults of the engines are planted in
+`test_engine_partition.py`, faults of speaking and committing in `test_trace_laws.py`.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from foosim.node.engines.pure import PureEngine
+from foosim.node.sensors import encoder
+from foosim.node.step import Stepper, Work
+from foosim.protocol.assign import Assignment, Island, Reach, Share, islands_of, reach_of, touching_of
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import build_layout
+from foosim.protocol.start import initial_numbers, place_ball
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TICKS = 800
+
+
+def differs() -> bool:
+    """Whether some tick differs between one node and two, in a run in which rods touch the ball."""
+    touched = 0
+
+    def count(frame: Frame) -> None:
+        nonlocal touched
+        touched += any(frame.numbers[rod.offsets["contacts"]] for rod in frame.layout.rods)
+
+    text = TABLE.read_text()
+    sets = ["engine=pure", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=2 m/s"]
+    one = rehearse(text, TABLE.name, TICKS, 1, sets, Settings(on_commit=count))
+    two = rehearse(text, TABLE.name, TICKS, 2, sets)
+    assert one.json["ticks"] == two.json["ticks"] == TICKS and touched > 0
+    return one.digests != two.digests
+
+
+def test_a_draw_from_a_running_generator_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not differs()
+    dice = random.Random(1)
+    monkeypatch.setattr(encoder, "gaussian", lambda word: dice.gauss(0.0, 1.0))
+    assert differs()
+
+
+def test_an_island_split_between_two_solvers_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not differs()
+    divide = Assignment._divide
+
+    def split(self: Assignment, islands: tuple[Island, ...]) -> dict[str, Share]:
+        """Give the ball to the last node, its rods to their owners."""
+        parts: list[Island] = []
+        for island in islands:
+            names = {index: self.layout.entities[index].name for index in island.entities}
+            parts += [Island((index,), name if name in self.owners else "") for index, name in names.items()]
+        return divide(self, tuple(parts))
+
+    monkeypatch.setattr(Assignment, "_divide", split)
+    assert differs()
+
+
+def kicked_towards_the_next_rod() -> tuple[Stepper, list[float]]:
+    """The table at ticks of 10 ms: a resting ball before a turning foot, the other team's rod 99 mm ahead of it."""
+    text = apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure", "tick=10 ms", "substeps=20"])
+    deployment = load_deployment(text, TABLE.name)
+    layout = build_layout(deployment)
+    numbers = initial_numbers(deployment, layout)
+    radius_m = deployment.table.ball.radius
+    place_ball(numbers, layout["ball"], (-deployment.table.lines["midfield"].x - 0.05, 0.0, radius_m))
+    kicker = layout["blue.midfield"]
+    numbers[kicker.offsets["joint_velocities"] + 1] = 140.0
+    numbers[kicker.offsets["wanted"] + 1] = 100.0
+    return Stepper(deployment, layout), numbers
+
+
+def solve(stepper: Stepper, numbers: Sequence[float], reach: Reach) -> list[float]:
+    """Solve each island of a tick in an engine of its own; return the numbers after it."""
+    after = list(numbers)
+    entities = stepper.layout.entities
+    for island in islands_of(numbers, reach, touching_of(numbers, reach)):
+        bodies = tuple(entities[index] for index in island.entities)
+        work = Work(0, stepper.layout, (bodies,), island.entities, list(numbers), {})
+        stepper.solve(PureEngine(stepper.deployment, stepper.layout), work)
+        for body in bodies:
+            after[body.start : body.split] = work.numbers[body.start : body.split]
+    return after
+
+
+def test_reach_from_present_speed_is_caught() -> None:
+    """A resting ball has no present speed, and reaches the next rod within the tick in which it is kicked."""
+    stepper, numbers = kicked_towards_the_next_rod()
+    declared = reach_of(stepper.deployment, stepper.layout)
+    present = replace(declared, ball_m=stepper.deployment.table.ball.radius)
+    together = list(numbers)
+    bodies = tuple(entity for entity in stepper.layout.entities if entity.has_body)
+    work = Work(0, stepper.layout, (bodies,), tuple(body.index for body in bodies), together, {})
+    stepper.solve(PureEngine(stepper.deployment, stepper.layout), work)
+    for name in ("red.midfield", "blue.midfield"):
+        assert together[stepper.layout[name].offsets["contacts"]] > 0, name
+    assert solve(stepper, numbers, declared) == together
+    assert solve(stepper, numbers, present) != together
