@@ -1,6 +1,6 @@
 """A meter of where the time of a tick goes, and an engine that is metered.
 
-Times are of the wall: on a machine with more work than cores they hold the time of others, too. Neighbours:
+Parts are of the wall: on a machine with more work than cores they hold the time of others, too. Neighbours:
 `table_one_process` and `metered_node` put the meter where they measure.
 """
 
@@ -27,6 +27,7 @@ class Meter:
     def __init__(self) -> None:
         self.parts: dict[str, int] = {}
         self._begin_ns = self._mark_ns = 0
+        self._begin_cpu_ns = self._mark_cpu_ns = 0
         self._begin_tick = self._mark_tick = 0
         self._marked: dict[str, int] = {}
 
@@ -54,20 +55,22 @@ class Meter:
         """Forget what was before this tick."""
         self.parts.clear()
         self._begin_ns, self._begin_tick = time.perf_counter_ns(), tick
+        self._begin_cpu_ns = time.process_time_ns()
 
     def mark(self, tick: int) -> None:
         """Count up to here; what comes behind the first mark of the last tick is not counted."""
         if tick == self._mark_tick:
             return
         self._mark_ns, self._mark_tick = time.perf_counter_ns(), tick
+        self._mark_cpu_ns = time.process_time_ns()
         self._marked = self.parts.copy()
 
     def us_per_tick(self) -> dict[str, float]:
-        """Return the mean of each part, and of the whole tick as `total`, in us."""
+        """Return the mean of each part, of the whole tick as `total`, and of its processor time as `cpu`, in us."""
         ticks = self._mark_tick - self._begin_tick
         assert ticks > 0, "too short a run to meter"
-        total = {"total": self._mark_ns - self._begin_ns}
-        return {part: round(spent / ticks / 1e3, 1) for part, spent in {**self._marked, **total}.items()}
+        whole = {"total": self._mark_ns - self._begin_ns, "cpu": self._mark_cpu_ns - self._begin_cpu_ns}
+        return {part: round(spent / ticks / 1e3, 1) for part, spent in {**self._marked, **whole}.items()}
 
 
 class MeteredEngine:

@@ -85,7 +85,12 @@ def run_metered(name: str, connect: str) -> dict[str, float]:
         node_main.run_node(name, connect)
     spent = METER.us_per_tick()
     parts = {part: spent.get(part, 0.0) for part in PARTS}
-    return {**parts, "rest": round(spent["total"] - sum(parts.values()), 1), "total": spent["total"]}
+    return {
+        **parts,
+        "rest": round(spent["total"] - sum(parts.values()), 1),
+        "total": spent["total"],
+        "cpu": spent["cpu"],
+    }
 
 
 def main() -> None:

@@ -30,6 +30,8 @@ class OneProcess:
     us_per_tick: float
     rtf: float
     us_of_runs: list[float]
+    cpu_us_of_runs: list[float]
+    """Processor time: what to compare on a machine that others use, too."""
     metered_us: dict[str, float]
     score: dict[str, int]
 
@@ -47,11 +49,13 @@ def _measure(engine: str, seconds: float, repeats: int) -> OneProcess:
     metered, _ = _rehearse(engine, seconds, Settings(factory=metered_engine(meter)), meter)
     node = metered.pop("node") - sum(metered.get(part, 0.0) for part in ENGINE_PARTS)
     parts = {**{part: metered.pop(part) for part in ENGINE_PARTS}, "node": round(node, 1)}
-    total = metered.pop("total")
+    total, cpu = metered.pop("total"), metered.pop("cpu")
     parts |= metered
-    parts |= {"bus": round(total - sum(parts.values()), 1), "total": total}
+    parts |= {"bus": round(total - sum(parts.values()), 1), "total": total, "cpu": cpu}
     rtf = round(result["tick_ns"] / 1e3 / us, 2)
-    return OneProcess(engine, result["ticks"], us, rtf, runs, parts, result["score"])
+    return OneProcess(
+        engine, result["ticks"], us, rtf, runs, [times["cpu"] for times, _ in bare], parts, result["score"]
+    )
 
 
 def _rehearse(
@@ -96,9 +100,11 @@ def lines(rows: list[OneProcess]) -> list[str]:
     shown = []
     for row in rows:
         to_reach = ", to reach 6x" if row.engine == "bullet" else ""
-        shown.append(
-            f"{row.engine:8}{row.us_per_tick:8.1f} us/tick{row.rtf:7.2f}x real time (runs of {row.ticks} ticks: "
-            f"{' '.join(f'{us:g}' for us in row.us_of_runs)} us{to_reach}; {row.score['red']} : {row.score['blue']})"
-        )
+        runs, cpu = (" ".join(f"{us:g}" for us in of_runs) for of_runs in (row.us_of_runs, row.cpu_us_of_runs))
+        shown += [
+            f"{row.engine:8}{row.us_per_tick:8.1f} us/tick{row.rtf:7.2f}x real time "
+            f"({row.ticks} ticks{to_reach}; {row.score['red']} : {row.score['blue']})",
+            f"        runs {runs} us, of processor {cpu}",
+        ]
         shown.append("        metered: " + "  ".join(f"{part} {us:g}" for part, us in row.metered_us.items()))
     return shown
