@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from foosim.protocol.errors import BadValue, Refused, show
+from foosim.protocol.errors import BadValue, Failed, Refused, show
 from foosim.protocol.names import nearest_name
 
 CHOICES_MAX: Final = 24
@@ -28,10 +28,8 @@ class PacketError(Refused):
     """A packet, or a message with packets, that the wire does not take."""
 
 
-class PlayerError(Refused):
+class PlayerError(Failed):
     """A player that cannot be loaded, or that did something that players must not do."""
-
-    exit_code = 1
 
 
 class ConnectionRefused(Refused):

@@ -20,6 +20,12 @@ class Refused(Exception):
         self.what = what
 
 
+class Failed(Refused):
+    """What was asked for is in order and could not be done; the text says what stood in the way."""
+
+    exit_code = 1
+
+
 class BadValue(Refused):
     """A value that is not valid: what is wrong with it, the value as it was given, the nearest valid one if any."""
 

@@ -26,7 +26,7 @@ from typing import Final, Self
 from zlib import crc32
 
 from foosim.protocol import limits
-from foosim.protocol.errors import Refused
+from foosim.protocol.errors import Failed
 
 SIGNATURE: Final = b"foosim journal 1\n"
 _FRAMING: Final = struct.Struct("<II")
@@ -34,10 +34,8 @@ _LENGTH: Final = struct.Struct("<I")
 _SERIAL: Final = re.compile(r"(\d{6,})\.journal")
 
 
-class JournalError(Refused):
+class JournalError(Failed):
     """A journal cannot be written or read: the file, and what is wrong with it."""
-
-    exit_code = 1
 
 
 @dataclass(frozen=True, slots=True)

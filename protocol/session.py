@@ -28,7 +28,7 @@ import zenoh
 
 from foosim.protocol import limits
 from foosim.protocol.addresses import parse_address, reachable
-from foosim.protocol.errors import BadValue, Refused, show
+from foosim.protocol.errors import BadValue, Failed, show
 from foosim.protocol.inbox import Inbox, Item
 
 KeyReader = Callable[[str], tuple[str, str] | None]
@@ -56,16 +56,12 @@ _runtime = ROUTER_RUNTIME
 _opened = False
 
 
-class ListenError(Refused):
+class ListenError(Failed):
     """The address cannot be listened on."""
 
-    exit_code = 1
 
-
-class ConnectError(Refused):
+class ConnectError(Failed):
     """No router answers at the address."""
-
-    exit_code = 1
 
 
 def use_client_runtime() -> None:

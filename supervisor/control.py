@@ -15,7 +15,7 @@ from typing import Any, Final, Self
 from foosim.protocol import channels
 from foosim.protocol.channels import Plane
 from foosim.protocol.codec import decode, decode_json, encode, encode_json
-from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.errors import Failed, Malformed, Refused
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Wire
 from foosim.protocol.messages import Answer, Request, Vector
@@ -33,10 +33,8 @@ class RequestRefused(Refused):
     """The supervisor would not do it; the text says why."""
 
 
-class NoAnswer(Refused):
+class NoAnswer(Failed):
     """The supervisor did not answer in time."""
-
-    exit_code = 1
 
 
 class Control:

@@ -18,7 +18,7 @@ import msgspec
 import platformdirs
 
 from foosim.protocol import wall
-from foosim.protocol.errors import Refused
+from foosim.protocol.errors import Failed, Refused
 from foosim.protocol.names import is_name, nearest_name
 
 KEPT_RUNS: Final = 20
@@ -29,10 +29,8 @@ LOCK_FILE: Final = "lock"
 HOLD_TRIES: Final = 50
 
 
-class NoRun(Refused):
+class NoRun(Failed):
     """There is no such run, or none that is live."""
-
-    exit_code = 1
 
 
 class RunInfo(msgspec.Struct, frozen=True):
