@@ -217,18 +217,18 @@ def test_a_node_that_does_not_fit_is_refused_and_costs_the_run_nothing(house: Ho
     assert code == 3 and "no node rde is declared; declared are blue, red, nearest is red" in err
     code, err = node("red", "--world", "chess")
     assert code == 3 and "world chess, this is table" in err
-    code, err = node_of_version_2(house, info.simulation)
+    version_2 = "from foosim.protocol import limits; limits.PROTOCOL_VERSION = 2"
+    code, err = altered_node(house, version_2, "red", info.simulation)
     assert code == 3 and "protocol version 2, this is 1" in err
     status = house.ticking(before + 1)
     assert (status["state"], status["epoch"]) == ("running", 1)
 
 
-def node_of_version_2(house: House, address: str) -> tuple[int, str]:
-    """A node whose protocol is another one."""
-    program = "from foosim.protocol import limits; limits.PROTOCOL_VERSION = 2; "
-    program += "from foosim.node.main import main; main()"
+def altered_node(house: House, change: str, name: str, address: str) -> tuple[int, str]:
+    """A node of which something was changed before it starts; return its exit code and errors."""
+    program = f"{change}; from foosim.node.main import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", program, "--name", "red", "--connect", address],
+        [sys.executable, "-c", program, "--name", name, "--connect", address],
         cwd=house.folder,
         capture_output=True,
         text=True,
@@ -244,6 +244,9 @@ def test_the_run_waits_for_a_node_that_is_started_by_hand(house: House) -> None:
     command = line.split(": ", 1)[1].split()
     assert command[:4] == ["foosim-node", "--name", "blue", "--connect"]
     house.wait_for("the others", lambda: control.status()["waiting_for"] == "blue")
+    other_cpu = "from foosim.node import main; main.library_fingerprint = lambda: bytes(32)"
+    code, err = altered_node(house, other_cpu, "blue", command[4])
+    assert code == 3 and "arithmetic fingerprint 0000000000000000, this is " in err
     code, _, err = house.run(*command)
     assert code == 0, err
     code, out, _ = house.end(up)
