@@ -106,6 +106,7 @@ class Loop:
     def __init__(self, core: Core, inbox: Inbox, log: logging.Logger, deadline_ns: Callable[[int], int]) -> None:
         """`deadline_ns(now)` is when the core has something to do by time."""
         self.core = core
+        self.deadline_ns = deadline_ns
         self.journal: Appender | None = None
         self.turn: Callable[[int], None] = lambda now_ns: None
         """What the core does once it has its messages; it may call `perform` in between."""
@@ -121,7 +122,6 @@ class Loop:
         """Share of the last second in which the loop did not sleep."""
         self._inbox = inbox
         self._log = log
-        self._deadline_ns = deadline_ns
         self._wires: dict[Plane, Wire] = {}
         self._channels: dict[str, Channel] = {channel.key: channel for channel in CHANNELS}
         self._planes = {key: plane for plane, key in ALIVE.items()}
@@ -166,9 +166,9 @@ class Loop:
             core.wake(now_ns)
             self.turn(now_ns)
             self.perform()
-            self._wake_ns = self._deadline_ns(now_ns)
+            self._wake_ns = self.deadline_ns(now_ns)
         else:
-            self._wake_ns = min(self._wake_ns, self._deadline_ns(now_ns))
+            self._wake_ns = min(self._wake_ns, self.deadline_ns(now_ns))
 
     def perform(self) -> None:
         """Do what the core asks for, in order."""
