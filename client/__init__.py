@@ -2,3 +2,7 @@
 
 `connect` (in `client`) is for programs and people; `player` and `players` for controllers that `up` starts.
 """
+
+from foosim.client.client import Client, connect
+
+__all__ = ["Client", "connect"]

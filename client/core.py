@@ -282,24 +282,27 @@ class ClientCore:
 
     def _numbered(self, packets: Sequence[Outgoing], stamp_ns: int) -> list[Sent]:
         """Return the packets with their numbers, checked; nothing is counted yet."""
-        assert self.deployment is not None
         if len(packets) > limits.PACKETS_PER_MESSAGE_MAX:
             raise PacketError(f"{len(packets)} packets at once, at most {limits.PACKETS_PER_MESSAGE_MAX} are allowed")
         for packet in packets:
-            self._check(packet, self.deployment)
+            self.check(packet)
         return [
             Sent(self._sequence + index, packet.destination, packet.channel, stamp_ns, packet.payload)
             for index, packet in enumerate(packets, 1)
         ]
 
-    def _check(self, packet: Outgoing, deployment: Deployment) -> None:
+    def check(self, packet: Outgoing) -> None:
+        """Raise UnknownName or PacketError for a packet that could not be sent."""
+        deployment = self.deployment
+        assert deployment is not None
         destination = packet.destination
-        if not (destination in deployment.robots or destination in deployment.players or destination in deployment.clients):
+        if not any(destination in known for known in (deployment.robots, deployment.players, deployment.clients)):
             raise UnknownName("unknown destination", destination, deployment.endpoints())
         if not 1 <= len(packet.channel) <= limits.NAME_LENGTH_MAX:
             raise PacketError(f"channel {packet.channel!r}: not 1 to {limits.NAME_LENGTH_MAX} characters")
-        if len(packet.payload) > limits.PAYLOAD_BYTES_MAX:
-            raise PacketError(f"{len(packet.payload)} bytes in one packet, at most {limits.PAYLOAD_BYTES_MAX} are allowed")
+        size = len(packet.payload)
+        if size > limits.PAYLOAD_BYTES_MAX:
+            raise PacketError(f"{size} bytes in one packet, at most {limits.PAYLOAD_BYTES_MAX} are allowed")
 
     def _count_sent(self, sent: Sequence[Sent]) -> None:
         self._sequence += len(sent)

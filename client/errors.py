@@ -38,3 +38,13 @@ class ConnectionRefused(Refused):
 
 class ConnectionFailed(Refused):
     """Nobody answered at the address, or the connection to the vHub is gone."""
+
+
+class NotJoined(Refused):
+    """Something was asked of a client that needs `lockstep` or `listen` first, or that cannot follow it."""
+
+    exit_code = 2
+
+
+class RunEnded(Refused):
+    """The run is over: nothing can be sent, and nothing comes any more."""

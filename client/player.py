@@ -76,18 +76,41 @@ def load_player(path: str) -> PlayerFactory:
     return cast(PlayerFactory, made)
 
 
+class Newest:
+    """Keeps the newest sample of each channel that is heard; what was sent later may have come earlier."""
+
+    def __init__(self, kinds: Mapping[tuple[str, str], str]) -> None:
+        """`kinds` is the kind of what each (robot, channel) carries; packets of others are passed over."""
+        self.samples: dict[tuple[str, str], Sample] = {}
+        self.malformed = 0
+        """Samples that did not fit their channel."""
+        self._kinds = kinds
+
+    def take(self, packets: Iterable[Received]) -> None:
+        """Take packets as they came."""
+        for packet in packets:
+            pair = (packet.source, packet.channel)
+            kind = self._kinds.get(pair)
+            known = self.samples.get(pair)
+            if kind is None or (known is not None and known.sequence >= packet.sequence):
+                continue
+            try:
+                value = decode_payload(kind, packet.payload)
+            except Malformed:
+                self.malformed += 1
+                continue
+            self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
+
+
 class PlayerLoop:
     """Runs the player that the deployment declares under the core's name. `step` after every message and wake."""
 
     def __init__(self, core: ClientCore, load: Callable[[str], PlayerFactory] = load_player) -> None:
         self.core = core
-        self.samples: dict[tuple[str, str], Sample] = {}
-        self.malformed = 0
-        """Samples that did not fit their channel."""
+        self.newest = Newest({})
         self._load = load
         self._declaration: Declaration | None = None
         self._player: Player | None = None
-        self._kinds: dict[tuple[str, str], str] = {}
         self._beat_ns = NEVER_NS
         self._period_ns = 0
 
@@ -102,10 +125,10 @@ class PlayerLoop:
         if self._player is None:
             self._begin(core.deployment, now_ns)
         if core.go is not None:
-            self._take(core.go.packets)
+            self.newest.take(core.go.packets)
             core.done(self._act(core.go.tick))
         elif self._period_ns:
-            self._take(core.arrivals)
+            self.newest.take(core.arrivals)
             core.arrivals.clear()
             if now_ns >= self._beat_ns:
                 core.send(self._act(max(core.tick, 0)), now_ns)
@@ -128,7 +151,7 @@ class PlayerLoop:
         except Exception as error:
             raise PlayerError(f"player {name}: {declared.class_} cannot be made: {_describe(error)}") from error
         wanted = [(robot, channel) for robot, heard in sorted(declared.robots.items()) for channel in heard]
-        self._kinds = {pair: channel_kind(deployment, *pair) for pair in wanted}
+        self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in wanted})
         if declared.lockstep:
             self.core.join(deployment.ticks(declared.rate_hz), wanted)
         else:
@@ -136,28 +159,13 @@ class PlayerLoop:
             self._period_ns = int(NS_PER_S / declared.rate_hz)
             self._beat_ns = now_ns + self._period_ns
 
-    def _take(self, packets: Iterable[Received]) -> None:
-        """Keep the newest sample of each channel; what was sent later may have come earlier."""
-        for packet in packets:
-            pair = (packet.source, packet.channel)
-            kind = self._kinds.get(pair)
-            known = self.samples.get(pair)
-            if kind is None or (known is not None and known.sequence >= packet.sequence):
-                continue
-            try:
-                value = decode_payload(kind, packet.payload)
-            except Malformed:
-                self.malformed += 1
-                continue
-            self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
-
     def _act(self, tick: int) -> list[Outgoing]:
         """Ask the player, and check and pack what it commands, in the robots' name order."""
         deployment, declared = self.core.deployment, self._declaration
         assert self._player is not None and deployment is not None and declared is not None
         where = f"player {self.core.name} at tick {tick}"
         try:
-            commands = self._player.act(tick, self.samples)
+            commands = self._player.act(tick, self.newest.samples)
         except Exception as error:
             raise PlayerError(f"{where}: act failed: {_describe(error)}") from error
         packets = []

@@ -1,0 +1,423 @@
+"""The library for programs and people: connect to a run, hear its robots, command them, send and receive packets.
+
+    with connect("tcp/127.0.0.1:7450", "hand") as client:
+        client.subscribe("red.goal", "encoder")
+        goal = client.robots["red.goal"]
+        for tick in client.lockstep(100):
+            sample = goal.sensors["encoder"]
+            goal.actuators["position"].set(slide=0.05, spin=0.0)
+
+The name is one that the deployment declares under `clients`. In `lockstep` the run waits at each of the client's ticks
+until the loop's body is done; after `listen` it goes on by itself. Everything travels as packets through the emulated
+network: what arrives is late, and some is lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
+frame (origin on the floor in the middle of the table, x towards blue's goal, z up). A client belongs to one thread.
+Neighbours: `core` decides, `payloads` has the values, `protocol.loop` carries; it is imported with the first `connect`.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from types import TracebackType
+from typing import TYPE_CHECKING, Final, Generic, Self, TypeVar
+
+from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics, Outgoing, check_subscription
+from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded, UnknownName
+from foosim.client.payloads import Command, Value, channel_kind, decode_payload, encode_command
+from foosim.client.player import NS_PER_S, Newest, Sample
+from foosim.protocol import channels, limits
+from foosim.protocol.channels import VHUB, Plane
+from foosim.protocol.deployment import Deployment, RodRobot
+from foosim.protocol.errors import BadValue, Malformed
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.messages import Received
+from foosim.protocol.names import CHANNEL_POSITION, is_name
+from foosim.protocol.process import new_boot
+
+if TYPE_CHECKING:
+    from foosim.protocol.session import Session
+
+CONNECT_S: Final = 10.0
+_LOG: Final = logging.getLogger("foosim.client")
+_LOG.addHandler(logging.NullHandler())
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """One packet that has reached the client. `sent_ns` and `due_ns` are simulated time."""
+
+    source: str
+    channel: str
+    sequence: int
+    """Grows with each packet of its source; what the network delivers twice has it twice."""
+    sent_ns: int
+    due_ns: int
+    payload: bytes
+    value: Value | None
+    """What the payload holds: the bytes themselves on `echo` and from other clients, None when it holds no value."""
+
+
+class Named(Generic[T]):
+    """Things by name, in name order; a name that does not exist raises UnknownName, which says what is nearest."""
+
+    def __init__(self, what: str, names: Iterable[str], make: Callable[[str], T]) -> None:
+        self._what = what
+        self._names = sorted(names)
+        self._make = make
+
+    def __getitem__(self, name: str) -> T:
+        if name not in self._names:
+            raise UnknownName(self._what, name, self._names)
+        return self._make(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+class Actuator:
+    """The position loop of a rod."""
+
+    def __init__(self, client: Client, robot: str) -> None:
+        self._client = client
+        self._robot = robot
+
+    def set(self, slide: float, spin: float) -> None:
+        """Say where the rod shall go: `slide` in m along world +y from its middle, `spin` in rad about +y, 0 feet down.
+
+        In lockstep it is sent at the tick's end, and of several the last one counts; after `listen` it is sent at once.
+        The rod keeps its last command. Raises BadValue for what is out of its reach or not finite, NotJoined, RunEnded.
+        """
+        payload = encode_command(self._client.deployment, self._robot, Command(float(slide), float(spin)))
+        self._client._command(self._robot, payload)
+
+
+class Robot:
+    """One robot: what it measures and what moves it, by the names in the deployment."""
+
+    def __init__(self, client: Client, name: str) -> None:
+        self.name: Final = name
+        self._client = client
+        robot = client.deployment.robots[name]
+
+        def sensor(channel: str) -> Sample | None:
+            return client._sample(name, channel)
+
+        def actuator(channel: str) -> Actuator:
+            return Actuator(client, name)
+
+        self.sensors: Final[Named[Sample | None]] = Named(f"{name} has no such sensor", robot.sensors, sensor)
+        """The newest sample of each, None until one has come; its `value` is a RodPosition or a BallPosition."""
+        moved = [CHANNEL_POSITION] if isinstance(robot, RodRobot) else []
+        self.actuators: Final[Named[Actuator]] = Named(f"{name} has no such actuator", moved, actuator)
+
+    def send(self, channel: str, payload: bytes) -> None:
+        """Send a packet to the robot; see `Client.send`."""
+        self._client.send(self.name, channel, payload)
+
+
+class Link:
+    """The client's way to the vHub: its core on a session, driven by whoever waits for something."""
+
+    def __init__(self, core: ClientCore, session: Session) -> None:
+        from foosim.protocol.loop import Loop, Wire
+
+        self.core: Final = core
+        self.locator: Final = session.locator
+        self.is_lost = False
+        self.closed = False
+        self._session = session
+        self._inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+        self._until_ns = NEVER_NS
+        self._wire = Wire(session, Plane.RADIO, self._inbox, core.name)
+        self._loop = Loop(core, self._inbox, _LOG, lambda now_ns: max(now_ns, min(core.deadline_ns(), self._until_ns)))
+        self._loop.connect(self._wire)
+        self._loop.on_alive = self._on_alive
+        self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
+
+    def be_present(self) -> None:
+        """Show that this client is here, and hear when the vHub is not; once it has let the client in."""
+        self._wire.declare_alive()
+        self._wire.watch_alive(VHUB)
+
+    def perform(self) -> None:
+        """Say what the core has to say."""
+        self._loop.perform()
+
+    def wait(self, reached: Callable[[], bool], timeout_s: float | None) -> None:
+        """Go round until something is reached or the time is over. Raises ConnectionFailed when the vHub is lost."""
+        if self.closed:
+            raise NotJoined("the client is closed")
+        self._until_ns = NEVER_NS
+        if timeout_s is not None:
+            self._until_ns = time.monotonic_ns() + int(max(timeout_s, 0.0) * NS_PER_S)
+        self._inbox.wake()  # the first round does not sleep: it learns until when it may
+        while True:
+            self._loop.go_round()
+            if reached():
+                return
+            if self.is_lost:
+                raise ConnectionFailed(f"lost the vHub at {self.locator}")
+            if time.monotonic_ns() >= self._until_ns:
+                return
+
+    def close(self) -> None:
+        """Close the session."""
+        self.closed = True
+        self._session.close()
+
+    def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        if name == VHUB:
+            self.is_lost = not is_alive
+
+
+class Client:
+    """One connection to a run. Made by `connect`; use it in `with`. When a lockstep client goes, the run ends."""
+
+    def __init__(self, link: Link, deployment: Deployment) -> None:
+        """`link` has been let in; the client closes it."""
+        self.name: Final = link.core.name
+        self.deployment: Final = deployment
+        """The run's deployment: the whole world in SI units."""
+        self.packets: list[Packet] = []
+        """What has arrived with the last tick of `lockstep` or the last `receive`, in order of arrival."""
+        robots = {name: Robot(self, name) for name in deployment.robots}
+        self.robots: Final[Named[Robot]] = Named("unknown robot", robots, robots.__getitem__)
+        self._core = link.core
+        self._link = link
+        self._subscriptions: set[tuple[str, str]] = set()
+        self._newest = Newest({})
+        self._period: int | None = None
+        self._commands: dict[str, bytes] = {}
+        self._outgoing: deque[Outgoing] = deque()
+
+    # --- what it is --------------------------------------------------------------------------------------------------
+
+    @property
+    def tick(self) -> int:
+        """The newest tick that the vHub has named; -1 before the first. Its time is `tick * deployment.tick_ns`."""
+        return self._core.tick
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run is known to be over."""
+        return self._core.ended
+
+    def statistics(self) -> ClientStatistics:
+        """Return the account of the connection so far."""
+        return self._core.statistics()
+
+    # --- taking part -------------------------------------------------------------------------------------------------
+
+    def subscribe(self, robot: str, channel: str) -> None:
+        """Ask to hear a robot's channel; before `lockstep` or `listen`. Raises UnknownName, NotJoined."""
+        check_subscription(self.deployment, robot, channel)
+        if self._period is not None and (robot, channel) not in self._subscriptions:
+            raise NotJoined(f"subscribe to {robot} {channel} before lockstep() or listen(): this client has joined")
+        self._subscriptions.add((robot, channel))
+
+    def lockstep(self, rate_hz: float | Fraction | None = None) -> Iterator[int]:
+        """Take part in lockstep: yield each of the client's ticks while the run waits, until the run ends.
+
+        `rate_hz` is a whole number of ticks; None is the rate that the deployment declares. The client joins when the
+        loop begins. What the loop's body sends leaves when the loop comes round or is left; a client that does not go
+        on holds the run, up to the deployment's deadline. Raises BadValue for a rate, NotJoined, ConnectionFailed,
+        and PacketError when a tick's packets are too many for one answer.
+        """
+        period = self._period_ticks(rate_hz)
+        if self._period is not None and self._period != period:
+            raise NotJoined("lockstep at another rate, or after listen(): a client joins once")
+        return self._ticks(period)
+
+    def listen(self, subscriptions: Iterable[tuple[str, str]] = ()) -> None:
+        """Take part without being waited for, and hear these (robot, channel) beside those of `subscribe`.
+
+        The vHub takes the client in at a tick soon after; what is sent before that is lost. Raises UnknownName and
+        NotJoined.
+        """
+        for robot, channel in subscriptions:
+            self.subscribe(robot, channel)
+        if self._period:
+            raise NotJoined("listen() after lockstep(): a client joins once")
+        self._join(0)
+
+    # --- packets -----------------------------------------------------------------------------------------------------
+
+    def send(self, destination: str, channel: str, payload: bytes) -> None:
+        """Send opaque bytes to a robot's (or another client's) channel.
+
+        After `listen` at once, in lockstep with the tick. Nothing says whether a packet arrives. Raises UnknownName
+        for a destination, PacketError for a size, NotJoined, RunEnded and ConnectionFailed.
+        """
+        packet = Outgoing(destination, channel, bytes(payload))
+        self._core.check(packet)
+        self._check_sending()
+        if self._period:
+            if len(self._outgoing) + len(self._commands) >= limits.PACKETS_PER_MESSAGE_MAX:
+                raise PacketError(f"more than {limits.PACKETS_PER_MESSAGE_MAX} packets at one tick")
+            self._outgoing.append(packet)
+            return
+        self._core.send([packet], time.monotonic_ns())
+        self._link.perform()
+
+    def receive(self, timeout_s: float = 1.0) -> list[Packet]:
+        """After `listen`: return what has arrived, waiting for it up to `timeout_s` of wall time.
+
+        The list is empty when nothing has. Sensors have their new samples with it. Raises RunEnded once the run is over
+        and all has been taken, NotJoined and ConnectionFailed.
+        """
+        if self._period != 0:
+            raise NotJoined("receive() after listen(); in lockstep the packets are in client.packets")
+        core = self._core
+        self._link.wait(lambda: bool(core.arrivals) or core.ended, timeout_s)
+        if core.ended and not core.arrivals:
+            raise RunEnded("the run is over")
+        self._take(core.arrivals)
+        core.arrivals.clear()
+        return self.packets
+
+    # --- the end -----------------------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Leave the run. One that is in lockstep ends it, if it is not over."""
+        self._link.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    # --- inside ------------------------------------------------------------------------------------------------------
+
+    def _period_ticks(self, rate_hz: float | Fraction | None) -> int:
+        if rate_hz is None:
+            spec = self.deployment.clients.get(self.name) or self.deployment.players.get(self.name)
+            rate_hz = None if spec is None else spec.rate_hz
+        if rate_hz is None:
+            raise BadValue(f"no rate for lockstep, and the deployment declares none for {self.name}", rate_hz)
+        try:
+            # As it is written: 0.1 is a tenth, not the binary number that is nearest to it.
+            rate = rate_hz if isinstance(rate_hz, Fraction) else Fraction(str(rate_hz))
+        except ValueError:
+            raise BadValue("not a rate in Hz", rate_hz) from None
+        if rate <= 0:
+            raise BadValue("not a rate above 0 Hz", rate_hz)
+        return self.deployment.ticks(rate)
+
+    def _ticks(self, period: int) -> Iterator[int]:
+        core = self._core
+        if self._period is None:
+            self._join(period)
+        while True:
+            self._link.wait(lambda: core.go is not None or core.ended, None)
+            if core.go is None:
+                return
+            self._take(core.go.packets)
+            try:
+                yield core.go.tick
+            finally:
+                # A loop that an error ends is closed late or never: a client that is gone has nothing to answer.
+                if not self._link.closed:
+                    self._answer()
+
+    def _answer(self) -> None:
+        """Send what was set in the loop's body, commands last and in their robots' name order."""
+        commands = [Outgoing(robot, CHANNEL_POSITION, payload) for robot, payload in sorted(self._commands.items())]
+        packets = [*self._outgoing, *commands]
+        self._outgoing.clear()
+        self._commands.clear()
+        if self._core.go is None:  # the run has ended since
+            return
+        self._core.done(packets)
+        self._link.perform()
+
+    def _join(self, period: int) -> None:
+        wanted = sorted(self._subscriptions)
+        self._newest = Newest({pair: channel_kind(self.deployment, *pair) for pair in wanted})
+        self._core.join(period, wanted)
+        self._period = period
+        self._link.perform()
+
+    def _command(self, robot: str, payload: bytes) -> None:
+        if self._period:
+            self._check_sending()
+            self._commands[robot] = payload
+        else:
+            self.send(robot, CHANNEL_POSITION, payload)
+
+    def _check_sending(self) -> None:
+        if self._link.closed:
+            raise NotJoined("the client is closed")
+        if self._core.ended:
+            raise RunEnded("the run is over")
+        if self._period is None:
+            raise NotJoined("a client that has not joined cannot send: lockstep() or listen() first")
+
+    def _sample(self, robot: str, channel: str) -> Sample | None:
+        if self._period is not None and (robot, channel) not in self._subscriptions:
+            heard = [name for owner, name in self._subscriptions if owner == robot]
+            raise UnknownName(f"not subscribed to this channel of {robot}", channel, heard)
+        return self._newest.samples.get((robot, channel))
+
+    def _take(self, received: Iterable[Received]) -> None:
+        received = list(received)
+        self._newest.take(received)
+        self.packets = [self._packet(packet) for packet in received]
+
+    def _packet(self, packet: Received) -> Packet:
+        value: Value | None = packet.payload
+        if packet.source in self.deployment.robots:
+            try:
+                kind = channel_kind(self.deployment, packet.source, packet.channel)
+                value = decode_payload(kind, packet.payload)
+            except (UnknownName, Malformed):
+                value = None
+        return Packet(
+            packet.source, packet.channel, packet.sequence, packet.sent_ns, packet.due_ns, packet.payload, value
+        )
+
+
+def connect(address: str, name: str, world: str = "", timeout_s: float = CONNECT_S) -> Client:
+    """Connect to a run as the declared client `name`; `address` is the vHub's radio plane, `tcp/HOST:PORT`.
+
+    `world` refuses any other world than this one. Raises BadValue for a name or address that is none, ConnectionFailed
+    when nobody answers within `timeout_s` (wall time), ConnectionRefused, with the reason, when the vHub will not have
+    the client.
+    """
+    if not is_name(name):
+        raise BadValue("not a name for a client", name)
+    from foosim.protocol.session import ConnectError, Session
+
+    begun_ns = time.monotonic_ns()
+    try:
+        session = Session.client(address, timeout_s, limits.RADIO_MESSAGE_BYTES_MAX)
+    except ConnectError as error:
+        raise ConnectionFailed(error.what) from None
+    try:
+        core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
+        link = Link(core, session)
+        left_s = timeout_s - (time.monotonic_ns() - begun_ns) / NS_PER_S
+        link.wait(lambda: core.deployment is not None or bool(core.refusal), left_s)
+        if core.refusal:
+            raise ConnectionRefused(f"{name} at {session.locator}: {core.refusal}")
+        if core.deployment is None:
+            raise ConnectionFailed(
+                f"no vHub answers at {session.locator} within {timeout_s:g} s: is it the radio plane's address?"
+            )
+        link.be_present()
+        return Client(link, core.deployment)
+    except BaseException:
+        session.close()
+        raise

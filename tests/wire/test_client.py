@@ -1,0 +1,144 @@
+"""The client library against a run of real processes: lockstep, free-running, and what it says when it is refused."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from foosim.client import connect
+from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded, UnknownName
+from foosim.client.payloads import RodPosition
+from foosim.protocol.errors import BadValue
+from foosim.supervisor import control
+
+if TYPE_CHECKING:
+    from tests.wire.conftest import House
+
+CLIENTS = "clients={hand: {lockstep: true, rate: 100 Hz}, ear: {lockstep: false}}"
+PERFECT = "network.links=[]"
+TICKS = 50
+PATIENCE_S = 30.0
+
+
+def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
+    up = house.up("--set", CLIENTS, "--set", PERFECT, "--set", "engine=pure", "--pace", "fast", "--for", "1s", "--json")
+    radio = house.info().radio
+    with connect(radio, "hand", "table") as client:
+        client.subscribe("red.goal", "encoder")
+        client.subscribe("blue.attack", "encoder")
+        goal, attack = client.robots["red.goal"], client.robots["blue.attack"]
+        assert goal.sensors["encoder"] is None
+        with pytest.raises(NotJoined, match="lockstep"):
+            goal.actuators["position"].set(slide=0.0, spin=0.0)
+        seen = []
+        for tick in client.lockstep():
+            seen.append(tick)
+            assert client.tick == tick
+            assert len(client.packets) == 2, "a perfect link brings what both send at this tick"
+            with pytest.raises(BadValue, match=r"slide of red\.goal"):
+                goal.actuators["position"].set(slide=1.0, spin=0.0)
+            goal.actuators["position"].set(slide=-0.1, spin=0.0)
+            goal.actuators["position"].set(slide=0.1, spin=0.5)
+            attack.actuators["position"].set(slide=-0.05, spin=0.0)
+            if len(seen) == TICKS:
+                break
+        assert seen == list(range(0, 5 * TICKS, 5))
+        for robot, slide, spin in ((goal, 0.1, 0.5), (attack, -0.05, 0.0)):
+            sample = robot.sensors["encoder"]
+            assert sample is not None and isinstance(sample.value, RodPosition)
+            assert sample.value.slide == pytest.approx(slide, abs=0.005)
+            assert sample.value.spin == pytest.approx(spin, abs=0.1)
+            assert sample.sent_ns == seen[-1] * client.deployment.tick_ns
+        with pytest.raises(UnknownName, match="not subscribed"):
+            client.robots["red.attack"].sensors["encoder"]
+        with pytest.raises(NotJoined, match="another rate"):
+            client.lockstep(50)
+        rest = list(client.lockstep())
+        assert rest == list(range(5 * TICKS, 500, 5)), "the loop ends with the run"
+        assert client.ended
+        with pytest.raises(RunEnded):
+            goal.actuators["position"].set(slide=0.0, spin=0.0)
+        assert client.statistics().answered == 100
+        assert client.statistics().sent == 2 * 50
+    code, _, err = house.end(up)
+    assert code == 0, err
+
+
+def test_a_free_running_client_hears_robots_and_gets_its_echo_back(house: House) -> None:
+    up = house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"), "--set", "engine=pure", "--pace", "fast")
+    radio = house.info().radio
+    with connect(radio, "ear") as client, connect(radio, "hand") as other:
+        client.listen([("camera", "ball")])
+        other.listen()
+        back: list[bytes] = []
+        heard: list[bytes] = []
+        number = 0
+        while not (back and heard and client.robots["camera"].sensors["ball"]):
+            number += 1  # what is sent before the vHub has taken a client in is lost, and one in 200 later
+            assert number < 10_000
+            client.robots["blue.goal"].send("echo", b"%d" % number)
+            other.send("ear", "talk", b"%d" % number)
+            for packet in client.receive(0.05):
+                if packet.channel == "echo":
+                    assert (packet.source, packet.value) == ("blue.goal", packet.payload)
+                    assert packet.due_ns > packet.sent_ns
+                    back.append(packet.payload)
+                elif packet.source == "hand":
+                    heard.append(packet.payload)
+        assert {int(payload) for payload in back + heard} <= set(range(1, number + 1))
+        control.down()
+        with pytest.raises(RunEnded):
+            while True:
+                client.receive(PATIENCE_S)
+        with pytest.raises(RunEnded):
+            client.send("camera", "echo", b"")
+    code, _, err = house.end(up)
+    assert code == 0, err
+
+
+def test_who_is_refused_is_told_why(house: House) -> None:
+    house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"))
+    info = house.info()
+    with pytest.raises(ConnectionRefused, match=r"no client hands .*declared are ear, hand, nearest is hand"):
+        connect(info.radio, "hands", timeout_s=PATIENCE_S)
+    with pytest.raises(ConnectionRefused, match="world pool, this is table"):
+        connect(info.radio, "hand", "pool", timeout_s=PATIENCE_S)
+    with connect(info.radio, "hand", timeout_s=PATIENCE_S) as client:
+        with pytest.raises(ConnectionRefused, match="a client hand is already here"):
+            connect(info.radio, "hand", timeout_s=PATIENCE_S)
+        with pytest.raises(UnknownName, match=r"unknown robot .*'red.gaol', nearest is 'red.goal'"):
+            client.robots["red.gaol"]
+        with pytest.raises(UnknownName, match=r"no such actuator .*nearest is 'position'"):
+            client.robots["red.goal"].actuators["positon"]
+        with pytest.raises(UnknownName, match=r"no such channel to hear .*nearest is 'encoder'"):
+            client.subscribe("red.goal", "encode")
+        with pytest.raises(BadValue, match="not a whole number of ticks"):
+            client.lockstep(300)
+        with pytest.raises(BadValue, match="declares none for hand"):
+            client.lockstep()
+        client.listen()
+        with pytest.raises(NotJoined):
+            client.subscribe("camera", "ball")
+        with pytest.raises(UnknownName, match="unknown destination"):
+            client.send("red.gaol", "echo", b"")
+    with pytest.raises(ConnectionFailed, match="radio plane's address"):
+        connect(info.simulation, "hand", timeout_s=1.0)
+    with pytest.raises(BadValue, match="not a name for a client"):
+        connect(info.radio, "Hand")
+    house.kill("vhub")
+
+
+def test_a_client_says_that_the_vhub_is_lost(house: House) -> None:
+    house.up("--set", CLIENTS)
+    with connect(house.info().radio, "hand") as client:
+        ticks = client.lockstep(100)
+        assert next(ticks) == 0
+        house.kill("vhub")
+        with pytest.raises(ConnectionFailed, match="lost the vHub at tcp/"):
+            list(ticks)
+
+
+def test_nobody_at_the_address(house: House) -> None:
+    with pytest.raises(ConnectionFailed, match=r"no router answers at tcp/127\.0\.0\.1:1 "):
+        connect("tcp/127.0.0.1:1", "hand", timeout_s=0.1)
