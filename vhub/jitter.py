@@ -57,32 +57,44 @@ def _ln_gamma(a: float) -> float:
 
 
 class _Gamma:
-    """The regularised lower incomplete gamma function P(a, x) of one shape, and its inverse."""
+    """The regularised lower incomplete gamma function P(a, x) of one shape, and its inverse for ascending p."""
 
     def __init__(self, a: float) -> None:
         self.a = a
         self._ln_gamma = _ln_gamma(a)
+        self._density = 0.0
+        """At the last x that was looked at."""
 
     def _power(self, x: float) -> float:
         """x^a e^-x / Gamma(a): the factor that P and the density share."""
         return _exp(self.a * _ln(x) - x - self._ln_gamma)
 
-    def quantile(self, p: float, low: float) -> float:
-        """The x >= `low` with P(a, x) = p: Newton's iteration, kept inside a bracket that it narrows."""
-        high = max(2.0 * low, self.a)
-        while self._at(high)[0] < p:
-            low, high = high, 2.0 * high
-        x = low if low > 0.0 else high / 2.0
-        for _ in range(100):
+    def quantile(self, p: float, low: float, rise: float) -> float:
+        """The x >= `low` with P(a, x) = p, where P(a, low) = p - `rise`: Newton's iteration inside a bracket.
+
+        A step shorter than 1e-8 x is the last one: it leaves an error of about its square.
+        """
+        high = math.inf
+        x = self._guess(low, rise)
+        for _ in range(200):
             below, density = self._at(x)
             low, high = (x, high) if below < p else (low, x)
-            better = x - (below - p) / density
-            if not low < better < high:
-                better = low + (high - low) / 2.0
-            if abs(better - x) <= 1e-14 * x:
-                return better
-            x = better
+            step = (p - below) / density if density > 0.0 else math.inf
+            if abs(step) <= 1e-8 * x:
+                return x + step
+            if low < x + step < high:
+                x += step
+            else:
+                x = 2.0 * x if high == math.inf else low + (high - low) / 2.0
         return x
+
+    def _guess(self, low: float, rise: float) -> float:
+        """Where P has risen by `rise` above its value at `low`, by the first two terms of its Taylor series there."""
+        if low == 0.0 or self._density == 0.0:
+            return self.a
+        step = rise / self._density
+        bend = (self.a - 1.0) / low - 1.0
+        return low + step * max(0.5, 1.0 - 0.5 * bend * step)
 
     def _at(self, x: float) -> tuple[float, float]:
         """P(a, x) by its series, and the density at x."""
@@ -93,21 +105,25 @@ class _Gamma:
             term *= x / n
             total += term
         power = self._power(x)
-        return total * power, power / x
+        self._density = power / x
+        return total * power, self._density
 
 
 @lru_cache(maxsize=256)
 def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
-    """Return CELLS + 1 quantiles, in ns, of a gamma distribution; the ends are those at 0 and at 1 - 2^-20."""
+    """Return CELLS + 1 quantiles, in ns, of a gamma distribution; the ends are those at 2^-20 and at 1 - 2^-20.
+
+    A first one at 0 would give narrow distributions a tail that they have not.
+    """
     assert mean_ns > 0 and sd_ns > 0
     shape = (mean_ns / sd_ns) * (mean_ns / sd_ns)
     scale_ns = sd_ns * (sd_ns / mean_ns)
-    quantiles = [0]
+    quantiles = []
     gamma = _Gamma(shape)
-    x = 0.0
-    for cell in range(1, CELLS + 1):
-        p = cell / CELLS if cell < CELLS else 1.0 - 2.0**-20
-        x = gamma.quantile(p, x)
+    x = p = 0.0
+    for above in (2.0**-20, *(cell / CELLS for cell in range(1, CELLS)), 1.0 - 2.0**-20):
+        x = gamma.quantile(above, x, above - p)
+        p = above
         quantiles.append(round(x * scale_ns))
     return tuple(quantiles)
 

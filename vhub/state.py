@@ -19,6 +19,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Delivered, Received, RobotPacket, Sent
 from foosim.protocol.sampling import Sampling
+from foosim.vhub.jitter import gamma_quantiles_ns
 from foosim.vhub.links import Link, LinkState
 from foosim.vhub.packet import Flight
 
@@ -90,6 +91,9 @@ class HubState:
         self._flights: dict[int, list[Flight]] = {}
         """What is in flight, by the tick at which it arrives."""
         self.sampling = Sampling(deployment)
+        for rule in deployment.network.links:  # the tables are made before the run starts: they would hold up a tick
+            if rule.jitter is not None:
+                gamma_quantiles_ns(rule.jitter.mean_ns, rule.jitter.sd_ns)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
         self._receivers: dict[tuple[str, str], tuple[str, ...]] = {}
