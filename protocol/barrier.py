@@ -8,6 +8,7 @@ Neighbours: `assign` decides who writes what, `frame` is the result.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
 from typing import Any, Final
 
 import numpy as np
