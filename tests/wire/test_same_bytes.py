@@ -1,20 +1,15 @@
-"""Rehearsal and processes say the same, byte for byte: commits, samples, Gos, Dones and deliveries of every tick."""
+"""Rehearsal and processes say the same, byte for byte: frames, orders, deliveries and packets of every tick, and Gos."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import pytest
 
-from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.codec import decode_any
-from foosim.protocol.journal import read_journal
-from foosim.protocol.messages import Commit
 from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.system import Settings
-from foosim.supervisor.records import Record
-from foosim.vhub.records import HubRecord, TickRecord
+from foosim.vhub.mcap_file import McapFile, Message
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
@@ -32,13 +27,18 @@ def scribes(folder: Path) -> list[str]:
     return sets
 
 
-def ticks_of(records: list[bytes]) -> list[TickRecord]:
-    decoded = [decode_any(HubRecord, raw) for raw in records]
-    return [record for record in decoded if isinstance(record, TickRecord)]
-
-
-def commits_of(records: list[bytes]) -> list[bytes]:
-    return [raw for raw in records if isinstance(decode_any(Record, raw), Commit)]
+def said_in(path: Path) -> dict[str, list[tuple[int, int, bytes]]]:
+    """Return (time, sequence, bytes) of every topic of a capture but the log; rows without their wall-clock fields."""
+    topics: dict[str, list[tuple[int, int, bytes]]] = {}
+    with path.open("rb") as stream:
+        for content in McapFile(stream, path.stat().st_size, str(path)).contents():
+            if isinstance(content, Message) and content.topic != "/log":
+                data = content.data
+                if data[:1] == b"{":
+                    row = {key: value for key, value in msgspec.json.decode(data).items() if not key.startswith("wall")}
+                    data = msgspec.json.encode(row)
+                topics.setdefault(content.topic, []).append((content.log_ns, content.sequence, data))
+    return topics
 
 
 @pytest.mark.parametrize("engine", ["bullet", "pure"])
@@ -48,27 +48,21 @@ def test_processes_say_what_a_rehearsal_says(house: House, monkeypatch: pytest.M
     real, rehearsed = house.folder / "real", house.folder / "rehearsed"
     real.mkdir()
     rehearsed.mkdir()
-    sets = [argument for setting in scribes(real) for argument in ("--set", setting)]
-    up = house.up("--pace", "fast", "--for", "1s", "--engine", engine, "--json", *sets, players=True)
-    journals = house.live().journals
-    code, _, err = house.end(up)
+    common = ["capture.frames_every=1 tick", f"engine={engine}"]
+    sets = [argument for setting in [*common, *scribes(real)] for argument in ("--set", setting)]
+    code, _, err = house.end(
+        house.up("--pace", "fast", "--for", "1s", "--capture", real / "run.mcap", *sets, players=True)
+    )
     assert code == 0, err
-
-    said: dict[str, list[bytes]] = {VHUB: [], SUPERVISOR: []}
-    settings = Settings(on_journal=lambda process, record: said[process].append(record))
     text = house.table.read_text()
-    rehearse(text, "table.yaml", TICKS, None, [f"engine={engine}", *scribes(rehearsed)], settings)
+    capture = rehearsed / "run.mcap"
+    rehearse(text, "table.yaml", TICKS, None, [*common, *scribes(rehearsed)], capture=capture)
 
-    expected, found = ticks_of(said[VHUB]), ticks_of(list(read_journal(journals, VHUB)))
-    assert [record.tick for record in found] == list(range(TICKS))
-    for one, other in zip(found, expected, strict=True):
-        assert one.commit == other.commit and one.deliveries == other.deliveries, one.tick
-        assert sorted(one.samples) == sorted(other.samples), one.tick
-        assert [(name, [packet.payload for packet in sent]) for name, sent in one.admitted] == [
-            (name, [packet.payload for packet in sent]) for name, sent in other.admitted
-        ], one.tick
-    assert sum(len(record.admitted) for record in found) == 2 * (TICKS // 5 - 1), "at tick 0 nobody has seen anything"
-    assert commits_of(list(read_journal(journals, SUPERVISOR))) == commits_of(said[SUPERVISOR])
+    found, expected = said_in(real / "run.mcap"), said_in(capture)
+    assert {"/tick", "/frame", "/packets", "/clients", "/tf", "/scene"} <= set(found)
+    assert len(found["/tick"]) == len(found["/frame"]) == TICKS + 1
+    for topic in sorted(expected):
+        assert found[topic] == expected[topic], topic
     for team in ("red", "blue"):
         assert (real / f"{team}.txt").read_text() == (rehearsed / f"{team}.txt").read_text()
         assert len((real / f"{team}.txt").read_text().splitlines()) == TICKS // 5
