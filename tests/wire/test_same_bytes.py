@@ -1,4 +1,4 @@
-"""Rehearsal and processes say the same, byte for byte: frames, orders, deliveries and packets of every tick, and Gos."""
+"""Rehearsal and processes say the same, byte for byte: frames, orders, deliveries, packets of every tick, and Gos."""
 
 from __future__ import annotations
 
