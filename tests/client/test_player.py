@@ -1,0 +1,245 @@
+"""Loading a player and running it: what it is given, what it may do, and what is said when it does something else."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from foosim.client.core import NEVER_NS, ClientCore
+from foosim.client.errors import PlayerError
+from foosim.client.payloads import BallPosition, Command, RodPosition
+from foosim.client.player import Commands, PlayerLoop, Samples, load_player
+from foosim.client.players import Team
+from foosim.protocol import channels
+from foosim.protocol.actions import Publish
+from foosim.protocol.codec import decode_any, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import apply_sets
+from foosim.protocol.errors import BadValue
+from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+NAME = "player-red"
+
+
+class Scripted:
+    """A player that does what its test says, and keeps what it was given."""
+
+    made: ClassVar[list[Scripted]] = []
+
+    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+        self.parameters = dict(parameters)
+        self.calls: list[tuple[int, dict[tuple[str, str], object]]] = []
+        self.commands: Any = {}
+        Scripted.made.append(self)
+
+    def act(self, tick: int, samples: Samples) -> Commands:
+        self.calls.append((tick, {pair: sample.value for pair, sample in samples.items()}))
+        if isinstance(self.commands, Exception):
+            raise self.commands
+        commands: Commands = self.commands
+        return commands
+
+
+def begun(*sets: str, load: Any = lambda path: Scripted) -> PlayerLoop:
+    """A loop whose player has joined a run."""
+    core = ClientCore(NAME, "one", 0)
+    text = apply_sets(TABLE.read_text(), TABLE.name, sets)
+    welcome = ClientWelcome(NAME, "one", "hub", 0, 0, TABLE.name, text)
+    core.receive(channels.CLIENT_WELCOME, NAME, encode(welcome), 0)
+    loop = PlayerLoop(core, load)
+    loop.step(0)
+    return loop
+
+
+def said(loop: PlayerLoop) -> list[Join | Up | Done]:
+    """What was sent since the last time."""
+    messages = [decode_any(Join | Up | Done, a.payload) for a in loop.core.actions if isinstance(a, Publish)]
+    loop.core.actions.clear()
+    return messages
+
+
+def go(loop: PlayerLoop, number: int, *packets: Received) -> None:
+    """Give the player its turn number `number`."""
+    loop.core.receive(channels.DOWN, NAME, encode(Go(number, 5 * number, 0, list(packets))), 0)
+    loop.step(0)
+
+
+def sample(source: str, channel: str, sequence: int, *numbers: float) -> Received:
+    return Received(source, sequence, 0, channel, 0, 0, np.array(numbers, "<f8").tobytes())
+
+
+# --- the loop --------------------------------------------------------------------------------------------------------
+
+
+def test_it_joins_with_its_rate_and_what_it_hears() -> None:
+    loop = begun()
+    (join,) = said(loop)
+    assert isinstance(join, Join)
+    assert join.period == 5
+    rods = ("attack", "defence", "goal", "midfield")
+    heard = [Subscription("camera", "ball"), *(Subscription(f"red.{line}", "encoder") for line in rods)]
+    assert join.subscriptions == heard
+    assert Scripted.made[-1].parameters == {"team": "red"}
+
+
+def test_samples_are_the_newest_of_each_channel() -> None:
+    loop = begun()
+    player = Scripted.made[-1]
+    go(loop, 1)
+    go(loop, 2, sample("camera", "ball", 3, 0.1, 0.2, 0.3), sample("red.goal", "encoder", 3, 0.01, 0.02))
+    late = sample("camera", "ball", 2, 9.0, 9.0, 9.0)
+    foreign = sample("blue.goal", "encoder", 9, 9.0, 9.0)
+    go(loop, 3, late, foreign, sample("red.goal", "encoder", 4, 0.03, 0.04), sample("camera", "ball", 5, 1.0))
+    ball = BallPosition(0.1, 0.2, 0.3)
+    assert player.calls == [
+        (5, {}),
+        (10, {("camera", "ball"): ball, ("red.goal", "encoder"): RodPosition(0.01, 0.02)}),
+        (15, {("camera", "ball"): ball, ("red.goal", "encoder"): RodPosition(0.03, 0.04)}),
+    ]
+    assert loop.newest.malformed == 1
+
+
+def test_commands_are_packed_in_name_order_and_answer_the_go() -> None:
+    loop = begun()
+    said(loop)
+    Scripted.made[-1].commands = {"red.midfield": Command(0.01, 1.0), "red.attack": Command(-0.02, 2.0)}
+    go(loop, 1)
+    (done,) = said(loop)
+    assert isinstance(done, Done) and done.tick == 5
+    assert [(p.destination, p.channel, np.frombuffer(p.payload).tolist()) for p in done.packets] == [
+        ("red.attack", "position", [-0.02, 2.0]),
+        ("red.midfield", "position", [0.01, 1.0]),
+    ]
+    assert loop.deadline_ns() == NEVER_NS
+
+
+def test_a_free_running_player_acts_at_its_rate() -> None:
+    loop = begun("players.player-red.lockstep=false")
+    (join,) = said(loop)
+    assert isinstance(join, Join) and join.period == 0
+    player = Scripted.made[-1]
+    player.commands = {"red.goal": Command(0.0, 0.0)}
+    assert loop.deadline_ns() == 10_000_000
+    down = Down(1, 7, 0, [sample("camera", "ball", 1, 0.0, 0.0, 0.0)], False)
+    loop.core.receive(channels.DOWN, NAME, encode(down), 0)
+    loop.step(9_999_999)
+    assert player.calls == []
+    loop.step(10_000_000)
+    assert player.calls == [(7, {("camera", "ball"): BallPosition(0.0, 0.0, 0.0)})]
+    (up,) = said(loop)
+    assert isinstance(up, Up) and [packet.stamp_ns for packet in up.packets] == [10_000_000]
+    assert loop.deadline_ns() == 20_000_000
+    loop.step(95_000_000)
+    assert loop.deadline_ns() == 95_000_000, "beats that were missed are not made up for"
+    loop.core.receive(channels.DOWN, NAME, encode(Down(2, 8, 0, [], True)), 0)
+    loop.step(200_000_000)
+    assert (len(player.calls), loop.deadline_ns()) == (2, NEVER_NS)
+
+
+# --- what a player must not do ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("commands", "text"),
+    [
+        (ZeroDivisionError("division by zero"), "act failed: ZeroDivisionError: division by zero"),
+        (KeyError(), "act failed: KeyError"),
+        ({"red.gaol": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence, red.goal,"
+         " red.midfield), 'red.gaol', nearest is 'red.goal'"),
+        ({"blue.goal": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence,"
+         " red.goal, red.midfield), 'blue.goal', nearest is 'red.goal'"),
+        ({"red.goal": (0.0, 0.0)}, "red.goal gets a tuple, not a Command"),
+        ({"red.goal": Command(0.5, 0.0)}, "slide of red.goal is not within -0.123 to 0.123 m, 0.5"),
+        ({"camera": Command(0.0, 0.0)}, "no rod (there are: blue.attack, blue.defence, blue.goal, blue.midfield,"
+         " red.attack, red.defence, red.goal, red.midfield), 'camera'"),
+    ],
+)  # fmt: skip
+def test_what_a_player_must_not_do_ends_it(commands: Any, text: str) -> None:
+    loop = begun()
+    said(loop)
+    Scripted.made[-1].commands = commands
+    with pytest.raises(PlayerError) as error:
+        go(loop, 1)
+    assert str(error.value) == f"player {NAME} at tick 5: {text}"
+    assert error.value.exit_code == 1
+    assert said(loop) == []
+
+
+def test_a_player_that_cannot_be_made_says_why() -> None:
+    class Fails:
+        def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+            raise parameters["error"]
+
+    class Refuses:
+        def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+            raise BadValue("parameter team is not one of red, blue", "green")
+
+    with pytest.raises(PlayerError, match=r"player player-red: .*players:Team cannot be made: KeyError: 'error'"):
+        begun(load=lambda path: Fails)
+    with pytest.raises(PlayerError, match="player player-red: parameter team is not one of red, blue, 'green'"):
+        begun(load=lambda path: Refuses)
+
+
+def test_a_player_that_is_not_declared_is_no_player() -> None:
+    sets = ("players={}", f"clients={{{NAME}: {{lockstep: false}}}}")
+    with pytest.raises(PlayerError, match=r"not declared as a player \(there are: none\), 'player-red'"):
+        begun(*sets)
+
+
+# --- loading ---------------------------------------------------------------------------------------------------------
+
+SOURCE = """
+class Acts:
+    def act(self, tick, samples):
+        return {}
+
+class Sits:
+    pass
+
+number = 3
+"""
+
+
+@pytest.fixture
+def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Modules of somebody's own, on the path."""
+    (tmp_path / "own_player.py").write_text(SOURCE)
+    (tmp_path / "own_broken.py").write_text("1 / 0\n")
+    (tmp_path / "own_importer.py").write_text("import own_missing\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in ("own_player", "own_broken", "own_importer"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+
+
+@pytest.mark.usefixtures("modules")
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("own_player", "player 'own_player': not of the form module:Class"),
+        (":Acts", "player ':Acts': not of the form module:Class"),
+        ("own_playr:Acts", "player own_playr:Acts: there is no module own_playr"),
+        ("own_importer:Acts", "player own_importer:Acts: there is no module own_missing (it imports own_missing)"),
+        ("own_broken:Acts",
+         "player own_broken:Acts: importing own_broken failed: ZeroDivisionError: division by zero"),
+        ("own_player:Atcs", "player own_player:Atcs: no such class in own_player (there are: Acts), 'Atcs',"
+         " nearest is 'Acts'"),
+        ("own_player:Sits", "player own_player:Sits: Sits is no class with a method act(tick, samples)"),
+        ("own_player:number", "player own_player:number: number is no class with a method act(tick, samples)"),
+    ],
+)  # fmt: skip
+def test_a_class_that_cannot_be_loaded_says_why(path: str, text: str) -> None:
+    with pytest.raises(PlayerError) as error:
+        load_player(path)
+    assert str(error.value) == text
+
+
+@pytest.mark.usefixtures("modules")
+def test_a_class_is_found_by_its_path() -> None:
+    assert load_player("foosim.client.players:Team") is Team
+    assert load_player("own_player:Acts").__name__ == "Acts"  # type: ignore[attr-defined]

@@ -1,0 +1,136 @@
+"""The team: it guards, it shoots, both ways round alike, and two of them play a game."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foosim.client.errors import UnknownName
+from foosim.client.payloads import BallPosition, Command, RodPosition
+from foosim.client.player import Commands, Sample
+from foosim.client.players import Team
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import BadValue
+from foosim.protocol.names import LINE_NAMES
+from foosim.rehearsal.rehearse import rehearse
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
+LINES = DEPLOYMENT.table.lines
+RADIUS = DEPLOYMENT.table.ball.radius
+PERIOD = 5
+SIDE = {"red": 1.0, "blue": -1.0}
+
+
+class Bench:
+    """A team whose rods go where they are told within a turn, and a ball that is where the test puts it."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.team = Team(DEPLOYMENT, {"team": name})
+        self.rods = {f"{name}.{line}": RodPosition(0.0, 0.0) for line in LINE_NAMES}
+        self.turn = 0
+
+    def act(self, x: float, y: float) -> Commands:
+        """One turn, with the ball at `x` along the direction in which the team attacks, and at `y`."""
+        self.turn += 1
+        now_ns = self.turn * PERIOD * DEPLOYMENT.tick_ns
+        ball = BallPosition(SIDE[self.name] * x, y, RADIUS)
+        samples = {("camera", "ball"): Sample("camera", "ball", self.turn, now_ns, now_ns, ball)}
+        for name, position in self.rods.items():
+            samples[name, "encoder"] = Sample(name, "encoder", self.turn, now_ns, now_ns, position)
+        commands = self.team.act(self.turn * PERIOD, samples)
+        for name, command in commands.items():
+            self.rods[name] = RodPosition(*command)
+        return commands
+
+    def forward(self, line: str, commands: Commands) -> float:
+        """How far the feet of a rod are told to swing towards the goal that the team attacks, in rad."""
+        # Positive spin moves the feet towards -x, which is where blue attacks.
+        return -SIDE[self.name] * commands[f"{self.name}.{line}"].spin
+
+
+def figures(line: str) -> list[float]:
+    """Where the figures of a line stand with the rod in its middle."""
+    count, pitch = LINES[line].figures, LINES[line].pitch  # type: ignore[index]
+    return [(number - (count - 1) / 2) * pitch for number in range(count)]
+
+
+@pytest.mark.parametrize("name", ["red", "blue"])
+@pytest.mark.parametrize("y", [-0.25, -0.1, 0.0, 0.2])
+def test_the_keeper_stands_between_ball_and_goal(name: str, y: float) -> None:
+    bench = Bench(name)
+    for _ in range(5):
+        commands = bench.act(0.0, y)
+    goal_x = -DEPLOYMENT.table.field.length / 2
+    for line in ("goal", "defence"):
+        command = commands[f"{name}.{line}"]
+        stands = [command.slide + figure for figure in figures(line)]
+        share = (LINES[line].x - goal_x) / (0.0 - goal_x)  # type: ignore[index]
+        passes = [target + (y - target) * share for target in (-0.11, 0.11)]  # on its way to either post
+        assert min(passes) - 0.005 <= min(stands, key=lambda at: abs(at - sum(passes) / 2)) <= max(passes) + 0.005
+        assert abs(command.spin) < 0.3, "with the feet down"
+
+
+@pytest.mark.parametrize("name", ["red", "blue"])
+@pytest.mark.parametrize("line", ["midfield", "attack"])
+def test_the_striker_shoots_a_ball_in_front_of_its_feet(name: str, line: str) -> None:
+    bench = Bench(name)
+    x, y = LINES[line].x + 0.03, figures(line)[0] + 0.02  # type: ignore[index]
+    swings = [bench.forward(line, bench.act(x, y)) for _ in range(20)]
+    assert max(swings) > 1.0, swings
+
+
+@pytest.mark.parametrize("name", ["red", "blue"])
+def test_the_striker_lets_the_ball_of_its_own_defence_pass(name: str) -> None:
+    bench = Bench(name)
+    for _ in range(5):
+        commands = bench.act(LINES["defence"].x + 0.1, 0.05)
+    for line in ("midfield", "attack"):
+        assert bench.forward(line, commands) < -1.0, "feet behind the rod and above the ball"
+
+
+def test_both_teams_play_alike() -> None:
+    """The table is the same from either side; only where a shot aims is each team's own affair."""
+    red, blue = Bench("red"), Bench("blue")
+    for turn in range(20):
+        x, y = 0.01, 0.015 * turn - 0.15
+        mine, other = red.act(x, y), blue.act(x, y)
+        assert len(mine) == len(LINE_NAMES)
+        for line in LINE_NAMES:
+            command = mine[f"red.{line}"]
+            assert other[f"blue.{line}"] == Command(command.slide, -command.spin)
+
+
+def test_nothing_is_commanded_before_the_ball_and_the_rod_were_seen() -> None:
+    team = Team(DEPLOYMENT, {"team": "red"})
+    rod = Sample("red.goal", "encoder", 0, 0, 0, RodPosition(0.0, 0.0))
+    ball = Sample("camera", "ball", 0, 0, 0, BallPosition(0.0, 0.0, RADIUS))
+    assert dict(team.act(0, {})) == {}
+    assert dict(team.act(5, {("red.goal", "encoder"): rod})) == {}
+    assert set(team.act(10, {("red.goal", "encoder"): rod, ("camera", "ball"): ball})) == {"red.goal"}
+
+
+def test_commands_stay_within_reach() -> None:
+    bench = Bench("blue")
+    for turn in range(200):
+        x, y = -0.6 + 0.006 * turn, 0.32 if turn % 2 else -0.32
+        for name, command in bench.act(x, y).items():
+            assert abs(command.slide) <= LINES[name.removeprefix("blue.")].half_stroke  # type: ignore[index]
+
+
+def test_parameters_that_are_not_right_are_refused() -> None:
+    with pytest.raises(UnknownName, match=r"unknown parameter \(there are: team\), 'tema', nearest is 'team'"):
+        Team(DEPLOYMENT, {"tema": "red"})
+    with pytest.raises(BadValue, match="parameter team is not one of red, blue, 'green'"):
+        Team(DEPLOYMENT, {"team": "green"})
+    with pytest.raises(BadValue, match="parameter team is not one of red, blue, null"):
+        Team(DEPLOYMENT, {})
+
+
+def test_two_teams_play_through_the_network() -> None:
+    played = rehearse(TABLE.read_text(), TABLE.name, 5000, nodes=2, sets=["engine=pure"]).json
+    assert played["packets"]["dropped"] > 0
+    still = rehearse(TABLE.read_text(), TABLE.name, 5000, nodes=2, sets=["engine=pure", "players={}"]).json
+    assert played["handovers"] > max(2, still["handovers"]), "it is they who move the ball"
