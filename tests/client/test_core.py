@@ -369,9 +369,10 @@ def test_the_end_is_heard_and_nothing_after_it() -> None:
     air.now_ns += limits.DOWNLINK_KEPT_NS
     air.hub.wake(air.now_ns)
     air.carry(core)
-    assert (core.ended, core.go, core.deadline_ns()) == (True, None, NEVER_NS)
-    taken(core, Go(9, 9, 0, []))
-    assert core.go is None
+    assert core.ended and core.deadline_ns() == NEVER_NS
+    ended = in_run("hand", 1)
+    taken(ended, down(1, ended=True), Go(9, 9, 0, []))
+    assert (ended.ended, ended.go) == (True, None)
 
 
 # --- what does not fit -----------------------------------------------------------------------------------------------

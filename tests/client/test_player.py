@@ -242,4 +242,4 @@ def test_a_class_that_cannot_be_loaded_says_why(path: str, text: str) -> None:
 @pytest.mark.usefixtures("modules")
 def test_a_class_is_found_by_its_path() -> None:
     assert load_player("foosim.client.players:Team") is Team
-    assert load_player("own_player:Acts").__name__ == "Acts"  # type: ignore[attr-defined]
+    assert load_player("own_player:Acts").__name__ == "Acts"

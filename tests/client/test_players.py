@@ -67,7 +67,7 @@ def test_the_keeper_stands_between_ball_and_goal(name: str, y: float) -> None:
     for line in ("goal", "defence"):
         command = commands[f"{name}.{line}"]
         stands = [command.slide + figure for figure in figures(line)]
-        share = (LINES[line].x - goal_x) / (0.0 - goal_x)  # type: ignore[index]
+        share = (LINES[line].x - goal_x) / (0.0 - goal_x)
         passes = [target + (y - target) * share for target in (-0.11, 0.11)]  # on its way to either post
         assert min(passes) - 0.005 <= min(stands, key=lambda at: abs(at - sum(passes) / 2)) <= max(passes) + 0.005
         assert abs(command.spin) < 0.3, "with the feet down"
