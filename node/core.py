@@ -21,7 +21,7 @@ from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.assign import Assignment, Share, reach_of
 from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.codec import encode, encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, basis_of, frame_from_bytes
@@ -124,13 +124,10 @@ class NodeCore:
             if channel is channels.REFUSAL:
                 self.member.refuse(payload)
                 return
-            message = decode(channel.message, payload, channel.bytes_max)
             reader = self._readers.get(channel.name)
             if reader is None:
                 raise Malformed(f"a node does not read the channel {channel.name}")
-            if getattr(message, "sender", name) != name or (channel is channels.PART and message.node != name):
-                raise Malformed(f"a message on the key of {name} that names another sender")
-            reader(message, payload, now_ns)
+            reader(channels.read(channel, name, payload), payload, now_ns)
         except Malformed as error:
             self._refused += 1
             if self._refused <= 3:
@@ -397,10 +394,9 @@ class NodeCore:
 
     def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
         if self.member.take_build(build):
-            deployment = self.deployment = self.member.deployment
-            assert deployment is not None
-            added = [(entity.name, entity.model) for entity in build.added]
-            self.member.want_layout(build_layout(deployment, added))
+            self.deployment, layout = self.member.deployment, self.member.layout
+            assert layout is not None
+            self.member.want_layout(layout)
 
     def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
         if self.deployment is not None:

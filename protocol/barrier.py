@@ -101,24 +101,25 @@ class Barrier:
         return [node for node in self.roster if node not in self.parts]
 
     def add(self, part: Part) -> None:
-        """Take one node's part, or raise `Malformed` when it does not fit the layout. A repeat is ignored."""
+        """Take one node's part, or raise `BadParts` when it does not fit the layout. A repeat is ignored."""
         assert part.tick == self.tick
-        if part.node not in self.roster:
-            raise Malformed(f"a part of {part.node}, the roster is {', '.join(self.roster)}")
         if part.node in self.parts:
             return
         try:
-            expected = 8 * len(self.slots.solver(tuple(part.solved))), 8 * len(self.slots.owner(part.node))
+            self._check(part)
         except Malformed as error:
-            raise Malformed(f"part of {part.node}: {error}") from None
-        if (len(part.solver_values), len(part.owner_values)) != expected:
-            raise Malformed(
-                f"part of {part.node}: {len(part.solver_values)} and {len(part.owner_values)} bytes of values, "
-                f"{expected[0]} and {expected[1]} expected"
-            )
+            raise BadParts(f"part {part.tick} of {part.node}: {error}", [part.node]) from None
+        self.parts[part.node] = part
+
+    def _check(self, part: Part) -> None:
+        if part.node not in self.roster:
+            raise Malformed(f"the roster is {', '.join(self.roster)}")
+        expected = 8 * len(self.slots.solver(tuple(part.solved))), 8 * len(self.slots.owner(part.node))
+        given = len(part.solver_values), len(part.owner_values)
+        if given != expected:
+            raise Malformed(f"{given[0]} and {given[1]} bytes of values, {expected[0]} and {expected[1]} expected")
         if part.outboxes:
             self._check_outboxes(part)
-        self.parts[part.node] = part
 
     def drop(self, nodes: Iterable[str]) -> None:
         """Forget the parts of these nodes: they are missing again."""
@@ -130,11 +131,11 @@ class Barrier:
         entities = self.slots.layout.entities
         indices = [outbox.index for outbox in part.outboxes]
         if indices != sorted(set(indices)) or not set(indices) <= set(part.solved):
-            raise Malformed(f"part of {part.node}: outboxes of entities {indices}: not ascending or not solved by it")
+            raise Malformed(f"outboxes of entities {indices}: not ascending or not solved by it")
         for outbox in part.outboxes:
             packets = decode_any(_OUTBOX, outbox.packets)
             if not entities[outbox.index].is_robot or len(packets) > limits.OUTBOX_PACKETS_MAX:
-                raise Malformed(f"part of {part.node}: {len(packets)} packets of {entities[outbox.index].name}")
+                raise Malformed(f"{len(packets)} packets in the outbox of {entities[outbox.index].name}")
 
     def solver_of(self, index: int) -> str:
         """Return the node whose part holds the entity, or an empty string."""

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from foosim.protocol import limits, messages
+from foosim.protocol.codec import decode
+from foosim.protocol.errors import Malformed
 
 Plane = Enum("Plane", ["SIMULATION", "RADIO"])
 
@@ -39,9 +41,7 @@ class Channel:
         return self.key.replace("{name}", "*")
 
 
-def _simulation(
-    name: str, message: Any, writers: str, readers: str, rate: str, named: bool = True
-) -> Channel:
+def _simulation(name: str, message: Any, writers: str, readers: str, rate: str, named: bool = True) -> Channel:
     key = f"foosim/simulation/{name}" + ("/{name}" if named else "")
     return Channel(name, key, message, Plane.SIMULATION, writers, readers, rate, express=True)
 
@@ -70,9 +70,7 @@ ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick"
 PART: Final = _simulation("part", messages.Part, "node", "node, supervisor", "tick")
 SAMPLES: Final = _simulation("samples", messages.Samples, "node", "vhub", "tick")
 COMMIT: Final = _simulation("commit", messages.Commit, "supervisor", "the named one", "tick (vhub)")
-DELIVERIES: Final = _simulation(
-    "deliveries", messages.Deliveries, "vhub", "node, supervisor", "tick", named=False
-)
+DELIVERIES: Final = _simulation("deliveries", messages.Deliveries, "vhub", "node, supervisor", "tick", named=False)
 WANT: Final = _simulation("want", messages.Want, "all", "all", "20 ms doubling to 1 s without progress")
 HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
 TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a change, and an answer", named=False)
@@ -112,6 +110,26 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     UP,
     DOWN,
 )
+
+_NAMES: Final = {
+    channel.key: field
+    for channel in CHANNELS
+    if "{name}" in channel.key
+    for kind in (get_args(channel.message) or (channel.message,))[:1]
+    for field in ("sender", "node", "name")
+    if field in kind.__struct_fields__
+}
+"""The field of each channel's messages that names whom the key names."""
+
+
+def read(channel: Channel, name: str, payload: bytes) -> Any:
+    """Return the message that came on the key of `name`, or raise `Malformed`: also when it names another one."""
+    message = decode(channel.message, payload, channel.bytes_max)
+    field = _NAMES.get(channel.key)
+    if field is not None and getattr(message, field) != name:
+        raise Malformed(f"a message on the key of {name} that names {getattr(message, field)}")
+    return message
+
 
 NODE_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
     PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END

@@ -15,7 +15,7 @@ from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
-from foosim.protocol.layout import Layout
+from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Build, Heartbeat, Hello, Ready, Refusal
 
 AGAIN_NS: Final = 200_000_000
@@ -40,6 +40,8 @@ class Member:
         self.refusal = ""
         self.build: Build | None = None
         self.deployment: Deployment | None = None
+        self.layout: Layout | None = None
+        """Of the world as it was when the build was said."""
         self.layouts: list[Layout] = []
         self.deadline_ns = now_ns
         self.is_ready = False
@@ -57,12 +59,14 @@ class Member:
         if build.boot != self.boot or self.build is not None:
             return False
         try:
-            self.deployment = load_deployment(build.deployment, build.deployment_name)
+            deployment = load_deployment(build.deployment, build.deployment_name)
         except DeploymentError as error:
             raise Malformed(f"a build with a deployment that is not valid here:\n{error}") from None
+        self.layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
+        self.deployment = deployment
         self.build = build
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's says where clients find it
-        self._world = self.deployment.world
+        self._world = deployment.world
         return True
 
     def refuse(self, payload: bytes) -> None:

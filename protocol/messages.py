@@ -9,7 +9,7 @@ Neighbours: `codec` encodes and decodes, `channels` says which message travels w
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 import msgspec
 from msgspec import Meta
@@ -181,9 +181,17 @@ class Want(Message, frozen=True):
     epoch: Counter
 
 
+DONE_OF: Final = "Done of "
+SAMPLES_OF: Final = "samples of "
+JOIN_OF: Final = "join of "
+"""How a heartbeat of the vHub says whom it waits for: names follow, joined by a comma and a space."""
+
+
 class Heartbeat(Message, frozen=True):
     """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` a client
-    that is gone (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people."""
+    that is gone (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people.
+
+    Without a report it is the vHub's word, before late deliveries, on whom they waited for."""
 
     sender: Name
     tick: Counter

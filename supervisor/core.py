@@ -13,9 +13,9 @@ from typing import Any, Final
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
-from foosim.protocol.barrier import Barrier, Slots
+from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, decode_json, encode
+from foosim.protocol.codec import decode_json, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed
@@ -44,10 +44,12 @@ from foosim.protocol.messages import (
 from foosim.protocol.patience import Patience
 from foosim.protocol.start import initial_frame
 from foosim.protocol.units import Pace
+from foosim.supervisor.account import Account
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.records import HeadRecord, RunRecord
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
+from foosim.supervisor.status import SupervisorStatistics
 from foosim.supervisor.watch import Watch
 
 FAREWELL_NS: Final = 10_000_000_000
@@ -67,19 +69,6 @@ class RunSettings:
     deployment_text: str
     pace: Pace
     ticks: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class SupervisorStatistics:
-    """What the supervisor has done so far."""
-
-    tick: int
-    epoch: int
-    moves: int
-    handovers: int
-    refused: int
-    repeated: int
-    diverged: int
 
 
 class SupervisorCore:
@@ -103,10 +92,8 @@ class SupervisorCore:
         self.stop_at = settings.ticks
         self.end: End | None = None
         self.finished = False
-        self.moves = self.handovers = 0
-        self.solved_ticks: dict[str, int] = {}
+        self.account = Account(dict.fromkeys(sorted(self.deployment.nodes), 0))
         self.started_ns = self.committed_ns = 0
-        self.ball_solver = ""
         self.on_commit: Callable[[Frame], None] | None = None
         """Told of every committed frame: a rehearsal's window on the run."""
         self._slots = Slots(self.frame.layout, self.owners)
@@ -136,13 +123,10 @@ class SupervisorCore:
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
-            message = decode(channel.message, payload, channel.bytes_max)
+            message = channels.read(channel, name, payload)
             reader = self._readers.get(type(message))
             if reader is None:
                 raise Malformed(f"the supervisor does not read the channel {channel.name}")
-            for field in ("sender", "node", "name"):
-                if getattr(message, field, name) != name:
-                    raise Malformed(f"a message on the key of {name} that names {getattr(message, field)}")
             reader(message, payload, now_ns)
         except Malformed as error:
             self._refused += 1
@@ -220,7 +204,13 @@ class SupervisorCore:
 
     def statistics(self) -> SupervisorStatistics:
         return SupervisorStatistics(
-            self.frame.tick, self.epoch, self.moves, self.handovers, self._refused, self._repeated, self._diverged
+            self.frame.tick,
+            self.epoch,
+            self.account.moves,
+            self.account.handovers,
+            self._refused,
+            self._repeated,
+            self._diverged,
         )
 
     def say(self, level: str, text: str) -> None:
@@ -236,6 +226,16 @@ class SupervisorCore:
         """Return the entities of a layout beside the deployment's."""
         base = build_layout(self.deployment)
         return [AddedEntity(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
+
+    @property
+    def missing_nodes(self) -> list[str]:
+        """Return the nodes without whose parts the next frame cannot be put together."""
+        known = {part.node for part in self._parts.get(self.frame.tick + 1, ())}
+        return [node for node in self.members if node not in known]
+
+    def took(self, begun_ns: int, ended_ns: int) -> None:
+        """The shell's word on how long a turn took, its actions performed."""
+        self.watch.took(begun_ns, ended_ns)
 
     def unready_nodes(self, layout: bytes) -> list[str]:
         """Return the nodes that have no engine for a layout yet."""
@@ -301,24 +301,21 @@ class SupervisorCore:
                 self._diverged += 1
                 self.finish(f"node {part.node} has diverged: its part {part.tick} has another basis", failed=True)
                 return False
-            barrier.add(part)
-        frame = barrier.assemble()
+        try:
+            for part in parts:
+                barrier.add(part)
+            frame = barrier.assemble()
+        except BadParts as bad:
+            self._refused += len(bad.nodes)
+            self.say("error", f"{bad}: asked for again")
+            self._parts[tick + 1] = [part for part in parts if part.node not in bad.nodes]
+            return False
         self._slots = slots
         self._parts.pop(tick + 1)
         self._deliveries.pop(tick - limits.KEPT_TICKS, None)
-        self._count(barrier, frame)
+        self.account.count(barrier, frame)
         self._take_frame(frame, edits, now_ns)
         return True
-
-    def _count(self, barrier: Barrier, frame: Frame) -> None:
-        """Keep account of who solved what."""
-        for name, part in barrier.parts.items():
-            if any(frame.layout.entities[index].has_body for index in part.solved):
-                self.solved_ticks[name] = self.solved_ticks.get(name, 0) + 1
-        solver = barrier.solver_of(frame.layout["ball"].index)
-        if self.ball_solver and solver != self.ball_solver:
-            self.handovers += 1
-        self.ball_solver = solver
 
     def _take_frame(self, frame: Frame, edits: list[Edit], now_ns: int) -> None:
         self.frame = frame
@@ -328,12 +325,13 @@ class SupervisorCore:
         self._say_commit(edits)
         if self.on_commit is not None:
             self.on_commit(frame)
+        due_ns = self.pacer.release_ns(frame.tick - 1) or 0
         moved_ns = self.pacer.committed(frame.tick, now_ns)
-        self.watch.committed(frame.tick, self.pacer.last_lag_ns, now_ns)
+        late = self.watch.committed(frame.tick, self.pacer.last_lag_ns, due_ns, now_ns)
         if moved_ns:
-            self.actions.append(
-                Say("warning", f"tick {frame.tick}: lag {moved_ns / 1e6:.1f} ms, waited for {self.watch.late}")
-            )
+            self.say("warning", f"tick {frame.tick}: lag {moved_ns / 1e6:.1f} ms, waited for {self.watch.late}")
+        elif late:
+            self.say("info", late)
 
     def _say_commit(self, edits: list[Edit]) -> None:
         """Journal a frame, then publish it to the vHub."""
@@ -389,7 +387,6 @@ class SupervisorCore:
             return
         self.pacer.start(now_ns)
         self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
-        self.solved_ticks = dict.fromkeys(sorted(self.deployment.nodes), 0)
         self.open_epoch(self.owners, now_ns)
         self._say_commit([])
 
@@ -449,6 +446,9 @@ class SupervisorCore:
             self._repeated += 1
             return
         process.heard_ns = now_ns
+        if not heartbeat.report:
+            self.watch.told(heartbeat)
+            return
         process.heartbeat = heartbeat
         report = decode_json(heartbeat.report)
         process.report = report if isinstance(report, dict) else {}
@@ -478,6 +478,8 @@ class SupervisorCore:
         if deliveries.tick in self._deliveries or deliveries.tick < self.frame.tick:
             self._repeated += 1
             return
+        if deliveries.tick > self.frame.tick + limits.KEPT_TICKS:
+            raise Malformed(f"deliveries of tick {deliveries.tick}, the last commit is {self.frame.tick}")
         self._deliveries[deliveries.tick] = payload
         self.watch.delivered(deliveries.tick, now_ns)
 

@@ -226,7 +226,7 @@ class Requests:
         if core.owners[robot] == node:
             return self._accept(request, tick, f"{robot} is on {node} already")
         answer = self._accept(request, tick, f"{robot} moved to {node} at tick {tick}")
-        core.moves += 1
+        core.account.moves += 1
         core.open_epoch({**core.owners, robot: node}, now_ns)
         return answer
 

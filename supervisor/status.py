@@ -5,12 +5,27 @@ Neighbours: `requests` answers with it, `display` shows it, `up` prints the resu
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from foosim.protocol.channels import VHUB
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisorStatistics:
+    """What the supervisor has done so far."""
+
+    tick: int
+    epoch: int
+    moves: int
+    handovers: int
+    refused: int
+    repeated: int
+    diverged: int
+
 
 NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
 
@@ -39,12 +54,12 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         "nodes": {
             name: {
                 "owned": sorted(robot for robot, owner in core.owners.items() if owner == name),
-                "solved_ticks": core.solved_ticks.get(name, 0),
+                "solved_ticks": core.account.solved_ticks.get(name, 0),
             }
             for name in sorted(core.deployment.nodes)
         },
-        "moves": core.moves,
-        "handovers": core.handovers,
+        "moves": core.account.moves,
+        "handovers": core.account.handovers,
         "score": {"red": red, "blue": blue},
         "capture": (report.get("capture") or None) if hub is not None and hub.farewell else None,
         "reason": core.end.reason if core.end is not None else None,
@@ -66,8 +81,8 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "pace": str(pacer.pace),
         "released": core.released,
         "late": {"lag_ms": pacer.last_lag_ns / 1e6, "waited_for": core.watch.late, "tick": core.watch.late_tick},
-        "waiting_for": core.watch.waiting_for(core),
-        "ball": {"position": [round(value, 4) for value in ball], "solver": core.ball_solver},
+        "waiting_for": ", ".join(core.watch.waiting_for(core)),
+        "ball": {"position": [round(value, 4) for value in ball], "solver": core.account.ball_solver},
         "processes": {
             name: {
                 "role": process.role,

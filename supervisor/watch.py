@@ -1,26 +1,31 @@
 """Who is waited for, who is late, who is lost.
 
 Who is waited for is who has all its inputs and has not answered (node: order and deliveries; vHub: commit, samples and
-Dones; lockstep client: Go). Only that one can be late or overdue. Neighbours: `core` tells it what came when.
+Dones; lockstep client: Go). Only that one can be late or overdue. A late tick is blamed on who took the longest on the
+way from the last commit to its own, on a clock that stands still while the supervisor itself was busy; ticks that only
+catch up keep the name of who made them late. Neighbours: `core` tells what came when, `vhub.waits` whom the vHub
+waited for.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from foosim.protocol import limits
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.messages import DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
 from foosim.supervisor.roster import Roster
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
 
-DONE_OF = "Done of "
+LATE_EVERY_NS: Final = 1_000_000_000
+"""How often late ticks are logged at most."""
 
 
 class Watch:
-    """When each input of the last ticks came, as wall times of the supervisor."""
+    """When each input of the last ticks came, by the supervisor's clock less what it was busy itself."""
 
     def __init__(self, deployment: Deployment, roster: Roster, now_ns: int) -> None:
         self.deployment = deployment
@@ -30,73 +35,105 @@ class Watch:
         self.late = ""
         """The process that the last late tick waited for."""
         self.late_tick = -1
-        self._begun_ns = now_ns
-        self._progress_ns = now_ns
+        self._busy_ns = 0
+        self._begun_ns = self._progress_ns = now_ns
         self._named = ""
+        self._lag_ns = 0
+        self._late_ticks = 0
+        self._late_said_ns = now_ns - LATE_EVERY_NS
         self._released: dict[int, int] = {}
         self._delivered: dict[int, int] = {0: now_ns}
-        self._committed: dict[int, int] = {0: now_ns}
+        self._committed: dict[int, tuple[int, int]] = {}
+        """Of each frame: when it was committed, and how long the supervisor had been busy until then."""
         self._parts: dict[int, dict[str, int]] = {}
+        self._told: dict[int, str] = {}
+        """By tick: whom its deliveries waited for, as the vHub said."""
+
+    # --- what came when ----------------------------------------------------------------------------------------------
+
+    def took(self, begun_ns: int, ended_ns: int) -> None:
+        """A turn of the supervisor took this long."""
+        self._busy_ns += max(0, ended_ns - begun_ns)
 
     def begun(self, now_ns: int) -> None:
         """An epoch begins."""
         self._begun_ns = self._progress_ns = now_ns
 
     def released(self, tick: int, now_ns: int) -> None:
-        self._released[tick] = now_ns
-        if tick not in self._parts:
-            self._parts[tick] = {}
-        if not self._waits_before(tick):
-            self._progress_ns = now_ns
-
-    def _waits_before(self, tick: int) -> bool:
-        return any(earlier in self._released and earlier + 1 not in self._committed for earlier in (tick - 1, tick - 2))
+        self._released[tick] = now_ns - self._busy_ns
+        before = (tick - 1, tick - 2)
+        if not any(earlier in self._released and earlier + 1 not in self._committed for earlier in before):
+            self._progress_ns = now_ns  # nothing was waited for until now
 
     def delivered(self, tick: int, now_ns: int) -> None:
-        self._delivered[tick] = now_ns
+        self._delivered[tick] = now_ns - self._busy_ns
+
+    def told(self, heartbeat: Heartbeat) -> None:
+        """The vHub says whom its closing waited for: the deliveries of the tick after are late because of it."""
+        names = _names(heartbeat.waiting_for)
+        if names:
+            self._told[heartbeat.tick + 1] = names[0]
+            self._told.pop(heartbeat.tick + 1 - limits.KEPT_TICKS, None)
 
     def part(self, tick: int, node: str, now_ns: int) -> None:
         """A node's part of the frame after `tick` has come."""
-        self._parts.setdefault(tick, {})[node] = now_ns
+        self._parts.setdefault(tick, {})[node] = now_ns - self._busy_ns
 
-    def committed(self, frame_tick: int, lag_ns: int, now_ns: int) -> None:
-        """A frame is committed; name who was waited for when it is late."""
-        self._committed[frame_tick] = self._progress_ns = now_ns
-        self._named = ""
-        if lag_ns > 0:
-            self.late = self._waited_for(frame_tick - 1)
+    def committed(self, frame_tick: int, lag_ns: int, due_ns: int, now_ns: int) -> str:
+        """A frame is committed, of a tick that was due to be released at `due_ns`; return what is to be logged."""
+        if lag_ns > self._lag_ns:
+            self.late = self._waited_for(frame_tick - 1, due_ns, now_ns)
             self.late_tick = frame_tick
+        self._lag_ns = lag_ns
+        self._committed[frame_tick] = now_ns - self._busy_ns, self._busy_ns
+        self._progress_ns = now_ns
+        self._named = ""
         for known in (self._released, self._delivered, self._committed, self._parts):
             known.pop(frame_tick - limits.KEPT_TICKS, None)
+        return self._late_line(frame_tick, lag_ns, now_ns)
 
-    def _waited_for(self, tick: int) -> str:
-        """Return who took the longest of those on the way to the frame after `tick`."""
-        begun = self._begun_ns
-        released = self._released.get(tick, begun)
-        delivered = self._delivered.get(tick, begun)
-        before = self._committed.get(tick, begun)
-        spans = {SUPERVISOR: released - before}
-        spans[self._hub_or_client()] = delivered - self._committed.get(tick - 1, begun)
+    def _late_line(self, frame_tick: int, lag_ns: int, now_ns: int) -> str:
+        """Return a line about late ticks, once a second at most."""
+        if lag_ns < self.deployment.tick_ns:
+            return ""
+        self._late_ticks += 1
+        if now_ns - self._late_said_ns < LATE_EVERY_NS:
+            return ""
+        self._late_said_ns, count, self._late_ticks = now_ns, self._late_ticks, 0
+        return f"tick {frame_tick}: lag {lag_ns / 1e6:.1f} ms, waited for {self.late} ({count} late ticks)"
+
+    def _waited_for(self, tick: int, due_ns: int, now_ns: int) -> str:
+        """Return who took the longest between the commit of frame `tick` and that of the next one."""
+        before, busy_before_ns = self._committed.get(tick, (self._begun_ns - self._busy_ns, self._busy_ns))
+        begun = max(before, due_ns - busy_before_ns)
+        released = max(begun, self._released.get(tick, begun))
+        delivered = max(begun, self._delivered.get(tick, begun))
+        spans = {SUPERVISOR: self._busy_ns - busy_before_ns + released - begun}
+        hub = self._told.get(tick, VHUB)
+        spans[hub] = spans.get(hub, 0) + delivered - begun
         for node, came in self._parts.get(tick, {}).items():
-            spans[node] = came - max(released, delivered, before)
+            spans[node] = spans.get(node, 0) + came - max(released, delivered)
         return max(sorted(spans), key=lambda name: spans[name])
 
-    def _hub_or_client(self) -> str:
-        """Return the vHub, or the lockstep client that it waited for."""
-        hub = self.roster.by_name.get(VHUB)
-        waiting = hub.heartbeat.waiting_for if hub is not None and hub.heartbeat is not None else ""
-        return waiting.removeprefix(DONE_OF).partition(",")[0] if waiting.startswith(DONE_OF) else VHUB
+    # --- who is waited for -------------------------------------------------------------------------------------------
 
-    def waiting_for(self, core: SupervisorCore) -> str:
-        """Return who is being waited for, for people: a name, or several, or an empty string."""
+    def waiting_for(self, core: SupervisorCore) -> list[str]:
+        """Return who is being waited for: processes and lockstep clients, in name order."""
         if core.epoch == 0:
-            return ", ".join(self.roster.missing(core.frame.layout.digest))
+            missing = self.roster.missing(core.frame.layout.digest)
+            clients = self._hub_waits_for() if missing == [VHUB] else []
+            return clients or missing
         tick = core.frame.tick
         if tick >= core.released:
-            return ""
+            return []
         if tick not in self._delivered:
-            return self._hub_or_client()
-        return ", ".join(node for node in core.members if node not in self._parts.get(tick, {}))
+            return self._hub_waits_for() or [VHUB]
+        return core.missing_nodes
+
+    def _hub_waits_for(self) -> list[str]:
+        """Return the clients or nodes that the vHub says it waits for."""
+        hub = self.roster.by_name.get(VHUB)
+        return [] if hub is None or hub.heartbeat is None else _names(hub.heartbeat.waiting_for)
 
     def lost(self, core: SupervisorCore, now_ns: int) -> str:
         """Return who is lost and why, or an empty string."""
@@ -107,10 +144,11 @@ class Watch:
         silent = self.roster.silent(now_ns, deadlines.heartbeat_ns)
         if silent:
             return f"{silent[0]}: no heartbeat for {deadlines.heartbeat_ns / 1e9:g} s"
-        waited = self.waiting_for(core)
-        if not waited or waited in self.deployment.players or waited in self.deployment.clients:
-            self._progress_ns = max(self._progress_ns, now_ns - deadlines.tick_named_ns)
+        names = self.waiting_for(core)
+        if all(name in self.deployment.players or name in self.deployment.clients for name in names):
+            self._progress_ns = max(self._progress_ns, now_ns - deadlines.tick_named_ns)  # the vHub has their deadline
             return ""
+        waited = ", ".join(names)
         overdue_ns = now_ns - self._progress_ns
         if overdue_ns > deadlines.tick_lost_ns:
             return f"{waited}: tick {core.frame.tick} is overdue by {overdue_ns / 1e9:.1f} s"
@@ -120,9 +158,18 @@ class Watch:
         return ""
 
     def _late_to_start(self, core: SupervisorCore, now_ns: int) -> str:
-        """Give local processes their time to start; those started by hand are waited for."""
-        local = [name for name, node in self.deployment.nodes.items() if node.launch == "local"]
-        missing = [name for name in self.roster.missing(core.frame.layout.digest) if name in local]
+        """Give local processes and players their time to start; what is started by hand is waited for."""
+        local = {name for name, node in self.deployment.nodes.items() if node.launch == "local"}
+        local |= {VHUB, *self.deployment.players}
+        missing = [name for name in self.waiting_for(core) if name in local]
         if not missing or now_ns - self._begun_ns <= self.deployment.deadlines.start_ns:
             return ""
         return f"{', '.join(missing)}: not ready within {self.deployment.deadlines.start_ns / 1e9:g} s"
+
+
+def _names(waiting_for: str) -> list[str]:
+    """Return the names in what a heartbeat of the vHub says that it waits for."""
+    for what in (DONE_OF, SAMPLES_OF, JOIN_OF):
+        if waiting_for.startswith(what):
+            return waiting_for.removeprefix(what).split(", ")
+    return []

@@ -15,13 +15,16 @@ from typing import Any
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, encode
+from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
+    DONE_OF,
+    JOIN_OF,
+    SAMPLES_OF,
     Build,
     ClientHello,
     Commit,
@@ -41,11 +44,12 @@ from foosim.protocol.messages import (
 from foosim.protocol.patience import Patience
 from foosim.protocol.units import parse_pace
 from foosim.vhub.packet import IN_FLIGHT, Flight
-from foosim.vhub.records import Closing, HeadRecord, TickRecord, world_packets
+from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
 from foosim.vhub.report import HubStatistics, report, statistics
-from foosim.vhub.sessions import Session, Sessions
+from foosim.vhub.sessions import Session, Sessions, may_lockstep
 from foosim.vhub.state import HubState, received
+from foosim.vhub.waits import Waits
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +88,16 @@ class HubCore:
         self.busy = 0.0
         self._layout: Layout | None = None
         self._epoch = self._epoch_tick = 0
+        self._owners: dict[str, str] = {}
+        self.waits = Waits()
         self._commits: dict[int, tuple[bytes, Commit, Frame]] = {}
         self._next_commit = 0
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
         self._leaves: list[str] = []
+        self._left_behind: dict[str, list[Sent]] = {}
+        """What clients had sent before they went."""
         self._patience = Patience(now_ns)
         self._end_ns = 0
         self._malformed = self._repeated = 0
@@ -115,14 +123,12 @@ class HubCore:
             if channel is channels.REFUSAL:
                 self.member.refuse(payload)
                 return
-            message = decode(channel.message, payload, channel.bytes_max)
+            message = channels.read(channel, name, payload)
             reader = self._readers.get(type(message))
             if reader is None:
                 raise Malformed(f"the vHub does not read the channel {channel.name}")
-            if channel.plane is channels.Plane.RADIO and message.name != name:
-                raise Malformed(f"a message on the key of {name} that names {message.name}")
             reader(message, payload, now_ns)
-        except Malformed as error:
+        except Refused as error:
             self._malformed += 1
             if channel.plane is channels.Plane.RADIO and self.state is not None:
                 self.state.refuse_at_door("malformed")
@@ -143,9 +149,10 @@ class HubCore:
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
         self.member.wake(now_ns, self._heartbeat)
-        if self._world is not None and self._world.waited:
+        if self._world is not None and self._world.waited and self.releases is not None:
             self.sessions.repeat(self._world.waited, now_ns)
-            self._check_deadlines(now_ns)
+            for late in self.sessions.overdue(self._world.waited, self.releases.paused, now_ns):
+                self._lose(late.name, f"no Done of tick {late.go_tick} within its deadline")
         if self._patience.is_over(now_ns) and self._epoch > 0 and self.ended is None:
             self._ask_again(now_ns)
         self._release(now_ns)
@@ -159,9 +166,8 @@ class HubCore:
             deadline = min(deadline, self._patience.at_ns if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
-        if self._world is not None:
-            for name in self._world.waited:
-                deadline = min(deadline, self.sessions.by_name[name].again_ns)
+        if self._world is not None and self._world.waited:
+            deadline = min(deadline, self.sessions.again_ns(self._world.waited))
         return deadline
 
     def client_gone(self, name: str, now_ns: int) -> None:
@@ -172,8 +178,9 @@ class HubCore:
         if member is not None and member.period > 0:
             self._lose(name, "its connection closed")  # its session stays: a tick may be waiting for it
             return
-        self.sessions.by_name.pop(name)
+        session = self.sessions.by_name.pop(name)
         self.sessions.joins.pop(name, None)
+        self._left_behind.setdefault(name, []).extend(session.inbox)
         if name in self.state.members:
             self._leaves.append(name)
 
@@ -192,12 +199,16 @@ class HubCore:
         if self.state is None:
             return "start"
         if self._epoch == 0:
-            missing = self._missing_clients()
-            return f"join of {', '.join(missing)}" if missing else "epoch"
+            missing = self.sessions.missing(self.state.deployment)
+            return JOIN_OF + ", ".join(missing) if missing else "epoch"
         if self._world is not None:
-            return f"Done of {', '.join(self._world.waited)}" if self._world.waited else ""
+            return DONE_OF + ", ".join(self._world.waited) if self._world.waited else ""
         tick = self.state.closed + 1
-        return "samples" if tick in self._commits else "commit"
+        if tick not in self._commits:
+            return "commit"
+        _, commit, frame = self._commits[tick]
+        robots = missing_robots((s for _, s in self._samples.get(tick, ())), commit.digest, frame)
+        return SAMPLES_OF + ", ".join(sorted({self._owners.get(robot, robot) for robot in robots}))
 
     @property
     def is_between_ticks(self) -> bool:
@@ -214,9 +225,11 @@ class HubCore:
         if committed is None:
             return False
         _, commit, frame = committed
+        self.waits.begin(now_ns)
         packets = world_packets((s for _, s in self._samples.get(tick, ())), commit.digest, frame, state.sampling)
         if packets is None or commit.last:
             return False
+        self.waits.close_world(now_ns)
         leaves, self._leaves = self._leaves, []
         joins = self.sessions.take_joins(tick)
         for name in leaves:
@@ -243,9 +256,7 @@ class HubCore:
         self.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
         deadlines = self.deployment.deadlines
         allowed_ns = deadlines.lockstep_realtime_ns if self.releases.factor else deadlines.lockstep_fast_ns
-        session.deadline_ns = now_ns + allowed_ns
-        session.again_after_ns = max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns)
-        session.again_ns = now_ns + session.again_after_ns
+        session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns))
 
     def _close_clients(self, now_ns: int) -> bool:
         """Phase two, when all Dones are there: judge what clients sent, write, speak."""
@@ -254,7 +265,8 @@ class HubCore:
         if world.waited:
             return False
         tick = world.frame.tick
-        admitted: dict[str, list[Sent]] = {}
+        self._tell_of_waits(now_ns)
+        admitted, self._left_behind = self._left_behind, {}
         for name, session in self.sessions.by_name.items():
             packets = session.inbox
             session.inbox = []
@@ -262,12 +274,14 @@ class HubCore:
                 packets = [*packets, *session.done.packets]
                 session.done = None
             if packets:
-                admitted[name] = packets
+                admitted[name] = admitted.get(name, []) + packets
+        samples = self._samples.pop(tick, [])
         deliveries = Deliveries(tick + 1, state.close_clients(world.frame, admitted, world.closing.fates))
         payload = encode(deliveries)
         for name in world.free:
             state.members[name].downlink += 1
-        self._write(tick, world, admitted, payload)
+        record = tick_record(world.closing, self._commits[tick][0], samples, admitted, state, payload)
+        self.actions.append(Journal(record))
         self._sent[tick + 1] = payload
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
@@ -278,24 +292,17 @@ class HubCore:
         self.actions.append(Keep(world.closing))
         self._world = None
         self._commits.pop(tick - limits.KEPT_TICKS, None)
-        self._samples.pop(tick, None)
         self._patience.progress(state.tick_ns, now_ns)
         return True
 
-    def _write(self, tick: int, world: _World, admitted: dict[str, list[Sent]], deliveries: bytes) -> None:
-        assert self.state is not None
-        samples = [raw for raw, message in self._samples.get(tick, ()) if message.digest == world.closing.digest]
-        record = TickRecord(
-            tick,
-            self._commits[tick][0],
-            samples,
-            sorted(admitted.items()),
-            world.closing.joins,
-            world.closing.leaves,
-            self.state.refused_at_door,
-            deliveries,
-        )
-        self.actions.append(Journal(encode(record)))
+    def _tell_of_waits(self, now_ns: int) -> None:
+        """Before late deliveries, tell the supervisor whom they waited for."""
+        assert self.releases is not None and self.state is not None
+        factor = self.releases.factor
+        text = self.waits.close(now_ns, int(self.state.tick_ns / factor / 2) if factor else limits.COUNTER_MAX)
+        if text:
+            told = Heartbeat(channels.VHUB, self.state.closed + 1, self._epoch, text, self.lost, self.busy, b"")
+            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(told)))
 
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""
@@ -324,22 +331,17 @@ class HubCore:
             return
         deployment = self.deployment = self.member.deployment
         assert deployment is not None
-        self._layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
+        self._layout = self.member.layout
         self.state = HubState(deployment)
         self.releases = Releases(deployment.tick_ns)
         self.actions.append(Journal(self.head()))
         self._ready_if_complete()
 
-    def _missing_clients(self) -> list[str]:
-        assert self.deployment is not None
-        players, clients = self.deployment.players, self.deployment.clients
-        lockstep = [name for name, player in players.items() if player.lockstep]
-        lockstep += [name for name, client in clients.items() if client.lockstep]
-        return [name for name in sorted(lockstep) if name not in self.sessions.joins]
-
     def _ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined."""
-        if self._layout is not None and not self.member.is_ready and not self._missing_clients():
+        if self._layout is None or self.deployment is None or self.member.is_ready:
+            return
+        if not self.sessions.missing(self.deployment):
             self.member.ready(self._layout)
 
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
@@ -348,6 +350,7 @@ class HubCore:
             return
         first = self._epoch == 0
         self._epoch, self._epoch_tick = epoch.epoch, epoch.tick
+        self._owners = dict(epoch.owners)
         self.member.entered()
         if first:
             self._sent[0] = encode(Deliveries(0, []))
@@ -362,6 +365,8 @@ class HubCore:
             return
         layout = layout_after(self._layout, commit.edits)
         frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        if frame.digest != commit.digest:
+            raise Malformed(f"commit {commit.tick} whose frame has another digest")
         self._layout = layout
         self._next_commit += 1
         self._commits[commit.tick] = payload, commit, frame
@@ -377,6 +382,7 @@ class HubCore:
             self._repeated += 1
         elif len(kept) < limits.NODES_MAX * 4:
             kept.append((payload, samples))
+            self.waits.node = samples.node
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
         if want.kind == channels.DELIVERIES.name and want.tick in self._sent:
@@ -397,6 +403,8 @@ class HubCore:
     def _on_join(self, join: Join, payload: bytes, now_ns: int) -> None:
         if self._session(join) is None or self.state is None:
             return
+        if join.period and not may_lockstep(self.state.deployment, join.name):
+            raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
         known = self.state.members.get(join.name)
         if known is not None and known.active and known.period == join.period:
             self._repeated += 1
@@ -421,13 +429,11 @@ class HubCore:
         if done.name in self._world.waited:
             self._world.waited.remove(done.name)
             session.done = done
+            self.waits.client = done.name
 
     def _on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
         """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
-        try:
-            pace = parse_pace(tempo.pace)
-        except Refused as error:
-            raise Malformed(str(error)) from None
+        pace = parse_pace(tempo.pace)
         if self.releases is not None:
             self.releases.set_tempo(0.0 if pace.kind == "fast" else float(pace.factor), tempo.paused)
 
@@ -441,15 +447,6 @@ class HubCore:
             want = Want(channels.VHUB, kind, tick, self._epoch)
             self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
         self._patience.asked(now_ns)
-
-    def _check_deadlines(self, now_ns: int) -> None:
-        assert self._world is not None
-        for name in self._world.waited:
-            session = self.sessions.by_name[name]
-            if self.releases is not None and self.releases.paused:
-                session.deadline_ns = max(session.deadline_ns, now_ns + limits.WANT_EVERY_NS_MAX)
-            elif now_ns >= session.deadline_ns:
-                self._lose(name, f"no Done of tick {session.go_tick} within its deadline")
 
     def _lose(self, name: str, why: str) -> None:
         if not self.lost:

@@ -6,7 +6,7 @@ for byte. The first record of a file holds the whole state, so that older files 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import msgspec
@@ -64,13 +64,26 @@ class Closing:
     wall_ns: int = 0
 
 
+def tick_record(
+    closing: Closing,
+    commit: bytes,
+    samples: Iterable[tuple[bytes, Samples]],
+    admitted: Mapping[str, list[Sent]],
+    state: HubState,
+    deliveries: bytes,
+) -> bytes:
+    """Return the record of a closing: what has to be written before its deliveries are spoken."""
+    sampled = [raw for raw, message in samples if message.digest == closing.digest]
+    clients = sorted(admitted.items()), closing.joins, closing.leaves
+    return encode(TickRecord(closing.frame.tick, commit, sampled, *clients, state.refused_at_door, deliveries))
+
+
 def world_packets(
     samples: Iterable[Samples], digest: bytes, frame: Frame, sampling: Sampling
 ) -> list[RobotPacket] | None:
     """Return what the robots sent at a frame in (robot, index) order, or None while a robot's samples are missing."""
     if sampling.is_silent(frame):
         return []
-    robots = frame.layout.robots
     by_robot: dict[str, list[RobotPacket]] = {}
     for message in samples:
         if message.digest != digest:
@@ -80,9 +93,16 @@ def world_packets(
         for packet in message.packets:
             if packet.robot in fresh:
                 by_robot[packet.robot].append(packet)
+    robots = frame.layout.robots
     if any(robot.name not in by_robot for robot in robots):
         return None
     return [packet for robot in robots for packet in by_robot[robot.name]]
+
+
+def missing_robots(samples: Iterable[Samples], digest: bytes, frame: Frame) -> list[str]:
+    """Return the robots whose samples at a frame have not come."""
+    covered = {robot for message in samples if message.digest == digest for robot in message.robots}
+    return [robot.name for robot in frame.layout.robots if robot.name not in covered]
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:

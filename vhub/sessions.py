@@ -30,6 +30,12 @@ from foosim.protocol.names import nearest_name
 from foosim.vhub.state import HubState, Joining
 
 
+def may_lockstep(deployment: Deployment, name: str) -> bool:
+    """Whether the run waits for this client: no other can hold it up."""
+    declared = deployment.players.get(name) or deployment.clients.get(name)
+    return declared is not None and declared.lockstep
+
+
 @dataclass(slots=True)
 class Session:
     """One client's process: its boot, the Go that waits for its Done, what it sent between closings."""
@@ -43,7 +49,12 @@ class Session:
     deadline_ns: int = 0
     done: Done | None = None
     inbox: list[Sent] = field(default_factory=list)
-    queued_max: int = 0
+
+    def wait(self, now_ns: int, allowed_ns: int, again_after_ns: int) -> None:
+        """Begin to wait for a Done."""
+        self.deadline_ns = now_ns + allowed_ns
+        self.again_after_ns = again_after_ns
+        self.again_ns = now_ns + again_after_ns
 
 
 class Sessions:
@@ -93,6 +104,11 @@ class Sessions:
             return f"a client {hello.name} is already here"
         return ""
 
+    def missing(self, deployment: Deployment) -> list[str]:
+        """Return the declared lockstep clients that have not joined yet, in name order."""
+        declared = sorted([*deployment.players, *deployment.clients])
+        return [name for name in declared if may_lockstep(deployment, name) and name not in self.joins]
+
     def join(self, join: Join) -> None:
         """Note a join; it takes effect when the hub closes a tick that suits its period."""
         subscriptions = [(wanted.robot, wanted.channel) for wanted in join.subscriptions]
@@ -116,6 +132,18 @@ class Sessions:
         """Give a client what is released to it outside of lockstep, or the news of the end."""
         payload = encode(Down(number, tick, acknowledged, list(packets), ended))
         self._actions.append(Publish(channels.DOWN, name, payload))
+
+    def overdue(self, waited: Sequence[str], paused: bool, now_ns: int) -> list[Session]:
+        """Return those whose deadline has passed; while the run is paused none passes."""
+        sessions = [self.by_name[name] for name in waited]
+        if paused:
+            for session in sessions:
+                session.deadline_ns = max(session.deadline_ns, now_ns + limits.WANT_EVERY_NS_MAX)
+        return [session for session in sessions if now_ns >= session.deadline_ns]
+
+    def again_ns(self, waited: Sequence[str]) -> int:
+        """When the next Go is said again."""
+        return min(self.by_name[name].again_ns for name in waited)
 
     def repeat(self, waited: Sequence[str], now_ns: int) -> None:
         """Say a Go again to those who have not answered for long, the wait doubling."""
