@@ -118,6 +118,8 @@ class Loop:
         self.on_alive: Callable[[Plane, str, bool], None] = lambda plane, name, is_alive: None
         """Somebody has come or gone."""
         self.on_say: Callable[[Say], None] = lambda say: None
+        self.took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
+        """Told how long a turn took, with all that was performed: when it began, when the loop slept again."""
         self.busy = 0.0
         """Share of the last second in which the loop did not sleep."""
         self._inbox = inbox
@@ -127,7 +129,7 @@ class Loop:
         self._planes = {key: plane for plane, key in ALIVE.items()}
         now_ns = time.monotonic_ns()
         self._wake_ns = now_ns
-        self._window_ns = now_ns
+        self._window_ns = self._turn_ns = now_ns
         self._slept_ns = 0
 
     def connect(self, wire: Wire) -> None:
@@ -147,11 +149,12 @@ class Loop:
         """Sleep until there is something, and do it."""
         core = self.core
         slept_ns = time.monotonic_ns()
+        self.took(self._turn_ns, slept_ns)
         lacking = self.lacking()
         timeout_s = max(0, self._wake_ns - slept_ns) / NS_PER_S
         lacks, count = ("", 1) if lacking is None else (lacking[0].key, lacking[1])
         items = self._inbox.take(timeout_s, lacks, count)
-        now_ns = time.monotonic_ns()
+        now_ns = self._turn_ns = time.monotonic_ns()
         self._measure(now_ns, now_ns - slept_ns)
         channels = self._channels
         for key, name, payload in items:

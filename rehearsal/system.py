@@ -47,6 +47,8 @@ class Process:
     slow_ns: int = 0
     """Virtual time that each of its turns takes which says something."""
     busy_until_ns: int = 0
+    took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
+    """Told how long its turns took, as a shell tells."""
 
 
 @dataclass(slots=True)
@@ -88,6 +90,8 @@ class System:
         deployment = self.supervisor.deployment
         self._enter(channels.SUPERVISOR, self.supervisor, self.supervisor.advance, channels.SUPERVISOR_READS)
         self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
+        self.processes[channels.SUPERVISOR].took = self.supervisor.watch.took
+        self.processes[channels.VHUB].took = self.hub.waits.took
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
         for name, player in sorted(deployment.players.items()):
@@ -159,6 +163,9 @@ class System:
         self._trace(now_ns, process, "receive", channel.name, payload)
         process.core.receive(channel, name, payload, now_ns)
         process.turn(now_ns)
+        if process.slow_ns and self._core_deadline_ns(process) <= now_ns:  # no backlog keeps it from its heartbeat
+            process.core.wake(now_ns)
+            process.turn(now_ns)
         self._perform(process)
 
     def _wake_all(self) -> None:
@@ -169,10 +176,13 @@ class System:
                 process.turn(now_ns)
                 self._perform(process)
 
-    def _deadline_of(self, process: Process) -> int:
+    def _core_deadline_ns(self, process: Process) -> int:
         core = process.core
         deadline: int = core.deadline_ns(self.bus.now_ns) if core is self.supervisor else core.deadline_ns()
-        return max(deadline, process.busy_until_ns)
+        return deadline
+
+    def _deadline_of(self, process: Process) -> int:
+        return max(self._core_deadline_ns(process), process.busy_until_ns)
 
     def _deadline_ns(self) -> int:
         return min(self._deadline_of(process) for process in self.processes.values())
@@ -191,6 +201,7 @@ class System:
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
             process.busy_until_ns = leaves_ns
+            process.took(self.bus.now_ns, leaves_ns)
         for action in actions:
             if type(action) is Publish:
                 self._trace(leaves_ns, process, "publish", action.channel.name, action.payload)

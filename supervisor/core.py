@@ -233,10 +233,6 @@ class SupervisorCore:
         known = {part.node for part in self._parts.get(self.frame.tick + 1, ())}
         return [node for node in self.members if node not in known]
 
-    def took(self, begun_ns: int, ended_ns: int) -> None:
-        """The shell's word on how long a turn took, its actions performed."""
-        self.watch.took(begun_ns, ended_ns)
-
     def unready_nodes(self, layout: bytes) -> list[str]:
         """Return the nodes that have no engine for a layout yet."""
         return [name for name in self.members if layout not in self.roster.by_name[name].ready]

@@ -50,6 +50,7 @@ class SupervisorProcess:
         self._journal = self._loop.journal = journal
         self._turned_tick = 0
         self._loop.turn = self._turn
+        self._loop.took = self.core.watch.took
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
         wire.read(channels.SUPERVISOR_READS, channels.SUPERVISOR_WAITS)

@@ -65,6 +65,7 @@ class HubProcess:
         self._loop.connect(self._wire)
         self._loop.connect(self._radio)
         self._loop.turn = self._turn
+        self._loop.took = self.core.waits.took
         self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
         self._loop.on_alive = self._on_alive
