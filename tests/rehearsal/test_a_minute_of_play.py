@@ -1,0 +1,23 @@
+"""A minute of the table as it is deployed: the players score, and the ball changes its solver, on good links and bad."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foosim.rehearsal.rehearse import rehearse
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TICKS = 30_000
+
+
+@pytest.mark.parametrize("links", ["table.yaml's", "perfect"])
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+def test_a_minute_has_goals_and_hand_overs(seed: int, links: str) -> None:
+    sets = [f"seed={seed}", *(["network.links=[]"] if links == "perfect" else [])]
+    result = rehearse(TABLE.read_text(), TABLE.name, TICKS, None, sets).json
+    assert result["handovers"] >= 20
+    assert sum(result["score"].values()) >= 1
+    assert (result["packets"]["dropped"] > 0) == (links != "perfect")
+    assert result["packets"]["refused"] == 0
