@@ -16,7 +16,7 @@ from foosim.client.payloads import BallPosition, Command, RodPosition
 from foosim.client.player import Commands, Samples
 from foosim.client.tracking import Ball, BallTrack, moved
 from foosim.protocol.deployment import BallSensor, Deployment, RodRobot, RodSensor
-from foosim.protocol.draws import draw_key, draw_words, unit_interval
+from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.errors import BadValue
 from foosim.protocol.names import TEAMS
 

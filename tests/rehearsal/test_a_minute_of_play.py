@@ -1,4 +1,4 @@
-"""A minute of the table as it is deployed: the players score, and the ball changes its solver, on good links and bad."""
+"""A minute of the table as deployed: the players score, and the ball changes its solver, on good links and bad."""
 
 from __future__ import annotations
 
