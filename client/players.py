@@ -25,16 +25,20 @@ LATENCY_S: Final = 0.003
 SLIDE_LAG_S: Final = 0.033
 """How far a rod's slide follows behind a moving target: 1 / gain of its loop."""
 SPIN_UP: Final = 1e4
-"""From a rod's start to its feet's reaching a ball in front of them."""
+"""rad/s2 with which a rod begins to turn: 2 N m on 2e-4 kg m2."""
 DOWN_RAD: Final = 0.0
 LIFTED_RAD: Final = -2.2
+"""Feet behind the rod and above the ball: it passes."""
 BACK_RAD: Final = -0.8
+"""Feet drawn back for a kick."""
 HIGH_M: Final = 0.03
+"""A ball whose centre is higher than this is above the feet."""
 SLOW: Final = 0.6
 FAST: Final = 3.0
+"""m/s: a ball that is slower waits for feet drawn back; one that comes faster is blocked, not struck."""
 FAR_M: Final = 0.036
 TAP_RAD: Final = 1.0
-"""Feet behind the rod and above the ball."""
+"""Where a kick of a ball that is FAR_M in front aims: struck late, it would fly."""
 KICKED_RAD: Final = 1.6
 """Where a kick aims; it is over before, at THROUGH_RAD."""
 THROUGH_RAD: Final = 0.6
@@ -46,12 +50,15 @@ UNDER_M: Final = 0.035
 ALIGNED_M: Final = 0.008
 AIM_RAD_MAX: Final = 0.6
 RESTS_M: Final = 0.06
-CALM_M: Final = 0.0
-POST_M: Final = 0.08
 BEHIND_M: Final = 0.02
+"""A ball that lies lower and this far behind the axis is let through under lifted feet."""
+POST_M: Final = 0.08
+"""The defence guards this far from the goal's middle, on the ball's side; the goalkeeper guards the middle."""
 COMING_SPEED: Final = 0.2
 COMING_S: Final = 0.5
+"""A ball that comes at this speed and is here within this time is awaited where it will pass."""
 AIM_INSIDE: Final = 1.6
+"""Shots aim this many radii of the ball inside a post."""
 AIM_NS: Final = 250_000_000
 FLAT_RAD: Final = 0.03
 """Below this a shot is straight enough with the flat of the foot."""
@@ -155,10 +162,7 @@ class Keeper:
         """Return where a rod waits for a ball that it cannot strike now."""
         if ball.u < rod.u - BEHIND_M and ball.z < RESTS_M:
             return rod.command(rod.slide_to(ball.y), LIFTED_RAD)
-        slide = rod.slide_to(self._guarded_y(rod, ball))
-        if abs(slide - rod.slide) < CALM_M and ball.vu > -COMING_SPEED:
-            slide = rod.slide
-        return rod.command(slide, DOWN_RAD)
+        return rod.command(rod.slide_to(self._guarded_y(rod, ball)), DOWN_RAD)
 
     def _guarded_y(self, rod: Rod, ball: View) -> float:
         if ball.vu < -COMING_SPEED:
@@ -190,12 +194,12 @@ class Team:
     """A keeper and a striker for one team. Parameters: `team`, red or blue. It commands the rods that it hears."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
-        team = parameters.get("team")
-        if team not in TEAMS:
-            raise BadValue(f"parameter team is not one of {', '.join(TEAMS)}", team)
         for key in parameters:
             if key != "team":
                 raise UnknownName("unknown parameter", key, ["team"])
+        team = parameters.get("team")
+        if team not in TEAMS:
+            raise BadValue(f"parameter team is not one of {', '.join(TEAMS)}", team)
         table = deployment.table
         side = 1.0 if team == "red" else -1.0
         self._side = side
