@@ -269,7 +269,8 @@ class Session:
 
     def _close(self) -> None:
         for declared in (*self._publishers, *self._declared):
-            with contextlib.suppress(zenoh.ZError):  # already undeclared
+            # Undeclared already, or borrowed by a thread that puts at this moment: then the session's close ends it.
+            with contextlib.suppress(zenoh.ZError, RuntimeError):
                 declared.undeclare()
         self._session.close()  # type: ignore[no-untyped-call]
         for thread in self._threads:
