@@ -194,24 +194,25 @@ class SupervisorCore:
         self.watch.ended_ns = self.watch.now_ns
         self.actions.append(Say("error" if failed else "info", f"run ends at tick {self.frame.tick}: {reason}"))
         self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+        self.requests.end()
 
     def stop(self) -> int:
-        """End the run in order after what is released; return the tick."""
-        self.stop_at = self.released if not self.stop_at else min(self.stop_at, self.released)
-        if self.epoch == 0 or self.frame.tick >= self.stop_at:
+        """End the run in order and return after which tick: what is released, or one more when all of it is committed.
+
+        The last commit says that it is the last, so that the vHub does not close its tick: no other may be.
+        """
+        if self.epoch == 0 or self.end is not None:
             self.finish("stopped", failed=False)
+            return self.frame.tick
+        last = max(self.released, self.frame.tick + 1)
+        self.stop_at = min(self.stop_at or last, last)
+        if self.pacer.paused and self.released < self.stop_at:
+            self.pacer.step(self.released, self.stop_at - self.released)
         return self.stop_at
 
     def statistics(self) -> SupervisorStatistics:
-        return SupervisorStatistics(
-            self.frame.tick,
-            self.epoch,
-            self.account.moves,
-            self.account.handovers,
-            self._refused,
-            self._repeated,
-            self._diverged,
-        )
+        account, refusals = self.account, (self._refused, self._repeated, self._diverged)
+        return SupervisorStatistics(self.frame.tick, self.epoch, account.moves, account.handovers, *refusals)
 
     def say(self, level: str, text: str) -> None:
         """Log a line for people."""

@@ -61,7 +61,8 @@ class History:
     epoch: Epoch | None = None
     edits: dict[int, list[Edit]] = field(default_factory=dict)
     """Edits of ticks that are not committed yet."""
-    answers: dict[str, Answer] = field(default_factory=dict)
+    answers: dict[tuple[str, str], Answer] = field(default_factory=dict)
+    """By sender and id of the request."""
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
@@ -78,7 +79,7 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
         elif isinstance(record, Epoch):
             history.epoch = record
         elif isinstance(record, RequestRecord):
-            history.answers[record.answer.id] = record.answer
+            history.answers[record.answer.sender, record.answer.id] = record.answer
             if record.edits:
                 history.edits.setdefault(record.tick, []).extend(record.edits)
     return history
@@ -97,5 +98,5 @@ def _begin(deployment: Deployment, first: object) -> History:
     if first.epoch:
         history.epoch = decode(Epoch, first.epoch)
     history.edits = {tick: list(edits) for tick, edits in first.edits}
-    history.answers = {answer.id: answer for answer in first.answers}
+    history.answers = {(answer.sender, answer.id): answer for answer in first.answers}
     return history

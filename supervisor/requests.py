@@ -8,17 +8,16 @@ Neighbours: `core`, `status` (what `status` answers).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from foosim.protocol import channels
+from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode_json, encode, encode_json
-from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.errors import Malformed, Refused, show
 from foosim.protocol.frame import layout_after
-from foosim.protocol.layout import Layout
+from foosim.protocol.layout import BALL, Layout
 from foosim.protocol.messages import Add, Answer, Edit, Push, Remove, Request
 from foosim.protocol.names import is_name, nearest_name
 from foosim.protocol.units import parse_pace
@@ -29,6 +28,12 @@ if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
 
 ANSWERS_KEPT = 1024
+PENDING_MAX = 256
+"""Changes of layout that may wait for engines at once."""
+TEXT_MAX = 4000
+"""Characters of a refusal."""
+NUMBER_MAX = 1e100
+"""More than anybody means, less than what overflows when squared."""
 IMPULSE_MAX = 10.0
 """N s on a free body: more than any kick, less than what leaves the world at once."""
 
@@ -47,7 +52,8 @@ class Requests:
 
     def __init__(self, core: SupervisorCore) -> None:
         self._core = core
-        self._answers: dict[str, Answer] = {}
+        self._answers: dict[tuple[str, str], Answer] = {}
+        """By sender and id."""
         self._pending: list[_Waiting] = []
         self._edits: dict[int, list[Edit]] = {}
         self._verbs: dict[str, Callable[[Request, dict[str, Any], int], Answer | None]] = {
@@ -65,19 +71,20 @@ class Requests:
 
     def take(self, request: Request, payload: bytes, now_ns: int) -> None:
         """Take one request: answer it now, or when all nodes are ready for what it asks."""
-        answer = self._answers.get(request.id)
+        key = request.sender, request.id
+        answer = self._answers.get(key)
         if answer is None:
-            if any(waiting.request.id == request.id for waiting in self._pending):
+            if any((waiting.request.sender, waiting.request.id) == key for waiting in self._pending):
                 return
             answer = self._decide(request, now_ns)
         if answer is not None:
-            self._core.actions.append(Publish(channels.ANSWER, request.sender, encode(answer)))
+            self._say(answer)
 
     def _decide(self, request: Request, now_ns: int) -> Answer | None:
         try:
             verb = self._verbs.get(request.verb)
             if verb is None:
-                raise Refused(f"no verb {request.verb}; there are {', '.join(self._verbs)}")
+                raise Refused(f"no verb {show(request.verb)}; there are {', '.join(self._verbs)}")
             if self._core.end is not None and request.verb not in ("status", "down"):
                 raise Refused("the run has ended")
             if self._core.epoch == 0 and request.verb not in ("status", "down"):
@@ -87,7 +94,26 @@ class Requests:
                 raise Malformed("arguments that are no JSON object")
             return verb(request, arguments, now_ns)
         except Refused as refused:
-            return Answer(request.sender, request.id, False, self._core.released, str(refused)[:4000], b"{}")
+            return self._refuse(request, str(refused))
+
+    def _say(self, answer: Answer) -> None:
+        self._core.actions.append(Publish(channels.ANSWER, answer.sender, encode(answer)))
+
+    def _refuse(self, request: Request, why: str) -> Answer:
+        return self._keep(Answer(request.sender, request.id, False, self._core.released, why[:TEXT_MAX], b"{}"))
+
+    def _keep(self, answer: Answer) -> Answer:
+        """Keep an answer for when the request is repeated."""
+        self._answers[answer.sender, answer.id] = answer
+        if len(self._answers) > ANSWERS_KEPT:
+            self._answers.pop(next(iter(self._answers)))
+        return answer
+
+    def end(self) -> None:
+        """The run has ended: refuse what still waits for engines."""
+        pending, self._pending = self._pending, []
+        for waiting in pending:
+            self._say(self._refuse(waiting.request, "the run has ended"))
 
     def _accept(self, request: Request, tick: int, text: str, edits: list[Edit] | None = None) -> Answer:
         """Journal a request whose tick is chosen, with what it adds to that tick's order, and keep its answer."""
@@ -95,10 +121,7 @@ class Requests:
         self._core.actions.append(Journal(encode(RequestRecord(tick, edits or [], answer))))
         if edits:
             self._edits.setdefault(tick, []).extend(edits)
-        self._answers[request.id] = answer
-        if len(self._answers) > ANSWERS_KEPT:
-            self._answers.pop(next(iter(self._answers)))
-        return answer
+        return self._keep(answer)
 
     def edits_for(self, tick: int) -> list[Edit]:
         """Take what requests add to the order of `tick`."""
@@ -153,9 +176,12 @@ class Requests:
 
     def _add(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
         layout = self._next_layout()
-        name = str(arguments.get("name") or _free_name(layout))
-        if not is_name(name) or name in layout or any(w.edit.name == name for w in self._pending):
-            raise Refused(f"name {name!r} is taken or no name; taken are {', '.join(layout.names)}")
+        taken = {*layout.names, *(waiting.edit.name for waiting in self._pending)}
+        name = _name(arguments, "name", _free_name(taken))
+        if not is_name(name) or name in taken:
+            raise Refused(f"name {show(name)} is taken or no name; taken are {', '.join(sorted(taken))}")
+        if len(taken) >= limits.ENTITIES_MAX:
+            raise Refused(f"{len(taken)} entities, at most {limits.ENTITIES_MAX} are allowed")
         table = self._core.deployment.table
         position = _vector(arguments, "position", (0.0, 0.0, table.ball.radius))
         velocity = _vector(arguments, "velocity", (0.0, 0.0, 0.0))
@@ -167,15 +193,17 @@ class Requests:
         self._wait_for_engines(request, Add(name, "ball", position, velocity))
 
     def _remove(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
-        name = str(arguments.get("name", ""))
-        layout = self._next_layout()
-        removable = [entity.name for entity in self._core.added_to(layout)]
-        if name not in removable:
-            raise Refused(f"{name!r} was not added; added are {', '.join(removable) or 'none'}")
+        name = _name(arguments, "name")
+        going = {waiting.edit.name for waiting in self._pending}
+        added = [entity.name for entity in self._core.added_to(self._next_layout()) if entity.name not in going]
+        if name not in added:
+            raise Refused(f"{show(name)} was not added; added are {', '.join(added) or 'none'}")
         self._wait_for_engines(request, Remove(name))
 
     def _wait_for_engines(self, request: Request, edit: Add | Remove) -> None:
         """Have the engines built; the first change that waits goes first, since each builds on the one before."""
+        if len(self._pending) >= PENDING_MAX:
+            raise Refused(f"{PENDING_MAX} additions and removals wait for engines already")
         self._pending.append(_Waiting(request, edit, layout_after(self._next_layout(), [edit])))
         if len(self._pending) == 1:
             self.prepare()
@@ -194,34 +222,26 @@ class Requests:
             self._pending.pop(0)
             tick = self._core.released
             verb = "added" if isinstance(waiting.edit, Add) else "removed"
-            answer = self._accept(waiting.request, tick, f"{waiting.edit.name} {verb} at tick {tick}", [waiting.edit])
-            self._core.actions.append(Publish(channels.ANSWER, waiting.request.sender, encode(answer)))
+            self._say(self._accept(waiting.request, tick, f"{waiting.edit.name} {verb} at tick {tick}", [waiting.edit]))
             if self._pending:
                 following = self._pending[0]
-                following.layout = layout_after(layout_after(self._next_layout(), [waiting.edit]), [following.edit])
+                following.layout = layout_after(self._next_layout(), [following.edit])
                 self.prepare()
 
     def _push(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        name = str(arguments.get("name", "ball"))
-        balls = [ball.name for ball in self._next_layout().balls]
-        if name not in balls:
-            nearest = nearest_name(name, balls)
-            hint = f", nearest is {nearest}" if nearest else ""
-            raise Refused(f"no free body {name!r}; there are {', '.join(balls)}{hint}")
+        name = _chosen("free body", _name(arguments, "name", BALL), [ball.name for ball in self._next_layout().balls])
         impulse = _vector(arguments, "impulse", None)
         if sum(value * value for value in impulse) > IMPULSE_MAX**2:
             raise Refused(f"impulse {impulse} is above {IMPULSE_MAX} N s")
         tick = self._core.released
+        if len(self._edits.get(tick, ())) >= limits.ENTITIES_MAX - PENDING_MAX:
+            raise Refused(f"tick {tick} has {len(self._edits[tick])} edits already")
         return self._accept(request, tick, f"{name} pushed at tick {tick}", [Push(name, impulse)])
 
     def _move(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        robot, node = str(arguments.get("robot", "")), str(arguments.get("node", ""))
         core = self._core
-        if robot not in core.owners:
-            nearest = nearest_name(robot, core.owners)
-            raise Refused(f"no robot {robot!r}" + (f", nearest is {nearest}" if nearest else ""))
-        if node not in core.members:
-            raise Refused(f"no node {node!r}; there are {', '.join(core.members)}")
+        robot = _chosen("robot", _name(arguments, "robot"), sorted(core.owners))
+        node = _chosen("node", _name(arguments, "node"), core.members)
         tick = core.frame.tick
         if core.owners[robot] == node:
             return self._accept(request, tick, f"{robot} is on {node} already")
@@ -235,29 +255,53 @@ class Requests:
         return self._accept(request, tick, f"the run ends at tick {tick}")
 
 
+def _name(arguments: dict[str, Any], key: str, default: str = "") -> str:
+    value = arguments.get(key)
+    if value is None and default:
+        return default
+    if not isinstance(value, str):
+        raise Refused(f"{key}: a name is needed, not {show(value)}")
+    return value
+
+
+def _chosen(what: str, name: str, choices: Sequence[str]) -> str:
+    if name in choices:
+        return name
+    nearest = nearest_name(name, choices)
+    hint = f", nearest is {nearest}" if nearest else ""
+    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices)}{hint}")
+
+
 def _integer(arguments: dict[str, Any], name: str, low: int, high: int) -> int:
     value = arguments.get(name)
     if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-        raise Refused(f"{name}: a whole number from {low} to {high} is needed, not {value!r}")
+        raise Refused(f"{name}: a whole number from {low} to {high} is needed, not {show(value)}")
     return value
 
 
 def _vector(
     arguments: dict[str, Any], name: str, default: tuple[float, float, float] | None
 ) -> tuple[float, float, float]:
-    value = arguments.get(name, default)
-    if value is not None and isinstance(value, list | tuple) and len(value) == 3:
-        try:
-            x, y, z = (float(number) for number in value)
-        except (TypeError, ValueError):
-            x = y = z = float("nan")
-        if isfinite(x) and isfinite(y) and isfinite(z):
-            return x, y, z
-    raise Refused(f"{name}: three finite numbers are needed, not {value!r}")
+    value = arguments.get(name)
+    if value is None and default is not None:
+        return default
+    if isinstance(value, list) and len(value) == 3 and all(_is_small(number) for number in value):
+        x, y, z = value
+        return float(x), float(y), float(z)
+    raise Refused(f"{name}: three numbers of at most {NUMBER_MAX:g} are needed, not {_show_list(value)}")
 
 
-def _free_name(layout: Layout) -> str:
+def _is_small(number: object) -> bool:
+    """Whether this is a number that is finite, also squared."""
+    return isinstance(number, int | float) and not isinstance(number, bool) and -NUMBER_MAX <= number <= NUMBER_MAX
+
+
+def _show_list(value: object) -> str:
+    return f"[{', '.join(show(item) for item in value[:4])}]" if isinstance(value, list) else show(value)
+
+
+def _free_name(taken: Collection[str]) -> str:
     number = 2
-    while f"ball{number}" in layout:
+    while f"{BALL}{number}" in taken:
         number += 1
-    return f"ball{number}"
+    return f"{BALL}{number}"

@@ -7,13 +7,16 @@ build or a refusal that says why. Neighbours: `protocol.member` is the other sid
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from foosim.protocol import limits
 from foosim.protocol.channels import VHUB
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import show
 from foosim.protocol.messages import Heartbeat, Hello, Ready
 from foosim.protocol.names import nearest_name
+
+ROLES: Final = ("node", "vhub")
 
 
 @dataclass(slots=True)
@@ -56,11 +59,13 @@ class Roster:
             return f"protocol version {hello.version}, this is {limits.PROTOCOL_VERSION}"
         if hello.world not in ("", self.deployment.world):
             return f"world {hello.world}, this is {self.deployment.world}"
+        if hello.role not in ROLES:
+            return f"role {show(hello.role)}, there are {', '.join(ROLES)}"
         choices = [VHUB] if hello.role == "vhub" else sorted(self.deployment.nodes)
         if hello.name not in choices:
             nearest = nearest_name(hello.name, choices)
             hint = f", nearest is {nearest}" if nearest else ""
-            return f"no {hello.role} {hello.name} is declared; declared are {', '.join(choices)}{hint}"
+            return f"no {hello.role} {show(hello.name)} is declared; declared are {', '.join(choices)}{hint}"
         known = self.by_name.get(hello.name)
         if known is not None and known.boot != hello.boot:
             return f"a {known.role} {hello.name} is already here"
@@ -73,9 +78,7 @@ class Roster:
 
     def take(self, hello: Hello, now_ns: int) -> Process:
         """Note a process whose hello was accepted."""
-        return self.by_name.setdefault(
-            hello.name, Process(hello.role, hello.name, hello.boot, heard_ns=now_ns)
-        )
+        return self.by_name.setdefault(hello.name, Process(hello.role, hello.name, hello.boot, heard_ns=now_ns))
 
     def note_ready(self, process: Process, ready: Ready) -> str:
         """Note a layout that is built; return why the process cannot take part after all, or an empty string."""
@@ -93,9 +96,7 @@ class Roster:
 
     def missing(self, layout: bytes) -> list[str]:
         """Return who is not ready for a layout yet, of those that the deployment declares."""
-        return [
-            name for name in self.expected if name not in self.by_name or layout not in self.by_name[name].ready
-        ]
+        return [name for name in self.expected if name not in self.by_name or layout not in self.by_name[name].ready]
 
     def silent(self, now_ns: int, deadline_ns: int) -> list[str]:
         """Return who has not been heard of for longer than the deadline."""

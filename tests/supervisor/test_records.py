@@ -79,7 +79,7 @@ def test_a_fold_of_all_records_gives_the_last_commit_and_every_answer(watched: W
     assert (history.frame.tick, history.frame.digest) == (TICKS, watched.supervisor.frame.digest)
     assert history.epoch is not None
     assert (history.epoch.epoch, dict(history.epoch.owners)["red.goal"]) == (2, "blue")
-    assert history.answers == watched.answers
+    assert history.answers == {(answer.sender, name): answer for name, answer in watched.answers.items()}
     assert history.run.deployment == TEXT
 
 
@@ -88,7 +88,7 @@ def test_a_request_is_in_the_journal_before_the_tick_at_which_it_takes_effect(wa
     cut = next(
         count
         for count in range(1, len(watched.records))
-        if pushed.id in fold(DEPLOYMENT, watched.records[:count]).answers
+        if (pushed.sender, pushed.id) in fold(DEPLOYMENT, watched.records[:count]).answers
     )
     history = fold(DEPLOYMENT, watched.records[:cut])
     assert history.frame.tick <= pushed.tick

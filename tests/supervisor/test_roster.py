@@ -1,0 +1,231 @@
+"""The handshake: who is let in, who is refused and why; over the real cores, and the roster by itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import pytest
+
+from foosim.node.core import NodeCore, NodeStatistics
+from foosim.node.solver import Solver
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Publish
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import Build, Epoch, Hello, Ready, Refusal
+from foosim.protocol.units import Pace
+from foosim.supervisor.core import RunSettings, SupervisorCore
+from foosim.supervisor.roster import Roster
+from foosim.vhub.core import HubCore
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TEXT: Final = apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure", "players={}"])
+DEPLOYMENT: Final = load_deployment(TEXT, TABLE.name)
+MIXED: Final = load_deployment(apply_sets(TEXT, TABLE.name, ["mixed_cpu=true"]), TABLE.name)
+LAYOUT: Final = build_layout(DEPLOYMENT).digest
+PRINT: Final = bytes(range(32))
+OTHER: Final = bytes(32)
+HELLO: Final = Hello("node", "red", "boot-1", limits.PROTOCOL_VERSION, "", PRINT)
+
+REFUSED: Final[dict[str, tuple[dict[str, Any], str]]] = {
+    "version": ({"version": 9}, f"protocol version 9, this is {limits.PROTOCOL_VERSION}"),
+    "world": ({"world": "mars"}, "world mars, this is table"),
+    "name": ({"name": "rde"}, "no node 'rde' is declared; declared are blue, red, nearest is red"),
+    "no name like it": ({"name": "zzz"}, "no node 'zzz' is declared; declared are blue, red"),
+    "the vHub's name": ({"name": "vhub"}, "no node 'vhub' is declared; declared are blue, red"),
+    "a node's name": ({"role": "vhub", "name": "red"}, "no vhub 'red' is declared; declared are vhub"),
+    "role": ({"role": "dragon"}, "role 'dragon', there are node, vhub"),
+    "fingerprint": (
+        {"fingerprint": OTHER},
+        "arithmetic fingerprint 0000000000000000, this is 0001020304050607: its results would differ "
+        "(the deployment may say mixed_cpu: true)",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_who_does_not_fit_is_refused_with_the_reason(what: str) -> None:
+    changes, reason = REFUSED[what]
+    roster = Roster(DEPLOYMENT, PRINT)
+    assert roster.reason_against(msgspec.structs.replace(HELLO, **changes)) == reason
+    assert roster.reason_against(HELLO) == "" and not roster.by_name
+
+
+def test_a_name_is_free_until_somebody_has_it() -> None:
+    roster = Roster(DEPLOYMENT, PRINT)
+    roster.take(HELLO, 5)
+    assert roster.reason_against(HELLO) == "", "the same process says hello again"
+    twin = msgspec.structs.replace(HELLO, boot="boot-2")
+    assert roster.reason_against(twin) == "a node red is already here"
+    assert roster.reason_against(msgspec.structs.replace(twin, name="blue")) == ""
+    assert roster.take(HELLO, 9) is roster.by_name["red"] and roster.by_name["red"].heard_ns == 5
+
+
+def test_a_deployment_may_allow_mixed_processors() -> None:
+    roster = Roster(MIXED, PRINT)
+    assert roster.reason_against(msgspec.structs.replace(HELLO, fingerprint=OTHER)) == ""
+    one = roster.take(HELLO, 0)
+    other = roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
+    assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT)) == ""
+    assert roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER)) == ""
+
+
+def test_engines_whose_small_run_differs_are_refused() -> None:
+    roster = Roster(DEPLOYMENT, PRINT)
+    one = roster.take(HELLO, 0)
+    other = roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
+    assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT)) == ""
+    reason = roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER))
+    assert reason.startswith(
+        "a fixed small run of its engine has digest 0000000000000000, the first node's is 00010203"
+    )
+    assert roster.missing(LAYOUT) == ["blue", "vhub"] and "blue" not in roster.by_name
+
+
+def test_the_vhub_has_no_engine_to_compare() -> None:
+    roster = Roster(DEPLOYMENT, PRINT)
+    hub = roster.take(Hello("vhub", "vhub", "b", limits.PROTOCOL_VERSION, "table", PRINT), 0)
+    roster.note_ready(roster.take(HELLO, 0), Ready("red", "boot-1", LAYOUT, PRINT))
+    assert roster.note_ready(hub, Ready("vhub", "b", LAYOUT, OTHER)) == ""
+
+
+def test_missing_is_who_has_not_built_this_layout() -> None:
+    roster = Roster(DEPLOYMENT, PRINT)
+    assert roster.missing(LAYOUT) == ["blue", "red", "vhub"] == roster.expected
+    red = roster.take(HELLO, 0)
+    assert roster.missing(LAYOUT) == ["blue", "red", "vhub"]
+    roster.note_ready(red, Ready("red", "boot-1", bytes(32), PRINT))
+    assert "red" in roster.missing(LAYOUT)
+    roster.note_ready(red, Ready("red", "boot-1", LAYOUT, PRINT))
+    assert roster.missing(LAYOUT) == ["blue", "vhub"] and roster.nodes == ["red"]
+
+
+def test_silent_is_who_was_not_heard_of_for_longer_than_the_deadline() -> None:
+    roster = Roster(DEPLOYMENT, PRINT)
+    roster.take(HELLO, 100)
+    roster.take(msgspec.structs.replace(HELLO, name="blue"), 200)
+    assert roster.silent(1100, 1000) == []
+    assert roster.silent(1101, 1000) == ["red"]
+    roster.by_name["red"].farewell = True
+    assert roster.silent(9999, 1000) == ["blue"]
+
+
+# --- over the cores --------------------------------------------------------------------------------------------------
+
+
+class Table:
+    """A supervisor, and what it says to whom."""
+
+    def __init__(self) -> None:
+        self.core = SupervisorCore(RunSettings("run", TABLE.name, TEXT, Pace("fast")), PRINT, 0)
+
+    def hear(self, process: NodeCore | HubCore, now_ns: int = 0) -> list[Publish]:
+        """Let the supervisor take what a process has to say; return its answers."""
+        for action in process.actions:
+            if isinstance(action, Publish):
+                self.core.receive(action.channel, action.name, action.payload, now_ns)
+        process.actions.clear()
+        self.core.advance(now_ns)
+        said = [action for action in self.core.actions if isinstance(action, Publish)]
+        self.core.actions.clear()
+        return said
+
+
+def node(name: str, fingerprint: bytes = PRINT, world: str = "") -> NodeCore:
+    core = NodeCore(name, f"boot-{name}", fingerprint, 0, world)
+    core.wake(0)
+    return core
+
+
+def give(process: NodeCore | HubCore, said: list[Publish], name: str) -> None:
+    for action in said:
+        if action.name in (name, channels.SUPERVISOR):
+            process.receive(action.channel, action.name, action.payload, 0)
+
+
+@pytest.mark.parametrize(
+    ("core", "reason"),
+    [
+        (lambda: node("rde"), "no node 'rde' is declared; declared are blue, red, nearest is red"),
+        (lambda: node("red", OTHER), "arithmetic fingerprint 0000000000000000, this is 0001020304050607"),
+        (lambda: node("red", world="mars"), "world mars, this is table"),
+    ],
+    ids=["name", "fingerprint", "world"],
+)
+def test_a_refused_process_knows_why_and_asks_no_more(core: Any, reason: str) -> None:
+    table, process = Table(), core()
+    (said,) = table.hear(process)
+    assert said.channel is channels.REFUSAL and decode(Refusal, said.payload).reason.startswith(reason)
+    give(process, [said], process.name)
+    assert process.member.refusal.startswith(reason)
+    process.actions.clear()
+    process.wake(10**9)
+    assert process.actions == []
+
+
+def test_a_refusal_for_another_start_of_the_name_is_not_taken() -> None:
+    process = node("red")
+    process.receive(channels.REFUSAL, "red", encode(Refusal("red", "another boot", "no")), 0)
+    process.receive(channels.REFUSAL, "red", b"\xc1", 0)
+    assert process.statistics().refused == 1
+    assert process.member.refusal == ""
+
+
+def test_who_is_let_in_gets_all_it_needs_and_the_run_starts_when_all_are_ready() -> None:
+    table = Table()
+    nodes = {name: node(name) for name in ("red", "blue")}
+    hub = HubCore("boot-hub", PRINT, 0)
+    hub.wake(0)
+    processes: dict[str, NodeCore | HubCore] = {**nodes, "vhub": hub}
+    for name, process in processes.items():
+        (said,) = table.hear(process)
+        build = decode(Build, said.payload)
+        assert (said.channel, said.name, build.name, build.deployment) == (channels.BUILD, name, name, TEXT)
+        give(process, [said], name)
+    assert table.core.watch.waiting_for(table.core) == ["blue", "red", "vhub"]
+    assert hub.member.is_ready, "without lockstep clients there is nobody to wait for"
+    assert not [action for action in table.hear(hub) if action.channel is channels.EPOCH]
+    for name, process in nodes.items():
+        Solver(process).build_wanted()
+        said_last = table.hear(process)
+        assert table.core.epoch == (1 if name == "blue" else 0)
+    epoch = decode(Epoch, next(action.payload for action in said_last if action.channel is channels.EPOCH))
+    assert (epoch.epoch, epoch.tick, epoch.roster) == (1, 0, ["blue", "red"])
+    assert dict(epoch.owners) == DEPLOYMENT.owners()
+
+
+def test_a_twin_of_a_node_that_takes_part_is_refused_and_the_first_stays() -> None:
+    table, first = Table(), node("red")
+    give(first, table.hear(first), "red")
+    twin = NodeCore("red", "another boot", PRINT, 0)
+    twin.wake(0)
+    (said,) = table.hear(twin)
+    assert decode(Refusal, said.payload) == Refusal("red", "another boot", "a node red is already here")
+    give(first, [said], "red")
+    assert not first.member.refusal and first.member.build is not None
+
+
+def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> None:
+    processes: dict[str, NodeCore | HubCore] = {"red": node("red"), "vhub": HubCore("boot-red", PRINT, 0)}
+    for name, process in processes.items():
+        right = Build(name, "boot-red", "run", "t", TEXT, "fast", [])
+        wrong = [
+            msgspec.structs.replace(right, deployment="world: ["),
+            msgspec.structs.replace(right, deployment=TEXT.replace("seed: 1", "seed: -1")),
+            msgspec.structs.replace(right, added=[("dragon", "dragon")]),
+            msgspec.structs.replace(right, added=[("ball", "ball")]),
+            msgspec.structs.replace(right, name="blue"),
+        ]
+        for build in wrong:
+            process.receive(channels.BUILD, name, encode(build), 0)
+        process.receive(channels.BUILD, name, encode(msgspec.structs.replace(right, boot="other")), 0)
+        built = process.member.build
+        assert built is None, built
+        process.receive(channels.BUILD, name, encode(right), 0)
+        assert process.deployment is not None
+        account = process.statistics()
+        refused = account.refused if isinstance(account, NodeStatistics) else account.malformed
+        assert refused == len(wrong)
