@@ -1,0 +1,430 @@
+"""Who is waited for, who makes ticks late, who is lost: each kind of process delayed or stopped in turn is named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from foosim.node.core import NodeCore
+from foosim.protocol import channels
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.codec import encode
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.messages import DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat, Request
+from foosim.protocol.units import Pace, parse_pace
+from foosim.rehearsal.rehearse import rehearse, with_nodes
+from foosim.rehearsal.system import IDLE_NS_MAX, OPERATOR, Settings, System
+from foosim.supervisor.core import RunSettings
+from foosim.supervisor.roster import Roster
+from foosim.supervisor.status import status
+from foosim.supervisor.watch import Watch, _names
+from foosim.vhub.core import HubCore
+from foosim.vhub.waits import Waits
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TEXT: Final = TABLE.read_text()
+MS: Final = 1_000_000
+T: Final = 2 * MS
+TICKS: Final = 100
+REALTIME: Final = Pace("realtime")
+LONG: Final = tuple(f"deadlines.{name}=1 h" for name in ("heartbeat", "tick_named", "tick_lost", "lockstep_realtime"))
+
+
+class Seen:
+    """A rehearsal in realtime, and who was said to be late at every tick."""
+
+    def __init__(self, nodes: int = 2, ticks: int = TICKS, pace: Pace = REALTIME, sets: Sequence[str] = LONG) -> None:
+        self.nodes, self.ticks, self.pace, self.sets = nodes, ticks, pace, sets
+        self.lines: list[str] = []
+        self.late: dict[int, str] = {}
+        self.settings = Settings(on_say=self._say, on_commit=lambda frame: self._look(frame.tick))
+        self.prepare: Callable[[System], None] = lambda system: None
+
+    def _say(self, process: str, level: str, text: str) -> None:
+        self.lines.append(text)
+
+    def _look(self, tick: int) -> None:
+        """The frame before was judged when it was committed."""
+        self.late[tick - 1] = self.system.supervisor.watch.late
+
+    def go(self) -> Seen:
+        def prepare(system: System) -> None:
+            self.system = system
+            self.prepare(system)
+
+        sets = ["engine=pure", *self.sets]
+        self.result = rehearse(
+            TEXT, TABLE.name, self.ticks, self.nodes, sets, self.settings, pace=self.pace, prepare=prepare
+        ).json
+        return self
+
+
+@cache
+def delayed(process: str, delay_ms: float, nodes: int = 2, pace: str = "realtime") -> Seen:
+    seen = Seen(nodes, pace=parse_pace(pace))
+    seen.settings.slow_ns = {process: int(delay_ms * MS)}
+    return seen.go()
+
+
+PROCESSES: Final = ("n1", "n2", VHUB, "player-red", "player-blue", SUPERVISOR)
+
+
+@pytest.mark.parametrize(
+    ("process", "delay_ms"), [*((process, 8) for process in PROCESSES), ("n2", 30), ("player-red", 30)]
+)
+def test_each_kind_of_process_delayed_is_named_in_the_lag_line(process: str, delay_ms: float) -> None:
+    seen = delayed(process, delay_ms)
+    assert seen.result["ticks"] == TICKS and seen.result["reason"] == "done"
+    assert {name for tick, name in seen.late.items() if tick > 5} == {process}
+    late = status(seen.system.supervisor, 0)["late"]
+    assert late["waited_for"] == process and 0 < late["tick"] <= TICKS
+    lines = [line for line in seen.lines if "lag" in line]
+    assert lines and all(f"ms, waited for {process}" in line for line in lines)
+    assert seen.result["lag_ms"]["max"] >= delay_ms - 2 * T / MS
+
+
+@pytest.mark.parametrize("process", ["n1", VHUB, SUPERVISOR])
+def test_so_is_one_that_is_only_just_too_slow(process: str) -> None:
+    seen = delayed(process, 2.5)
+    assert {name for tick, name in seen.late.items() if tick > 20} == {process}
+
+
+@pytest.mark.parametrize("process", ["n1", VHUB])
+def test_with_one_node_it_is_the_same(process: str) -> None:
+    assert {name for tick, name in delayed(process, 8, nodes=1).late.items() if tick > 5} == {process}
+
+
+def test_at_another_pace_it_is_the_same() -> None:
+    assert {name for tick, name in delayed("player-red", 12, pace="2x").late.items() if tick > 5} == {"player-red"}
+
+
+def test_a_run_in_time_names_nobody() -> None:
+    seen = Seen().go()
+    assert set(seen.late.values()) == {""} and not [line for line in seen.lines if "lag" in line]
+    assert status(seen.system.supervisor, 0)["late"] == {"lag_ms": 0.0, "waited_for": "", "tick": -1}
+
+
+def test_in_fast_nobody_is_late() -> None:
+    seen = delayed("n1", 8, pace="fast")
+    assert set(seen.late.values()) == {""} and seen.result["lag_ms"] is None
+
+
+def test_one_late_tick_is_blamed_once_and_the_ticks_that_catch_up_keep_the_name() -> None:
+    seen = Seen()
+
+    def stall(system: System) -> None:
+        def begin() -> None:
+            system.processes["n2"].busy_until_ns = system.bus.now_ns + 20 * MS
+
+        system.at_tick(60, begin)
+
+    seen.prepare = stall
+    seen.go()
+    assert {name for tick, name in seen.late.items() if tick < 60} == {""}
+    assert {name for tick, name in seen.late.items() if tick > 62} == {"n2"}
+    assert seen.system.supervisor.watch.late_tick in (61, 62, 63), "no tick after it was late by more"
+    assert seen.result["lag_ms"]["max"] == pytest.approx(18.0, abs=2.1)
+
+
+def test_late_ticks_are_logged_once_a_second_with_their_number() -> None:
+    lines = [line for line in delayed("player-red", 30).lines if "late ticks" in line]
+    assert lines[0] == "tick 2: lag 26.0 ms, waited for player-red (1 late ticks)"
+    assert 1 <= len(lines) <= 3
+    anchors = [line for line in delayed("player-red", 30).lines if "lag" in line and "late ticks" not in line]
+    assert anchors and all(float(line.split("lag ")[1].split(" ms")[0]) > 100.0 for line in anchors)
+
+
+def test_a_delay_changes_nothing_in_the_world() -> None:
+    calm = Seen().go()
+    assert {delayed(process, 8).result["digest"]["chain"] for process in PROCESSES} == {calm.result["digest"]["chain"]}
+
+
+# --- overdue, silent, gone -------------------------------------------------------------------------------------------
+
+DEADLINES: Final = ("deadlines.heartbeat=1 h", "deadlines.tick_named=500 ms", "deadlines.tick_lost=1 s")
+
+
+def ended(seen: Seen) -> tuple[str, int]:
+    """How a run ended that had to end early: in order, with a result, everyone told."""
+    core = seen.system.supervisor
+    assert core.end is not None and core.finished
+    assert seen.result["failed"] is True and seen.result["ticks"] == core.end.tick < seen.ticks
+    assert seen.system.hub.finished, "the vHub has closed what it had"
+    told = [name for name, solver in seen.system.solvers.items() if solver._core.ended is not None]
+    assert told or seen.nodes == 1, "who still hears is told"
+    return core.end.reason, core.end.tick
+
+
+class _StuckNode(NodeCore):
+    """n2 gets its work at tick 60 and never has it done; it hears and is heard."""
+
+    def advance(self, now_ns: int) -> None:
+        super().advance(now_ns)
+        if self.name == "n2" and self.work is not None and self.work.tick == 60:
+            self.work = None
+
+
+def test_a_node_that_stops_answering_is_named_and_then_lost() -> None:
+    seen = Seen(sets=DEADLINES, ticks=300)
+    seen.settings.node = _StuckNode
+    assert ended(seen.go()) == ("lost n2: tick 60 is overdue by 1.1 s", 60)
+    named = [line for line in seen.lines if "waits for" in line]
+    assert named == ["tick 60 waits for n2 since 0.6 s"]
+
+
+class _BlindNode(NodeCore):
+    """n2 says no samples from tick 60 on."""
+
+    def receive(self, channel: channels.Channel, name: str, payload: bytes, now_ns: int) -> None:
+        super().receive(channel, name, payload, now_ns)
+        self._drop()
+
+    def advance(self, now_ns: int) -> None:
+        super().advance(now_ns)
+        self._drop()
+
+    def _drop(self) -> None:
+        tick = 0 if self.frame is None else self.frame.tick
+        if self.name == "n2" and tick >= 60:
+            mute = [action for action in self.actions if getattr(action, "channel", None) is channels.SAMPLES]
+            for action in mute:
+                self.actions.remove(action)
+
+
+def test_who_keeps_the_vhub_waiting_for_samples_is_lost_not_the_vhub() -> None:
+    seen = Seen(sets=DEADLINES, ticks=300)
+    seen.settings.node = _BlindNode
+    reason, tick = ended(seen.go())
+    assert reason == f"lost n2: tick {tick} is overdue by 1.1 s" and 60 <= tick <= 62
+
+
+class _StuckHub(HubCore):
+    """Closes no tick from 60 on."""
+
+    def _close_clients(self, now_ns: int) -> bool:
+        return self.state is not None and self.state.closed < 59 and super()._close_clients(now_ns)
+
+
+def test_a_vhub_that_stops_closing_is_named_and_lost() -> None:
+    seen = Seen(sets=DEADLINES, ticks=300)
+    seen.settings.hub = _StuckHub
+    assert ended(seen.go()) == ("lost vhub: tick 61 is overdue by 1.1 s", 61)
+
+
+def stopped(process: str, **changes: Any) -> Seen:
+    """A process that stops altogether when frame 60 is committed: it neither hears nor says anything any more."""
+    seen = Seen(ticks=400, **changes)
+
+    def prepare(system: System) -> None:
+        def stop() -> None:
+            system.processes[process].busy_until_ns = 10 * IDLE_NS_MAX
+
+        system.at_tick(60, stop)
+
+    seen.prepare = prepare
+    return seen.go()
+
+
+@pytest.mark.parametrize("process", ["n1", "n2"])
+def test_a_silent_node_is_lost(process: str) -> None:
+    seen = stopped(process, sets=("deadlines.heartbeat=1 s", "deadlines.tick_lost=1 h", "deadlines.tick_named=1 h"))
+    reason, tick = ended(seen)
+    assert reason == f"lost {process}: no heartbeat for 1 s" and 60 <= tick <= 62
+
+
+def test_a_silent_vhub_is_lost_and_the_run_ends_without_its_farewell() -> None:
+    seen = stopped(VHUB, sets=("deadlines.heartbeat=1 s", "deadlines.tick_lost=1 h", "deadlines.tick_named=1 h"))
+    core = seen.system.supervisor
+    assert core.end is not None and core.end.reason == "lost vhub: no heartbeat for 1 s"
+    assert core.finished and not seen.system.hub.finished and seen.result["capture"] is None
+
+
+@pytest.mark.parametrize("pace", [REALTIME, Pace("fast")], ids=str)
+def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
+    """The vHub has its deadline: 1 s in realtime, 10 s in fast; meanwhile it is the one that is waited for."""
+    waited: list[list[str]] = []
+    seen = Seen(ticks=400, pace=pace, sets=())
+
+    def prepare(system: System) -> None:
+        def stop() -> None:
+            system.processes["player-red"].busy_until_ns = 10 * IDLE_NS_MAX
+
+        system.at_tick(60, stop)
+        say = system.settings.on_say
+
+        def listen(process: str, level: str, text: str) -> None:
+            assert say is not None
+            say(process, level, text)
+            if process == VHUB and text.startswith("lost"):
+                waited.append(system.supervisor.watch.waiting_for(system.supervisor))
+
+        system.settings.on_say = listen
+
+    seen.prepare = prepare
+    reason, tick = ended(seen.go())
+    assert reason.startswith("lost player-red: no Done of tick ") and reason.endswith(" within its deadline")
+    assert 60 <= tick <= 67 and waited == [["player-red"]]
+    assert not [line for line in seen.lines if "overdue" in line or "waits for" in line], "only it can be overdue"
+
+
+def test_a_lockstep_client_whose_connection_closes_is_lost() -> None:
+    seen = Seen(ticks=400)
+    seen.prepare = lambda system: system.at_tick(60, lambda: system.hub.client_gone("player-blue", system.bus.now_ns))
+    reason, _ = ended(seen.go())
+    assert reason == "lost player-blue: its connection closed"
+
+
+@pytest.mark.parametrize("process", ["n1", VHUB])
+def test_a_process_whose_presence_ends_is_lost(process: str) -> None:
+    seen = Seen(ticks=400)
+    seen.prepare = lambda system: system.at_tick(60, lambda: system.supervisor.process_gone(process, system.bus.now_ns))
+    seen.go()
+    assert seen.system.supervisor.end is not None
+    assert seen.system.supervisor.end.reason == f"lost {process}: its connection closed"
+
+
+def never_there(absent: str, sets: Sequence[str] = ()) -> Seen:
+    seen = Seen(sets=("deadlines.start=2 s", *sets))
+
+    def prepare(system: System) -> None:
+        system.processes[absent].busy_until_ns = 10 * IDLE_NS_MAX
+
+    seen.prepare = prepare
+    return seen
+
+
+@pytest.mark.parametrize("absent", ["n2", VHUB, "player-red"])
+def test_who_is_not_ready_in_time_ends_the_run_before_it_starts(absent: str) -> None:
+    core = never_there(absent).go().system.supervisor
+    assert core.end is not None and core.end.reason == f"lost {absent}: not ready within 2 s"
+
+
+def test_who_is_started_by_hand_is_waited_for_without_end() -> None:
+    text = with_nodes(TEXT, TABLE.name, 2, ["engine=pure", "deadlines.start=2 s", "nodes.n2.launch=manual"])
+    system = System(RunSettings("run", TABLE.name, text, REALTIME, 10), Settings())
+    system.processes["n2"].busy_until_ns = 30 * 1000 * MS
+    system.run()
+    assert system.supervisor.end is not None and system.supervisor.end.reason == "done"
+    assert system.supervisor.frame.tick == 10
+
+
+def test_nobody_is_overdue_while_the_run_is_paused() -> None:
+    text = with_nodes(TEXT, TABLE.name, 2, ["engine=pure"])
+    lines: list[str] = []
+    settings = Settings(on_say=lambda process, level, said: lines.append(said))
+    system = System(RunSettings("run", TABLE.name, text, REALTIME, TICKS), settings)
+    system.at_tick(30, lambda: system.request("pause") and None)
+    request = encode(Request(OPERATOR, "resume", "resume", b"{}"))
+    system.bus.put(OPERATOR, channels.REQUEST, OPERATOR, request, 40 * 1000 * MS)
+    system.run()
+    assert system.supervisor.frame.tick == TICKS and system.answers["resume"].accepted
+    assert lines == [f"run ends at tick {TICKS}: done"]
+
+
+# --- the watch by itself ---------------------------------------------------------------------------------------------
+
+
+def watch() -> Watch:
+    deployment = load_deployment(with_nodes(TEXT, TABLE.name, 2), TABLE.name)
+    made = Watch(deployment, Roster(deployment, bytes(32)), 0)
+    made.begun(0)
+    made.committed(10, 0, 0, 20 * MS)
+    return made
+
+
+def told(waiting_for: str, tick: int) -> Heartbeat:
+    return Heartbeat(VHUB, tick, 1, waiting_for, "", 0.0, b"")
+
+
+@pytest.mark.parametrize(
+    ("said", "name"),
+    [("", VHUB), (DONE_OF + "player-red", "player-red"), (SAMPLES_OF + "n2", "n2"), ("commit", VHUB)],
+)
+def test_late_deliveries_are_blamed_on_whom_the_vhub_named(said: str, name: str) -> None:
+    made = watch()
+    made.released(10, 20 * MS)
+    made.told(told(said, 9))
+    made.told(told(DONE_OF + "player-blue", 7))
+    made.delivered(10, 30 * MS)
+    for node in ("n1", "n2"):
+        made.part(10, node, 31 * MS)
+    line = made.committed(11, 9 * MS, 20 * MS, 31 * MS)
+    assert made.late == name and line == f"tick 11: lag 9.0 ms, waited for {name} (1 late ticks)"
+
+
+def test_the_slowest_node_counts_from_when_it_had_its_inputs() -> None:
+    made = watch()
+    made.released(10, 20 * MS)
+    made.delivered(10, 24 * MS)
+    made.part(10, "n1", 25 * MS)
+    made.part(10, "n2", 30 * MS)
+    made.committed(11, 8 * MS, 20 * MS, 30 * MS)
+    assert made.late == "n2", "6 ms after the 4 ms of the vHub"
+
+
+def test_what_the_supervisor_was_busy_counts_for_nobody_else() -> None:
+    made = watch()
+    made.released(10, 20 * MS)
+    made.took(20 * MS, 28 * MS)
+    made.delivered(10, 28 * MS)
+    made.part(10, "n1", 29 * MS)
+    made.part(10, "n2", 29 * MS)
+    made.committed(11, 7 * MS, 20 * MS, 29 * MS)
+    assert made.late == SUPERVISOR
+
+
+def test_waiting_for_the_clock_is_nobodys_fault() -> None:
+    made = watch()
+    made.released(10, 40 * MS)
+    made.delivered(10, 21 * MS)
+    made.part(10, "n1", 44 * MS)
+    made.part(10, "n2", 41 * MS)
+    made.committed(11, 2 * MS, 40 * MS, 44 * MS)
+    assert made.late == "n1"
+
+
+def test_the_watch_keeps_a_few_ticks_only() -> None:
+    made = watch()
+    for tick in range(10, 1000):
+        made.released(tick, tick * T)
+        made.delivered(tick, tick * T)
+        made.part(tick, "n1", tick * T)
+        made.told(told(DONE_OF + "player-red", tick))
+        made.committed(tick + 1, 0, tick * T, tick * T)
+    sizes = [len(made._released), len(made._delivered), len(made._parts), len(made._committed), len(made._told)]
+    assert max(sizes) <= 18
+
+
+# --- what the vHub measures ------------------------------------------------------------------------------------------
+
+
+def closed(commit_ms: int, samples_ms: int, done_ms: int, busy_ms: int = 0, least_ms: int = 1) -> str:
+    waits = Waits()
+    waits.node, waits.client = "n2", "player-red"
+    waits.begin(commit_ms * MS)
+    waits.begin((commit_ms + 1) * MS)
+    waits.close_world(samples_ms * MS)
+    waits.took(samples_ms * MS, (samples_ms + busy_ms) * MS)
+    return waits.close(done_ms * MS, least_ms * MS)
+
+
+def test_the_vhub_names_whom_it_waited_for_longest() -> None:
+    assert closed(10, 15, 18) == "samples of n2"
+    assert closed(10, 12, 18) == "Done of player-red"
+    assert closed(10, 10, 10) == ""
+    assert closed(10, 12, 15, least_ms=4) == "", "less than what matters"
+
+
+def test_what_the_vhub_was_busy_itself_counts_for_nobody() -> None:
+    assert closed(10, 10, 20, busy_ms=10) == ""
+    assert closed(10, 10, 20, busy_ms=3, least_ms=7) == "Done of player-red"
+
+
+def test_words_of_the_vhub_are_read_as_they_are_written() -> None:
+    assert _names(DONE_OF + "a, b") == ["a", "b"]
+    assert _names(SAMPLES_OF + "n2") == ["n2"] and _names(JOIN_OF + "player-red") == ["player-red"]
+    assert _names("commit") == _names("") == _names("epoch") == []
