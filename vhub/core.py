@@ -406,7 +406,7 @@ class HubCore:
         if join.period and not may_lockstep(self.state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
         known = self.state.members.get(join.name)
-        if known is not None and known.active and known.period == join.period:
+        if known is not None and known.active and known.period == join.period and join.name not in self._leaves:
             self._repeated += 1
             return
         self.sessions.join(join)
@@ -423,13 +423,14 @@ class HubCore:
 
     def _on_done(self, done: Done, payload: bytes, now_ns: int) -> None:
         session = self._session(done)
-        if session is None or self._world is None or done.tick != session.go_tick:
+        if session is None:
+            return
+        if self._world is None or done.name not in self._world.waited or done.tick != session.go_tick:
             self._repeated += 1
             return
-        if done.name in self._world.waited:
-            self._world.waited.remove(done.name)
-            session.done = done
-            self.waits.client = done.name
+        self._world.waited.remove(done.name)
+        session.done = done
+        self.waits.client = done.name
 
     def _on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
         """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""

@@ -7,7 +7,7 @@ of wall time 0 that late commits do not spoil. Neighbours: `core` says what is r
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from foosim.vhub.packet import Flight
@@ -37,9 +37,10 @@ class Releases:
         self._waiting: list[Release] = []
 
     def set_tempo(self, factor: float, paused: bool) -> None:
-        """Take a new pace: the anchor is learnt anew."""
+        """Take a new pace: the anchor is learnt anew, and what waited by the old one leaves at once."""
         if factor != self.factor or paused != self.paused:
             self._anchors.clear()
+            self._waiting = [replace(release, at_ns=0) for release in self._waiting]
         self.factor = factor
         self.paused = paused
 
@@ -52,11 +53,11 @@ class Releases:
             self._anchors.popleft()
 
     def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
-        """Take what a closed tick releases to a client."""
-        at_ns = now_ns
+        """Take what a closed tick releases to a client: never before what it was released earlier."""
+        at_ns = max([now_ns, *(release.at_ns for release in self._waiting if release.client == client)])
         if self.factor and self._anchors:
             anchor_ns = min(anchor for _, anchor in self._anchors)
-            at_ns = max(now_ns, anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor))
+            at_ns = max(at_ns, anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor))
         self._waiting.append(Release(at_ns, client, number, tick, flights))
         self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
 

@@ -1,0 +1,439 @@
+"""The clients' side of the vHub: who is let in, stop and wait in lockstep, what free-running clients send."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import pytest
+
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, decode_any, encode
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.messages import (
+    Build,
+    ClientHello,
+    ClientRefusal,
+    ClientWelcome,
+    Commit,
+    Deliveries,
+    Done,
+    Down,
+    End,
+    Epoch,
+    Go,
+    Heartbeat,
+    Join,
+    Ready,
+    Samples,
+    Sent,
+    Subscription,
+    Tempo,
+    Up,
+)
+from foosim.protocol.start import initial_frame
+from foosim.vhub.core import HubCore
+from foosim.vhub.sessions import Sessions, may_lockstep
+from foosim.vhub.state import HubState, Joining
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+SETS: Final = (
+    "players={}",
+    "network.links=[]",
+    "clients={ear: {}, eye: {}, hand: {lockstep: true, rate: 100 Hz}, knee: {lockstep: true, rate: 50 Hz}}",
+    *(f"robots.{line}.sensors.encoder.rate=10 Hz" for line in ("red.goal", "red.defence", "red.midfield")),
+)
+TEXT: Final = apply_sets(TABLE.read_text(), TABLE.name, SETS)
+DEPLOYMENT: Final = load_deployment(TEXT, TABLE.name)
+FRAME: Final = initial_frame(DEPLOYMENT)
+MS: Final = 1_000_000
+PERIODS: Final = {"hand": 5, "knee": 10}
+HELLO: Final = ClientHello("ear", "boot-1", limits.PROTOCOL_VERSION, "", 0)
+BUILD: Final = Build("vhub", "boot", "run", "table.yaml", TEXT, "fast", [])
+
+
+class Hub:
+    """A vHub, its supervisor and nodes played by hand. `said` is what it published since the last look."""
+
+    def __init__(self) -> None:
+        self.core = HubCore("boot", bytes(32), 0)
+        self.now_ns = 0
+        self.say(channels.BUILD, "vhub", BUILD)
+
+    def say(self, channel: Channel, name: str, message: msgspec.Struct | bytes) -> None:
+        payload = message if isinstance(message, bytes) else encode(message)
+        self.core.receive(channel, name, payload, self.now_ns)
+        self.core.advance(self.now_ns)
+
+    def said(self, *kinds: Channel) -> list[Any]:
+        """Take what was published on these channels; all that was said is forgotten."""
+        actions = [action for action in self.core.actions if isinstance(action, Publish)]
+        self.core.actions.clear()
+        return [decode_any(a.channel.message, a.payload) for a in actions if a.channel in kinds]
+
+    def lines(self) -> list[str]:
+        return [action.text for action in self.core.actions if isinstance(action, Say)]
+
+    def enter(self, name: str, period: int | None = None, boot: str = "one", wanted: Sequence[str] = ()) -> None:
+        self.say(channels.CLIENT_HELLO, name, ClientHello(name, boot, limits.PROTOCOL_VERSION, "", 0))
+        heard = [Subscription(robot, "encoder") for robot in wanted]
+        self.say(channels.UP, name, Join(name, boot, PERIODS.get(name, 0) if period is None else period, heard))
+
+    def begin(self) -> Hub:
+        for name in PERIODS:
+            self.enter(name)
+        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], [], []))
+        return self
+
+    def commit(self, tick: int, last: bool = False) -> None:
+        frame = type(FRAME)(tick, FRAME.layout, FRAME.values)
+        self.say(channels.COMMIT, "vhub", Commit(1, tick, frame.digest, frame.values.tobytes(), [], [], last))
+        robots = [robot.name for robot in FRAME.layout.robots]
+        self.say(channels.SAMPLES, "n1", Samples(tick, frame.digest, "n1", robots, []))
+
+    def done(self, name: str, tick: int, *packets: Sent, boot: str = "one") -> None:
+        self.say(channels.UP, name, Done(name, boot, tick, list(packets)))
+
+    def close(self, tick: int) -> None:
+        self.commit(tick)
+        for name, period in PERIODS.items():
+            if tick % period == 0:
+                self.done(name, tick)
+
+    @property
+    def state(self) -> HubState:
+        assert self.core.state is not None
+        return self.core.state
+
+
+def sent(sequence: int, destination: str = "red.goal", payload: bytes = b"") -> Sent:
+    return Sent(sequence, destination, "echo", 0, payload)
+
+
+# --- who is let in ---------------------------------------------------------------------------------------------------
+
+
+def greeted(hello: ClientHello, state: HubState | None = None, sessions: Sessions | None = None) -> Any:
+    actions: list[Action] = []
+    sessions = sessions or Sessions("hub-boot", actions)
+    sessions._actions = actions
+    sessions.hello(hello, BUILD, DEPLOYMENT, state or HubState(DEPLOYMENT))
+    (action,) = actions
+    assert isinstance(action, Publish) and action.name == hello.name
+    return decode_any(action.channel.message, action.payload)
+
+
+REFUSED: Final[dict[str, tuple[dict[str, Any], str]]] = {
+    "version": ({"version": 7}, f"protocol version 7, this is {limits.PROTOCOL_VERSION}"),
+    "world": ({"world": "mars"}, "world mars, this is table"),
+    "name": ({"name": "eear"}, "no client eear is declared; declared are ear, eye, hand, knee, nearest is ear"),
+    "a robot's name": ({"name": "camera"}, "no client camera is declared; declared are ear, eye, hand, knee"),
+    "the vHub's name": ({"name": "vhub"}, "no client vhub is declared; declared are ear, eye, hand, knee"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_who_does_not_fit_is_refused_with_the_reason(what: str) -> None:
+    changes, reason = REFUSED[what]
+    hello = msgspec.structs.replace(HELLO, **changes)
+    assert greeted(hello) == ClientRefusal(hello.name, "boot-1", reason)
+
+
+def test_who_is_let_in_gets_the_deployment_and_its_numbers() -> None:
+    assert greeted(HELLO) == ClientWelcome("ear", "boot-1", "hub-boot", 0, 0, "table.yaml", TEXT)
+    state = HubState(DEPLOYMENT)
+    state.join(Joining("ear", 0, []), 0)
+    state.members["ear"].sequence, state.members["ear"].downlink = 17, 4
+    welcome = greeted(msgspec.structs.replace(HELLO, boot="boot-2"), state)
+    assert (welcome.sequence, welcome.downlink) == (17, 4), "who comes back goes on with its numbers"
+
+
+def test_a_name_is_taken_while_its_client_is_here() -> None:
+    sessions = Sessions("hub-boot", [])
+    first, again = greeted(HELLO, sessions=sessions), greeted(HELLO, sessions=sessions)
+    assert first == again and isinstance(first, ClientWelcome)
+    twin = msgspec.structs.replace(HELLO, boot="boot-2")
+    assert greeted(twin, sessions=sessions) == ClientRefusal("ear", "boot-2", "a client ear is already here")
+    assert sessions.by_name["ear"].boot == "boot-1"
+
+
+def test_only_declared_lockstep_clients_are_waited_for() -> None:
+    assert [name for name in ("ear", "eye", "hand", "knee", "stranger") if may_lockstep(DEPLOYMENT, name)] == [
+        "hand",
+        "knee",
+    ]
+    hub = Hub()
+    assert not hub.said(channels.READY) and hub.core.waiting_for == "join of hand, knee"
+    hub.enter("ear")
+    hub.enter("knee")
+    assert not hub.said(channels.READY) and hub.core.waiting_for == "join of hand"
+    hub.enter("hand")
+    (ready,) = hub.said(channels.READY)
+    assert isinstance(ready, Ready) and ready.layout == FRAME.layout.digest and hub.core.waiting_for == "epoch"
+
+
+@pytest.mark.parametrize("period", [1, 5, 2**62])
+def test_no_other_client_can_make_the_run_wait_for_it(period: int) -> None:
+    hub = Hub().begin()
+    hub.enter("ear", period)
+    assert hub.core.statistics().malformed == 1
+    assert "ear joins in lockstep, it is not declared so: the run would wait for it" in hub.lines()[-1]
+    for tick in range(12):
+        hub.close(tick)
+    assert hub.state.closed == 11 and "ear" not in hub.state.members
+
+
+def test_joins_take_effect_at_a_multiple_of_the_period() -> None:
+    sessions = Sessions("hub-boot", [])
+    for name, period in (("knee", 10), ("ear", 0), ("hand", 5)):
+        sessions.join(Join(name, "one", period, [Subscription("red.goal", "encoder")] * 2))
+    assert [joining.name for joining in sessions.take_joins(3)] == ["ear"]
+    assert [joining.name for joining in sessions.take_joins(4)] == []
+    assert [(j.name, j.subscriptions) for j in sessions.take_joins(5)] == [("hand", [("red.goal", "encoder")])]
+    assert [joining.name for joining in sessions.take_joins(20)] == ["knee"]
+
+
+# --- lockstep --------------------------------------------------------------------------------------------------------
+
+
+def test_go_follows_commit_and_samples_and_the_tick_waits_for_all_dones() -> None:
+    hub = Hub().begin()
+    hub.said()
+    frame = FRAME
+    hub.say(channels.COMMIT, "vhub", Commit(1, 0, frame.digest, frame.values.tobytes(), [], [], False))
+    assert not hub.said(channels.DOWN) and hub.core.waiting_for.startswith("samples of ")
+    hub.say(channels.SAMPLES, "n1", Samples(0, frame.digest, "n1", [r.name for r in frame.layout.robots], []))
+    assert [(go.number, go.tick) for go in hub.said(channels.DOWN)] == [(1, 0), (1, 0)]
+    assert hub.core.waiting_for == "Done of hand, knee" and hub.state.closed == -1
+    hub.done("knee", 0)
+    assert not hub.said(channels.DELIVERIES) and hub.core.waiting_for == "Done of hand"
+    hub.done("hand", 0, sent(1))
+    (deliveries,) = hub.said(channels.DELIVERIES)
+    assert deliveries.tick == 1 and [packet.source for packet in deliveries.packets] == ["hand"]
+
+
+def test_each_client_is_due_at_its_own_ticks() -> None:
+    hub = Hub().begin()
+    due: dict[int, int] = {}
+    for tick in range(21):
+        hub.said()
+        hub.commit(tick)
+        due[tick] = len([go for go in hub.said(channels.DOWN) if isinstance(go, Go)])
+        for name, period in PERIODS.items():
+            if tick % period == 0:
+                hub.done(name, tick)
+    assert [tick for tick, count in due.items() if count == 2] == [0, 10, 20]
+    assert [tick for tick, count in due.items() if count == 1] == [5, 15]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        Done("hand", "another boot", 0, [sent(1)]),
+        Done("hand", "one", 5, [sent(1)]),
+        Done("hand", "one", 1, [sent(1)]),
+        Done("ear", "one", 0, [sent(1)]),
+        Up("hand", "another boot", [sent(1)]),
+    ],
+)
+def test_what_is_no_answer_to_this_go_is_not_taken(wrong: Done | Up) -> None:
+    hub = Hub().begin()
+    hub.enter("ear")
+    hub.commit(0)
+    hub.said()
+    hub.say(channels.UP, wrong.name, wrong)
+    assert hub.core.waiting_for == "Done of hand, knee" and hub.core.statistics().repeated == 1
+    hub.done("knee", 0)
+    hub.done("hand", 0)
+    (deliveries,) = hub.said(channels.DELIVERIES)
+    assert deliveries.packets == [], "nothing of it counts"
+
+
+def test_a_done_that_is_said_again_counts_once() -> None:
+    hub = Hub().begin()
+    hub.commit(0)
+    hub.said()
+    hub.done("hand", 0, sent(1))
+    hub.done("hand", 0, sent(1), sent(2))
+    hub.done("knee", 0)
+    (deliveries,) = hub.said(channels.DELIVERIES)
+    assert [packet.sequence for packet in deliveries.packets] == [1] and hub.core.statistics().repeated == 1
+
+
+def test_a_go_is_said_again_with_doubling_waits_until_it_is_answered() -> None:
+    hub = Hub().begin()
+    hub.commit(0)
+    first = hub.said(channels.DOWN)
+    hub.done("knee", 0)
+    said_ms = []
+    for ms in range(0, 3500, 5):
+        hub.core.wake(ms * MS)
+        again = hub.said(channels.DOWN)
+        assert again in ([], [first[0]]), "the same bytes, to who has not answered"
+        said_ms += [ms] if again else []
+    assert said_ms == [20, 60, 140, 300, 620, 1260, 2260, 3260]
+    hub.done("hand", 0)
+    hub.core.wake(10_000 * MS)
+    assert not hub.said(channels.DOWN)
+
+
+@pytest.mark.parametrize(("pace", "allowed_ms"), [("fast", 10_000), ("realtime", 1_000), ("2x", 1_000)])
+def test_who_does_not_answer_within_its_deadline_is_lost(pace: str, allowed_ms: int) -> None:
+    hub = Hub().begin()
+    hub.say(channels.TEMPO, "supervisor", Tempo(pace, False))
+    hub.commit(0)
+    hub.done("knee", 0)
+    hub.said()
+    hub.core.wake((allowed_ms - 1) * MS)
+    assert not any(beat.lost for beat in hub.said(channels.HEARTBEAT))
+    hub.core.wake(allowed_ms * MS)
+    lost = [beat.lost for beat in hub.said(channels.HEARTBEAT) if beat.lost]
+    assert lost == ["hand: no Done of tick 0 within its deadline"]
+    hub.core.wake(2 * allowed_ms * MS)
+    assert {beat.lost for beat in hub.said(channels.HEARTBEAT)} == set(lost), "and stays so"
+
+
+def test_no_deadline_passes_while_the_run_is_paused() -> None:
+    hub = Hub().begin()
+    hub.say(channels.TEMPO, "supervisor", Tempo("realtime", True))
+    hub.commit(0)
+    for second in range(100):
+        hub.core.wake(second * 1000 * MS)
+    assert hub.core.lost == ""
+    hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
+    hub.core.wake(99_900 * MS)
+    assert hub.core.lost == ""
+    hub.core.wake(101_000 * MS)
+    assert hub.core.lost.startswith("hand: no Done of tick 0")
+
+
+def test_a_lockstep_client_that_goes_is_lost_and_nothing_breaks() -> None:
+    for tick_waits in (True, False):
+        hub = Hub().begin()
+        if tick_waits:
+            hub.commit(0)
+        else:
+            hub.close(0)
+        hub.core.client_gone("hand", 0)
+        beat = hub.said(channels.HEARTBEAT)[-1]
+        assert isinstance(beat, Heartbeat) and beat.lost == "hand: its connection closed"
+        hub.core.wake(5_000 * MS)
+        assert hub.core.deadline_ns() > 5_000 * MS
+
+
+# --- free-running ----------------------------------------------------------------------------------------------------
+
+
+def test_packets_are_judged_in_the_order_of_their_numbers_whatever_the_order_of_arrival() -> None:
+    hub = Hub().begin()
+    hub.enter("ear")
+    hub.enter("eye")
+    hub.close(0)
+    hub.said()
+    hub.say(channels.UP, "eye", Up("eye", "one", [sent(2), sent(1)]))
+    hub.say(channels.UP, "ear", Up("ear", "one", [sent(5)]))
+    hub.say(channels.UP, "ear", Up("ear", "one", [sent(3), sent(4)]))
+    hub.close(1)
+    (deliveries,) = hub.said(channels.DELIVERIES)
+    assert [(packet.source, packet.sequence) for packet in deliveries.packets] == [
+        ("ear", 3), ("ear", 4), ("ear", 5), ("eye", 1), ("eye", 2),
+    ]  # fmt: skip
+
+
+def test_repeats_strangers_and_packets_to_nobody_are_refused_and_counted() -> None:
+    hub = Hub().begin()
+    hub.enter("ear")
+    hub.say(channels.CLIENT_HELLO, "eye", ClientHello("eye", "one", limits.PROTOCOL_VERSION, "", 0))
+    hub.close(0)
+    hub.say(channels.UP, "ear", Up("ear", "one", [sent(1), sent(1), sent(2, "nobody"), sent(3, "eye")]))
+    hub.say(channels.UP, "ear", Up("ear", "one", [sent(2)]))
+    hub.say(channels.UP, "eye", Up("eye", "one", [sent(1)]))
+    hub.say(channels.UP, "stranger", Up("stranger", "one", [sent(1)]))
+    hub.say(channels.UP, "ear", b"\xc1")
+    hub.say(channels.UP, "ear", Up("eye", "one", [sent(9)]))
+    hub.close(1)
+    assert hub.state.refusals == {"duplicate": 2, "no_route": 1, "unknown_source": 1, "malformed": 2}
+    assert (hub.state.packets.offered, hub.state.packets.refused) == (2, 6)
+
+
+def test_a_full_inbox_refuses_and_counts() -> None:
+    hub = Hub().begin()
+    hub.enter("ear")
+    hub.close(0)
+    for first in (0, 40_000):
+        hub.say(channels.UP, "ear", Up("ear", "one", [sent(first + number) for number in range(1, 40_001)]))
+    hub.close(1)
+    assert hub.state.refusals == {"inbox_full": 40_000} and hub.state.packets.offered == 40_000
+
+
+def test_what_a_client_sent_before_it_went_is_still_judged() -> None:
+    hub = Hub().begin()
+    hub.enter("ear", wanted=["red.goal"])
+    hub.close(0)
+    hub.said()
+    hub.say(channels.UP, "ear", Up("ear", "one", [sent(1), sent(2)]))
+    hub.core.client_gone("ear", 0)
+    hub.enter("ear", boot="two")
+    hub.say(channels.UP, "ear", Up("ear", "two", [sent(2), sent(3)]))
+    hub.close(1)
+    (deliveries,) = hub.said(channels.DELIVERIES)
+    assert [packet.sequence for packet in deliveries.packets] == [1, 2, 3]
+    assert hub.state.refusals == {"duplicate": 1} and hub.state.members["ear"].active
+
+
+def presence(hub: Hub) -> tuple[bool, int]:
+    """Whether `ear` takes part, and how many channels it hears."""
+    member = hub.state.members["ear"]
+    return member.active, len(member.subscriptions)
+
+
+def test_a_client_that_leaves_hears_nothing_more_and_may_come_back() -> None:
+    hub = Hub().begin()
+    hub.enter("ear", wanted=["red.goal"])
+    hub.close(0)
+    hub.core.client_gone("ear", 0)
+    assert presence(hub) == (True, 1)
+    hub.close(1)
+    assert presence(hub) == (False, 0)
+    hub.said()
+    hub.enter("ear", boot="two", wanted=["red.goal"])
+    (welcome,) = hub.said(channels.CLIENT_WELCOME)
+    assert welcome.boot == "two"
+    hub.close(2)
+    assert presence(hub) == (True, 1) and hub.state.members["ear"].joined_tick == 2
+
+
+def test_the_end_is_said_to_everyone_with_the_next_number() -> None:
+    hub = Hub().begin()
+    hub.enter("ear")
+    for tick in range(6):
+        hub.close(tick)
+    hub.commit(6, last=True)
+    hub.said()
+    hub.say(channels.END, "supervisor", End(6, "enough", False))
+    said = [action for action in hub.core.actions if isinstance(action, Publish) and action.channel is channels.DOWN]
+    downs = {action.name: decode_any(action.channel.message, action.payload) for action in said}
+    assert set(downs) == {"ear", "hand", "knee"}
+    assert all(isinstance(down, Down) and down.ended and down.tick == 6 for down in downs.values())
+    assert (downs["hand"].number, downs["knee"].number, downs["ear"].number) == (3, 2, 1)
+
+
+def test_a_commit_whose_frame_is_another_is_refused_and_the_right_one_counts() -> None:
+    hub = Hub().begin()
+    values = bytearray(FRAME.values.tobytes())
+    values[40] ^= 1
+    hub.say(channels.COMMIT, "vhub", Commit(1, 0, FRAME.digest, bytes(values), [], [], False))
+    assert hub.core.statistics().malformed == 1 and hub.core.waiting_for == "commit"
+    hub.close(0)
+    assert hub.state.closed == 0
+
+
+def test_deliveries_zero_are_empty_and_said_with_the_first_epoch() -> None:
+    hub = Hub()
+    hub.said()
+    hub.begin()
+    assert [decode(Deliveries, encode(said)) for said in hub.said(channels.DELIVERIES)] == [Deliveries(0, [])]
