@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from foosim.protocol.names import LINE_NAMES, TEAMS
 from foosim.protocol.units import parse_pace
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor import control
@@ -194,7 +195,8 @@ def assert_the_world_changes_as_asked(house: House, asked: Control, tick: int) -
 def test_a_wrong_name_is_refused_with_the_nearest_one(house: House) -> None:
     house.up()
     house.ticking()
-    refused = (3, "", "no robot 'red.gaol', nearest is red.goal\n")
+    robots = ", ".join(sorted(["camera", *(f"{team}.{line}" for team in TEAMS for line in LINE_NAMES)]))
+    refused = (3, "", f"no robot 'red.gaol'; there are {robots}, nearest is red.goal\n")
     assert house.run("foosim-supervisor", "move", "red.gaol", "blue") == refused
     code, _, err = house.run("foosim-supervisor", "status", "--run", "tabel")
     assert code == 1 and "no run 'tabel'" in err
@@ -214,7 +216,7 @@ def test_a_node_that_does_not_fit_is_refused_and_costs_the_run_nothing(house: Ho
     code, err = node("red")
     assert code == 3 and "refused by the supervisor: a node red is already here" in err
     code, err = node("rde")
-    assert code == 3 and "no node rde is declared; declared are blue, red, nearest is red" in err
+    assert code == 3 and "no node 'rde' is declared; declared are blue, red, nearest is red" in err
     code, err = node("red", "--world", "chess")
     assert code == 3 and "world chess, this is table" in err
     version_2 = "from foosim.protocol import limits; limits.PROTOCOL_VERSION = 2"
