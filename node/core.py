@@ -122,7 +122,7 @@ class NodeCore:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self.member.refuse(payload)
+                self._repeated += not self.member.refuse(payload)
                 return
             reader = self._readers.get(channel.name)
             if reader is None:
@@ -393,10 +393,12 @@ class NodeCore:
     # --- epochs, layouts, start and end ------------------------------------------------------------------------------
 
     def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
-        if self.member.take_build(build):
-            self.deployment, layout = self.member.deployment, self.member.layout
-            assert layout is not None
-            self.member.want_layout(layout)
+        if not self.member.take_build(build):
+            self._repeated += 1
+            return
+        self.deployment, layout = self.member.deployment, self.member.layout
+        assert layout is not None
+        self.member.want_layout(layout)
 
     def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
         if self.deployment is not None:
@@ -410,7 +412,7 @@ class NodeCore:
         if epoch.epoch <= self.epoch or self.deployment is None or self.name not in epoch.roster:
             self._repeated += 1
             return
-        self._check_epoch(epoch)
+        self.member.check_epoch(epoch)
         self.epoch = epoch.epoch
         self.roster = tuple(sorted(epoch.roster))
         self.owners = dict(epoch.owners)
@@ -430,16 +432,6 @@ class NodeCore:
             message = encode(Want(self.name, channels.COMMIT.name, epoch.tick, epoch.epoch))
             self.actions.append(Publish(channels.WANT, self.name, message))
             self._patience.progress(self.deployment.tick_ns, now_ns)
-
-    def _check_epoch(self, epoch: Epoch) -> None:
-        """Every robot has one owner, who takes part; the added entities make a layout."""
-        assert self.deployment is not None
-        owners = dict(epoch.owners)
-        if len(owners) != len(epoch.owners) or owners.keys() != self.deployment.robots.keys():
-            raise Malformed(f"epoch {epoch.epoch}: owners of {len(epoch.owners)} robots, not of each robot once")
-        if not set(owners.values()) <= set(epoch.roster) or len(set(epoch.roster)) != len(epoch.roster):
-            raise Malformed(f"epoch {epoch.epoch}: a roster of {', '.join(epoch.roster)} without every owner once")
-        self._layout_with(epoch.added)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         """The frame that the epoch starts from, when mine is not there or not the same."""

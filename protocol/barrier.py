@@ -111,6 +111,17 @@ class Barrier:
             raise BadParts(f"part {part.tick} of {part.node}: {error}", [part.node]) from None
         self.parts[part.node] = part
 
+    def add_all(self, parts: Iterable[Part]) -> None:
+        """Take parts of several nodes, or raise one `BadParts` for all that do not fit."""
+        bad: list[BadParts] = []
+        for part in parts:
+            try:
+                self.add(part)
+            except BadParts as error:
+                bad.append(error)
+        if bad:
+            raise BadParts("; ".join(map(str, bad)), [node for error in bad for node in error.nodes])
+
     def _check(self, part: Part) -> None:
         if part.node not in self.roster:
             raise Malformed(f"the roster is {', '.join(self.roster)}")

@@ -16,7 +16,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Build, Heartbeat, Hello, Ready, Refusal
+from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Refusal
 
 AGAIN_NS: Final = 200_000_000
 
@@ -69,12 +69,24 @@ class Member:
         self._world = deployment.world
         return True
 
-    def refuse(self, payload: bytes) -> None:
-        """Take a refusal that is meant for this boot."""
+    def refuse(self, payload: bytes) -> bool:
+        """Take a refusal; False when it is meant for another boot."""
         refusal = decode(Refusal, payload)
-        if refusal.boot == self.boot:
-            self.refusal = refusal.reason
-            self._actions.append(Say("error", f"refused by the supervisor: {refusal.reason}"))
+        if refusal.boot != self.boot:
+            return False
+        self.refusal = refusal.reason
+        self._actions.append(Say("error", f"refused by the supervisor: {refusal.reason}"))
+        return True
+
+    def check_epoch(self, epoch: Epoch) -> None:
+        """Raise `Malformed` unless every robot has one owner, who takes part, and the added entities make a layout."""
+        assert self.deployment is not None
+        owners, roster = dict(epoch.owners), set(epoch.roster)
+        if len(owners) != len(epoch.owners) or owners.keys() != self.deployment.robots.keys():
+            raise Malformed(f"epoch {epoch.epoch}: owners of {len(epoch.owners)} robots, not of each robot once")
+        if not set(owners.values()) <= roster or len(roster) != len(epoch.roster):
+            raise Malformed(f"epoch {epoch.epoch}: a roster of {', '.join(epoch.roster)} without every owner once")
+        build_layout(self.deployment, [(entity.name, entity.model) for entity in epoch.added])
 
     def want_layout(self, layout: Layout) -> None:
         """Ask the shell for what this layout needs (a node: an engine)."""

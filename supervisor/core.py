@@ -299,8 +299,7 @@ class SupervisorCore:
                 self.finish(f"node {part.node} has diverged: its part {part.tick} has another basis", failed=True)
                 return False
         try:
-            for part in parts:
-                barrier.add(part)
+            barrier.add_all(parts)
             frame = barrier.assemble()
         except BadParts as bad:
             self._refused += len(bad.nodes)
@@ -455,7 +454,7 @@ class SupervisorCore:
             self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
             if heartbeat.sender == channels.VHUB:
                 self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
-        if heartbeat.lost and self.end is None:
+        if heartbeat.lost and heartbeat.sender == channels.VHUB and self.end is None:
             self.finish(f"lost {heartbeat.lost}", failed=True)
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:

@@ -171,5 +171,5 @@ def _names(waiting_for: str) -> list[str]:
     """Return the names in what a heartbeat of the vHub says that it waits for."""
     for what in (DONE_OF, SAMPLES_OF, JOIN_OF):
         if waiting_for.startswith(what):
-            return waiting_for.removeprefix(what).split(", ")
+            return [name for name in waiting_for.removeprefix(what).split(", ") if name]
     return []

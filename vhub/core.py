@@ -121,7 +121,7 @@ class HubCore:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self.member.refuse(payload)
+                self._repeated += not self.member.refuse(payload)
                 return
             message = channels.read(channel, name, payload)
             reader = self._readers.get(type(message))
@@ -208,7 +208,7 @@ class HubCore:
             return "commit"
         _, commit, frame = self._commits[tick]
         robots = missing_robots((s for _, s in self._samples.get(tick, ())), commit.digest, frame)
-        return SAMPLES_OF + ", ".join(sorted({self._owners.get(robot, robot) for robot in robots}))
+        return "end" if commit.last else SAMPLES_OF + ", ".join(sorted({self._owners[robot] for robot in robots}))
 
     @property
     def is_between_ticks(self) -> bool:
@@ -328,6 +328,7 @@ class HubCore:
 
     def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
+            self._repeated += 1
             return
         deployment = self.deployment = self.member.deployment
         assert deployment is not None
@@ -348,6 +349,7 @@ class HubCore:
         if epoch.epoch <= self._epoch or self.state is None:
             self._repeated += 1
             return
+        self.member.check_epoch(epoch)
         first = self._epoch == 0
         self._epoch, self._epoch_tick = epoch.epoch, epoch.tick
         self._owners = dict(epoch.owners)

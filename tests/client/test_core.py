@@ -100,7 +100,8 @@ class Air:
         return core
 
     def start(self) -> None:
-        self.tell(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], [], [])))
+        owners = [(robot, "n1") for robot in DEPLOYMENT.robots]
+        self.tell(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [])))
 
     def close(self) -> None:
         """Give the hub one more tick: its frame and, at every fifth, one packet of the red goalkeeper."""

@@ -130,7 +130,8 @@ class Driver:
         for name, player in self.deployment.players.items():
             wanted = [Subscription(robot, heard) for robot, names in player.robots.items() for heard in names]
             self.join(name, self.deployment.ticks(player.rate_hz), wanted)
-        self.say(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], [], [])))
+        owners = [(robot, "n1") for robot in self.deployment.robots]
+        self.say(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [])))
 
     def join(self, name: str, period: int, wanted: list[Subscription], boot: str = "one") -> None:
         hello = ClientHello(name, boot, limits.PROTOCOL_VERSION, "", 0)

@@ -50,6 +50,7 @@ SETS: Final = (
 TEXT: Final = apply_sets(TABLE.read_text(), TABLE.name, SETS)
 DEPLOYMENT: Final = load_deployment(TEXT, TABLE.name)
 FRAME: Final = initial_frame(DEPLOYMENT)
+OWNERS: Final = [(robot, "n1") for robot in DEPLOYMENT.robots]
 MS: Final = 1_000_000
 PERIODS: Final = {"hand": 5, "knee": 10}
 HELLO: Final = ClientHello("ear", "boot-1", limits.PROTOCOL_VERSION, "", 0)
@@ -86,7 +87,7 @@ class Hub:
     def begin(self) -> Hub:
         for name in PERIODS:
             self.enter(name)
-        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], [], []))
+        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, []))
         return self
 
     def commit(self, tick: int, last: bool = False) -> None:

@@ -1,0 +1,316 @@
+"""Law 7: no input from outside ends a process or corrupts a run; it is refused and counted, and nothing is lost.
+
+On every channel of the table, to every process of a rehearsal, at random ticks: bytes that are no message, and messages
+that lie about their sender, epoch, tick or contents. The frames are those of the undisturbed run.
+`test_forged_law` has what looks true to the last field.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Sequence
+from struct import pack
+from typing import TYPE_CHECKING, Any, Final
+
+import msgspec
+import pytest
+from msgspec.structs import replace
+
+from foosim.client.core import ClientCore
+from foosim.protocol import channels, limits
+from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
+from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.errors import Malformed
+from foosim.protocol.messages import (
+    AddedEntity,
+    Build,
+    ClientHello,
+    ClientWelcome,
+    Commit,
+    Delivered,
+    Deliveries,
+    Done,
+    Edit,
+    Epoch,
+    Farewell,
+    Go,
+    Heartbeat,
+    Hello,
+    Join,
+    Order,
+    Part,
+    Prepare,
+    Push,
+    Ready,
+    Refusal,
+    Request,
+    RobotPacket,
+    Samples,
+    Sent,
+    Tempo,
+    Up,
+    Want,
+)
+from foosim.protocol.units import Pace
+from foosim.rehearsal.rehearse import with_nodes
+from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.core import RunSettings
+
+if TYPE_CHECKING:
+    from tests.laws.conftest import Disturbed
+
+NOBODY: Final = "nobody"
+REFUSED: Final = ("refused", "malformed")
+FAR: Final = 10_000
+"""A tick that nobody has reached."""
+COMMAND: Final = pack("<2d", 0.1, 1.0)
+Lie = tuple[str, Channel, str, msgspec.Struct]
+"""Who hears it, the channel, the name in the key, and what is said."""
+
+
+# --- bytes that are no message ---------------------------------------------------------------------------------------
+
+
+def mutated(rng: random.Random, raw: bytes) -> bytes:
+    """A message with some bytes flipped, put in or taken out; or cut, or with a tail."""
+    content = bytearray(raw)
+    for _ in range(rng.choice((1, 1, 2, 5))):
+        at = rng.randrange(len(content) + 1)
+        kind = rng.randrange(6)
+        if kind < 2 and at < len(content):
+            content[at] ^= 1 << rng.randrange(8)
+        elif kind == 2:
+            content[at : at + rng.randrange(4)] = b""
+        elif kind == 3:
+            content[at:at] = rng.randbytes(rng.randrange(1, 4))
+        elif kind == 4:
+            del content[at:]
+        else:
+            content += rng.randbytes(rng.randrange(1, 9))
+    return bytes(content)
+
+
+def no_message(rng: random.Random, channel: Channel, known: Sequence[bytes]) -> bytes:
+    """Random bytes, or a mutated message of this channel, that nobody can read as one of its messages."""
+    while True:
+        payload = mutated(rng, rng.choice(known)) if known and rng.random() < 0.7 else rng.randbytes(rng.randrange(60))
+        try:
+            decode(channel.message, payload, channel.bytes_max)
+        except Malformed:
+            return payload
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bytes_that_are_no_message_are_refused_counted_and_change_nothing(disturbed: Disturbed, seed: int) -> None:
+    rng = random.Random(seed)
+    _, said = disturbed.undisturbed()
+    expected: Counter[str] = Counter()
+    at_door = 0
+    takes_part = [*disturbed.hearers(channels.PART, ""), VHUB, "player-blue", "player-red"]
+    for channel in CHANNELS:
+        for name in (*takes_part, NOBODY):
+            for _ in range(4):
+                payload = no_message(rng, channel, said.get(channel.plane.name + channel.name, ()))
+                tick = rng.randrange(disturbed.ticks - 20)
+                disturbed.at(tick, lambda c=channel, n=name, p=payload: disturbed.put(c, n, p))  # type: ignore[misc]
+                hearers = disturbed.hearers(channel, name)
+                expected.update(hearers)
+                at_door += channel.plane is Plane.RADIO and VHUB in hearers and tick > 0
+    assert set(expected) == set(takes_part) and min(expected.values()) >= 12
+    disturbed.assert_untouched(disturbed.go())
+    assert disturbed.malformed() == expected
+    assert disturbed.system.hub.state is not None
+    assert disturbed.system.hub.state.refusals == {"malformed": at_door}, "what came before the build has no account"
+
+
+def test_a_flood_is_refused_to_the_last_message(disturbed: Disturbed) -> None:
+    def flood() -> None:
+        for channel in CHANNELS:
+            for name in (*disturbed.system.processes, NOBODY):
+                for _ in range(100):
+                    disturbed.put(channel, name, b"\xc1")
+
+    disturbed.at(30, flood)
+    disturbed.assert_untouched(disturbed.go())
+    assert min(disturbed.malformed().values()) >= 300
+
+
+# --- messages that lie -----------------------------------------------------------------------------------------------
+
+
+def lies_to_nodes(system: System) -> list[Lie]:
+    core = system.supervisor
+    tick, epoch, frame = core.frame.tick, core.epoch, core.frame
+    part = Part(epoch, tick + 1, "n2", bytes(32), [], b"", b"", [])
+    push: list[Edit] = [Push("ball", (1.0, 0.0, 0.0))]
+    owners = sorted(core.owners.items())
+    new = Epoch(epoch + 9, tick, frame.digest, ["n1", "n2"], owners, [])
+    said: list[tuple[Channel, str, msgspec.Struct]] = [
+        (channels.PART, "n2", replace(part, node="n1")),
+        (channels.PART, "n2", replace(part, epoch=0)),
+        (channels.PART, "n2", replace(part, tick=FAR)),
+        (channels.PART, "n2", replace(part, tick=max(0, tick - 3))),
+        (channels.PART, NOBODY, replace(part, node=NOBODY)),
+        (channels.ORDER, SUPERVISOR, Order(0, tick, push)),
+        (channels.ORDER, SUPERVISOR, Order(epoch, FAR, push)),
+        (channels.ORDER, SUPERVISOR, Order(epoch + 7, tick + 1, push)),
+        (channels.DELIVERIES, VHUB, Deliveries(FAR, [])),
+        (channels.EPOCH, SUPERVISOR, replace(new, epoch=0)),
+        (channels.EPOCH, SUPERVISOR, replace(new, owners=owners[1:])),
+        (channels.EPOCH, SUPERVISOR, replace(new, owners=[*owners, owners[0]])),
+        (channels.EPOCH, SUPERVISOR, replace(new, owners=[(robot, NOBODY) for robot, _ in owners])),
+        (channels.EPOCH, SUPERVISOR, replace(new, roster=["n1", "n1", "n2"])),
+        (channels.EPOCH, SUPERVISOR, replace(new, added=[AddedEntity("dragon", "dragon")])),
+        (channels.PREPARE, SUPERVISOR, Prepare([AddedEntity("red.goal", "ball")])),
+        (channels.BUILD, "n1", Build("n1", "other", "run", "t", "", "fast", [])),
+        (channels.REFUSAL, "n1", Refusal("n1", "other", "go away")),
+        (channels.COMMIT, "n1", Commit(epoch, tick, frame.digest, frame.values.tobytes(), [], [], True)),
+    ]
+    if tick > 3:
+        packet = Delivered(0, "x", 1, 0, "red.goal", "position", COMMAND)
+        said += [
+            (channels.ORDER, SUPERVISOR, Order(epoch, tick - 3, push)),
+            (channels.DELIVERIES, VHUB, Deliveries(tick - 3, [packet])),
+        ]
+    return [("n1", *lie) for lie in said]
+
+
+def lies_to_the_hub(system: System) -> list[Lie]:
+    core = system.supervisor
+    tick, epoch, frame = core.frame.tick, core.epoch, core.frame
+    commit = Commit(epoch, FAR, frame.digest, frame.values.tobytes(), [], [], True)
+    sample = RobotPacket("camera", 0, "", "ball", b"lie")
+    samples = Samples(tick + 1, bytes(32), "n1", list(core.owners), [sample])
+    command = Sent(10**9, "red.goal", "position", 0, COMMAND)
+    said: list[tuple[Channel, str, msgspec.Struct]] = [
+        (channels.COMMIT, VHUB, commit),
+        (channels.COMMIT, VHUB, replace(commit, tick=max(0, tick - 3))),
+        (channels.COMMIT, VHUB, replace(commit, tick=tick + 1)),
+        (channels.SAMPLES, "n1", replace(samples, node="n2")),
+        (channels.SAMPLES, "n1", samples),
+        (channels.SAMPLES, "n1", replace(samples, tick=FAR)),
+        (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], [])),
+        (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], [])),
+        (channels.TEMPO, SUPERVISOR, Tempo("1e999x", False)),
+        (channels.BUILD, VHUB, Build(VHUB, "other", "run", "t", "", "fast", [])),
+        (channels.REFUSAL, VHUB, Refusal(VHUB, "other", "go away")),
+        (channels.CLIENT_HELLO, "player-red", ClientHello("player-red", "other", limits.PROTOCOL_VERSION, "", 0)),
+        (channels.CLIENT_HELLO, NOBODY, ClientHello(NOBODY, "other", 99, "", 0)),
+        (channels.UP, "player-red", Up("player-red", "other", [command])),
+        (channels.UP, "player-red", Done("player-red", "other", tick, [command])),
+        (channels.UP, "player-red", Join("player-red", "other", 1, [])),
+        (channels.UP, "player-blue", Up("player-red", "boot", [command])),
+        (channels.UP, "player-red", Done("player-red", "boot", FAR, [command])),
+        (channels.UP, NOBODY, Up(NOBODY, "boot", [command])),
+    ]
+    return [(VHUB, *lie) for lie in said]
+
+
+def lies_to_the_supervisor(system: System) -> list[Lie]:
+    tick, epoch = system.supervisor.frame.tick, system.supervisor.epoch
+    part = Part(epoch, tick + 1, "n1", bytes(32), [], b"", b"", [])
+    hello = Hello("node", "n1", "other", limits.PROTOCOL_VERSION, "", bytes(32))
+    beat = Heartbeat("n1", FAR, FAR, "", "player-red", float("nan"), b"{}")
+    asked: tuple[tuple[str, dict[str, Any]], ...] = (
+        ("push", {"impulse": [10**400, 0, 0]}),
+        ("add", {"position": "x"}),
+        ("dragon", {}),
+    )
+    said: list[tuple[Channel, str, msgspec.Struct]] = [
+        (channels.PART, "n1", replace(part, epoch=0)),
+        (channels.PART, "n1", replace(part, tick=FAR)),
+        (channels.PART, "n1", replace(part, node="n2")),
+        (channels.PART, NOBODY, replace(part, node=NOBODY)),
+        (channels.DELIVERIES, VHUB, Deliveries(FAR, [])),
+        (channels.HELLO, "n1", hello),
+        (channels.HELLO, "n1", replace(hello, name="n2")),
+        (channels.HELLO, NOBODY, replace(hello, name=NOBODY)),
+        (channels.HELLO, "n1", replace(hello, role="dragon", boot="boot")),
+        (channels.READY, "n1", Ready("n1", "other", bytes(32), bytes(32))),
+        (channels.HEARTBEAT, "n1", replace(beat, report=b"{")),
+        (channels.HEARTBEAT, "n1", beat),
+        (channels.HEARTBEAT, NOBODY, replace(beat, sender=NOBODY)),
+        (channels.FAREWELL, NOBODY, Farewell(NOBODY, b"{}")),
+        (channels.FAREWELL, "n1", Farewell("n2", b"{}")),
+        (channels.REQUEST, NOBODY, Request("operator", "x", "down", b"{}")),
+        *((channels.REQUEST, NOBODY, Request(NOBODY, verb, verb, encode_json(given))) for verb, given in asked),
+    ]
+    if tick > 3:
+        said += [(channels.DELIVERIES, VHUB, Deliveries(tick - 3, []))]
+    return [(SUPERVISOR, *lie) for lie in said]
+
+
+def lies(system: System) -> list[Lie]:
+    """Well-formed messages that are not what they say, as they would be at the present tick."""
+    stranger = Want(NOBODY, "dragon", FAR, FAR)
+    welcome = ClientWelcome("player-red", "other", "hub", 0, 0, "t", "")
+    return [
+        *lies_to_nodes(system),
+        *lies_to_the_hub(system),
+        *lies_to_the_supervisor(system),
+        *((who, channels.WANT, NOBODY, stranger) for who in ("n1", VHUB, SUPERVISOR)),
+        *((who, channels.WANT, NOBODY, replace(stranger, sender="n1")) for who in ("n1", VHUB, SUPERVISOR)),
+        ("player-red", channels.CLIENT_WELCOME, "player-red", welcome),
+        ("player-red", channels.DOWN, "player-red", Go(0, FAR, 0, [])),
+    ]
+
+
+def test_lies_are_told_on_every_channel_that_somebody_reads(disturbed: Disturbed) -> None:
+    text = with_nodes(disturbed.text, disturbed.name, 2, disturbed.sets)
+    told = lies(System(RunSettings("run", disturbed.name, text, Pace("fast")), Settings()))
+    assert all(who in disturbed.hearers(channel, name) for who, channel, name, _ in told)
+    untold = set(CHANNELS) - {channel for _, channel, _, _ in told}
+    assert untold == {channels.ANSWER, channels.END, channels.CLIENT_REFUSAL}, "an end is an end"
+
+
+@pytest.mark.parametrize("tick", [0, 1, 35, 60])
+def test_messages_that_lie_change_nothing(disturbed: Disturbed, tick: int) -> None:
+    def tell() -> None:
+        for _, channel, name, message in lies(disturbed.system):
+            disturbed.put(channel, name, message)
+
+    disturbed.at(tick, tell)
+    disturbed.assert_untouched(disturbed.go())
+
+
+SILENT: Final = {channels.WANT, channels.SAMPLES, channels.HEARTBEAT, channels.FAREWELL}
+"""Of these some are taken and lead to nothing: a want of what nobody has, samples of another frame."""
+
+
+def test_each_lie_is_counted_or_answered_by_who_hears_it(disturbed: Disturbed) -> None:
+    """Told to the core itself, one at a time, at a tick in the middle."""
+    uncounted: list[Lie] = []
+
+    def account(core: Any) -> int:
+        numbers = core.statistics()
+        return sum(getattr(numbers, field, 0) for field in (*REFUSED, "repeated", "held"))
+
+    def tell() -> None:
+        for lie in lies(disturbed.system):
+            who, channel, name, message = lie
+            core = disturbed.system.processes[who].core
+            before, actions = account(core), len(core.actions)
+            core.receive(channel, name, encode(message), disturbed.system.bus.now_ns)
+            if account(core) == before and len(core.actions) == actions:
+                uncounted.append(lie)
+            del core.actions[actions:]
+
+    disturbed.at(40, tell)
+    disturbed.go()
+    assert [lie for lie in uncounted if lie[1] not in SILENT] == []
+    assert len(uncounted) <= 8, uncounted
+
+
+def test_a_client_refuses_what_it_did_not_ask_for(disturbed: Disturbed) -> None:
+    core = ClientCore("player-red", "boot", 0)
+    welcome = ClientWelcome("player-blue", "boot", "hub", 0, 0, disturbed.name, disturbed.text)
+    told: list[tuple[Channel, str, msgspec.Struct]] = [
+        (channels.DOWN, "player-red", Go(1, 0, 0, [])),
+        (channels.DOWN, "player-blue", Go(1, 0, 0, [])),
+        (channels.CLIENT_WELCOME, "player-red", welcome),
+        (channels.UP, "player-red", Up("player-red", "boot", [])),
+    ]
+    for channel, name, message in told:
+        core.receive(channel, name, encode(message), 0)
+    assert core.statistics().malformed == len(told) and core.go is None and core.welcome is None
