@@ -8,6 +8,7 @@ Neighbours: the node's `sensors` and `actuators` are the other side of the same 
 from __future__ import annotations
 
 import struct
+import sys
 from collections.abc import Mapping
 from math import isfinite
 from typing import Any, Final, NamedTuple
@@ -19,6 +20,7 @@ from foosim.protocol.names import CHANNEL_ECHO, CHANNEL_POSITION
 
 ANGLE_RAD_MAX: Final = 1000.0
 """The greatest angle that a rod's actuator takes."""
+FLOAT_MAX: Final = sys.float_info.max
 
 
 class RodPosition(NamedTuple):
@@ -74,21 +76,23 @@ def decode_payload(kind: str, payload: bytes) -> Value:
     if len(payload) != packed.size:
         raise Malformed(f"{len(payload)} bytes, {kind} has {packed.size}")
     numbers = packed.unpack(payload)
-    if not isfinite(sum(numbers)):
+    if not all(map(isfinite, numbers)):
         raise Malformed(f"{kind} with numbers that are not finite")
     value: Value = make(*numbers)
     return value
 
 
 def encode_payload(kind: str, value: Value) -> bytes:
-    """Return the payload of a value; raises BadValue for a number that is not finite."""
+    """Return the payload of a value; raises BadValue for what is no number or not finite."""
     if kind == CHANNEL_ECHO:
         assert isinstance(value, bytes), f"echo carries bytes, not {type(value).__name__}"
         return value
     packed, make = _NUMBERS[kind]
     assert isinstance(value, make), f"{kind} carries {make.__name__}, not {type(value).__name__}"
     for field, number in zip(make._fields, value, strict=True):
-        if not isfinite(number):
+        if not isinstance(number, int | float):
+            raise BadValue(f"{kind}.{field} is not a number", number)
+        if not abs(number) <= FLOAT_MAX:
             raise BadValue(f"{kind}.{field} is not finite", number)
     return packed.pack(*value)
 

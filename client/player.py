@@ -168,8 +168,10 @@ class PlayerLoop:
             commands = self._player.act(tick, self.newest.samples)
         except Exception as error:
             raise PlayerError(f"{where}: act failed: {_describe(error)}") from error
+        if not isinstance(commands, Mapping):
+            raise PlayerError(f"{where}: act gave a {type(commands).__name__}, not a mapping from robots to Commands")
         packets = []
-        for robot, command in sorted(commands.items()):
+        for robot, command in sorted(commands.items(), key=_by_name):
             if robot not in declared.robots:
                 raise PlayerError(f"{where}: {UnknownName('not one of its robots', robot, declared.robots)}")
             if not isinstance(command, Command):
@@ -180,6 +182,11 @@ class PlayerLoop:
                 raise PlayerError(f"{where}: {error}") from error
             packets.append(Outgoing(robot, CHANNEL_POSITION, payload))
         return packets
+
+
+def _by_name(item: tuple[object, object]) -> str:
+    """Orders what a player gave, also when it is no name."""
+    return str(item[0])
 
 
 def _describe(error: Exception) -> str:

@@ -46,8 +46,8 @@ from foosim.protocol.messages import (
 from foosim.protocol.patience import Patience
 from foosim.protocol.start import initial_frame
 
-FRAMES_KEPT: Final = 4
-"""A node is at most two ticks ahead of commit: an epoch's frame is among its last few."""
+FRAMES_KEPT: Final = limits.RELEASE_AHEAD + 2
+"""A node is no further ahead of commit than it has orders: an epoch's frame is among these."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,8 +340,11 @@ class NodeCore:
         ):
             self._repeated += 1
             return
-        self._check_near(deliveries.tick)
+        self._check_near(deliveries.last)
         self._deliveries[deliveries.tick] = (payload, deliveries)
+        for tick in range(deliveries.tick + 1, deliveries.last + 1):
+            empty = Deliveries(tick, [])
+            self._deliveries.setdefault(tick, (encode(empty), empty))
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
         if self._fenced(channels.PART, part, payload):

@@ -100,10 +100,19 @@ class Delivered(Item, frozen=True):
 
 
 class Deliveries(Message, frozen=True):
-    """The packets that reach robots at `tick`, in (due, source, sequence, copy) order. Final when published."""
+    """The packets that reach robots at `tick`, in (due, source, sequence, copy) order. Final when published.
+
+    At the `following` ticks none do, and that is final, too.
+    """
 
     tick: Counter
     packets: Annotated[list[Delivered], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+    following: Annotated[int, Meta(ge=0, le=limits.KEPT_TICKS)] = 0
+
+    @property
+    def last(self) -> int:
+        """The last tick that it is about."""
+        return self.tick + self.following
 
 
 class RobotPacket(Item, frozen=True):

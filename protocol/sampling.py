@@ -1,14 +1,19 @@
 """At which ticks robots have something to send: a pure function of deployment and frame.
 
 At a tick at which no sensor is due and no outbox holds anything, every node's samples are empty, and everybody knows:
-they are neither sent nor waited for. At 100 Hz and ticks of 2 ms that spares four messages of five on this way.
-Neighbours: `node.core` senses, `vhub.core` waits.
+they are neither sent nor waited for. At 100 Hz and ticks of 2 ms that spares four messages of five on this way. Where
+a sample is not due and no packet fills an outbox the vHub also knows it before the frame is there.
+Neighbours: `node.core` senses, `vhub.core` waits, `vhub.state` looks ahead.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
+from foosim.protocol.messages import Delivered
+from foosim.protocol.names import CHANNEL_ECHO
 
 
 class Sampling:
@@ -18,7 +23,15 @@ class Sampling:
         rates = {sensor.rate_hz for robot in deployment.robots.values() for sensor in robot.sensors.values()}
         self.periods = tuple(sorted(deployment.ticks(rate) for rate in rates))
 
+    def is_due(self, tick: int) -> bool:
+        """Whether some sensor samples at a tick."""
+        return not all(tick % period for period in self.periods)
+
     def is_silent(self, frame: Frame) -> bool:
         """Whether no robot sends anything at the frame's tick."""
-        tick = frame.tick
-        return not frame.outboxes and all(tick % period for period in self.periods)
+        return not frame.outboxes and not self.is_due(frame.tick)
+
+
+def are_answered(packets: Iterable[Delivered]) -> bool:
+    """Whether robots put something into their outboxes for one of these packets."""
+    return any(packet.channel == CHANNEL_ECHO for packet in packets)

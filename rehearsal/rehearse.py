@@ -19,7 +19,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.core import RunSettings
+from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import result
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.records import Closing

@@ -24,7 +24,8 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
-from foosim.supervisor.core import RunSettings, SupervisorCore
+from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.plan import RunSettings
 from foosim.vhub.core import HubCore, Keep
 from foosim.vhub.records import Closing
 

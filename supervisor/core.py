@@ -8,7 +8,6 @@ nodes' parts together. It journals, then speaks. A committed tick never changes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 from foosim.protocol import channels, limits
@@ -43,9 +42,9 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.start import initial_frame
-from foosim.protocol.units import Pace
 from foosim.supervisor.account import Account
 from foosim.supervisor.pacing import Pacer
+from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import HeadRecord, RunRecord
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
@@ -58,17 +57,6 @@ GONE_NS: Final = 500_000_000
 """How long what a process said last may take after the news that it is gone: the two come by different ways."""
 PREPARE_NS: Final = 200_000_000
 """How often a layout that nodes have not built yet is asked for again."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunSettings:
-    """What a supervisor is started with. `ticks` ends the run; 0 is until it is asked to end."""
-
-    run: str
-    deployment_name: str
-    deployment_text: str
-    pace: Pace
-    ticks: int = 0
 
 
 class SupervisorCore:
@@ -100,6 +88,8 @@ class SupervisorCore:
         self._epoch_payload = b""
         self._orders: dict[int, list[Edit]] = {}
         self._deliveries: dict[int, bytes] = {}
+        self._delivered = 0
+        """The last tick whose deliveries are here."""
         self._parts: dict[int, list[Part]] = {}
         self._commits: dict[int, bytes] = {}
         self._prepare_ns = now_ns
@@ -162,8 +152,14 @@ class SupervisorCore:
 
     @property
     def lacking(self) -> tuple[Channel, int]:
-        """The channel, and how many messages of it, without which the next commit cannot be made."""
-        missing = len(self.members) - len(self._parts.get(self.frame.tick + 1, ()))
+        """The channel, and how many messages of it, without which there is nothing to commit.
+
+        Commits wait for each other as long as nodes can go on without them, less a tick for what a commit takes.
+        """
+        tick = self.frame.tick
+        reach = min(self.released, self._delivered + 1)
+        ticks = range(tick + 1, max(tick + 2, reach))
+        missing = sum(len(self.members) - len(self._parts.get(ahead, ())) for ahead in ticks)
         return (channels.PART, missing) if missing > 0 else (channels.DELIVERIES, 1)
 
     def deadline_ns(self, now_ns: int) -> int:
@@ -474,10 +470,14 @@ class SupervisorCore:
         if deliveries.tick in self._deliveries or deliveries.tick < self.frame.tick:
             self._repeated += 1
             return
-        if deliveries.tick > self.frame.tick + limits.KEPT_TICKS:
-            raise Malformed(f"deliveries of tick {deliveries.tick}, the last commit is {self.frame.tick}")
+        if deliveries.last > self.frame.tick + limits.KEPT_TICKS:
+            raise Malformed(f"deliveries of tick {deliveries.last}, the last commit is {self.frame.tick}")
         self._deliveries[deliveries.tick] = payload
-        self.watch.delivered(deliveries.tick, now_ns)
+        self._delivered = max(self._delivered, deliveries.last)
+        for tick in range(deliveries.tick + 1, deliveries.last + 1):
+            self._deliveries.setdefault(tick, encode(Deliveries(tick, [])))
+        for tick in range(deliveries.tick, deliveries.last + 1):
+            self.watch.delivered(tick, now_ns)
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
         if want.kind == channels.ORDER.name and want.tick in self._orders and want.epoch == self.epoch:

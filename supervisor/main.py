@@ -21,8 +21,8 @@ from foosim.protocol.journal import Journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.process import Stop, die_with_parent, start_log
 from foosim.protocol.session import Session
-from foosim.supervisor.core import RunSettings, SupervisorCore
-from foosim.supervisor.plan import Plan
+from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.run_folder import RunFolder, RunInfo
 from foosim.supervisor.status import result
 

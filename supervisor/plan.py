@@ -1,4 +1,4 @@
-"""What a run is asked for, and the same checked: the plan, made before anything is started.
+"""What a run is asked for, and the same checked, before anything is started.
 
 Neighbours: `up` and `main` carry it out, `cli` reads the options from a command line.
 """
@@ -41,6 +41,17 @@ class RunOptions:
         for setting in self.sets:
             given += ["--set", setting]
         return given
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """What a supervisor is started with. `ticks` ends the run; 0 is until it is asked to end."""
+
+    run: str
+    deployment_name: str
+    deployment_text: str
+    pace: Pace
+    ticks: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,9 @@ from foosim.supervisor.plan import Plan
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
 
 POLL_S: Final = 0.02
+"""How often a run that starts is looked at."""
+WATCH_S: Final = 0.1
+"""How often one that runs is: what it takes is taken from the run."""
 END_S: Final = 20.0
 """How long a run that is ending may take before its processes are stopped: the vHub has a capture to close."""
 LEAVE_S: Final = 1.0
@@ -158,7 +161,7 @@ class Up:
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self.display.every_s
                     self._show(control)
-                time.sleep(POLL_S)
+                time.sleep(WATCH_S)
 
     def _show(self, control: Control) -> None:
         try:

@@ -34,7 +34,7 @@ METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 DEPLOYMENT: Final = "deployment.yaml"
 VERSIONS: Final = "versions.json"
-GATHER_S: Final = 0.004
+GATHER_S: Final = 0.02
 """How long the writer lets closings gather: it wakes once for several, instead of taking the interpreter at each."""
 BATCH_ROWS: Final = 2_000
 """How many rows are written between two looks at the clock."""

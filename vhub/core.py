@@ -36,7 +36,6 @@ from foosim.protocol.messages import (
     Heartbeat,
     Join,
     Samples,
-    Sent,
     Tempo,
     Up,
     Want,
@@ -48,7 +47,7 @@ from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record
 from foosim.vhub.release import Releases
 from foosim.vhub.report import HubStatistics, report, statistics
 from foosim.vhub.sessions import Session, Sessions, may_lockstep
-from foosim.vhub.state import HubState, received
+from foosim.vhub.state import HubState, Joining, received
 from foosim.vhub.waits import Waits
 
 
@@ -96,8 +95,6 @@ class HubCore:
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
         self._leaves: list[str] = []
-        self._left_behind: dict[str, list[Sent]] = {}
-        """What clients had sent before they went."""
         self._patience = Patience(now_ns)
         self._end_ns = 0
         self._malformed = self._repeated = 0
@@ -178,9 +175,7 @@ class HubCore:
         if member is not None and member.period > 0:
             self._lose(name, "its connection closed")  # its session stays: a tick may be waiting for it
             return
-        session = self.sessions.by_name.pop(name)
-        self.sessions.joins.pop(name, None)
-        self._left_behind.setdefault(name, []).extend(session.inbox)
+        self.sessions.leave(name)
         if name in self.state.members:
             self._leaves.append(name)
 
@@ -189,9 +184,15 @@ class HubCore:
 
     @property
     def lacking(self) -> tuple[Channel, int]:
-        """The channel without which the closing of the tick cannot go on (Dones come on the other plane)."""
-        world = self._world is None and self.state is not None and self.state.closed + 1 in self._commits
-        return channels.SAMPLES if world else channels.COMMIT, 1
+        """The channel, and how many messages of it, without which no tick is closed (Dones come on the other plane).
+
+        Where deliveries are final nobody waits for a closing: those ticks are closed together.
+        """
+        if self.state is None:
+            return channels.COMMIT, 1
+        if self._world is None and self.state.closed + 1 in self._commits:
+            return channels.SAMPLES, 1
+        return channels.COMMIT, max(1, self.state.final - self._next_commit)
 
     @property
     def waiting_for(self) -> str:
@@ -230,8 +231,11 @@ class HubCore:
         if packets is None or commit.last:
             return False
         self.waits.close_world(now_ns)
-        leaves, self._leaves = self._leaves, []
-        joins = self.sessions.take_joins(tick)
+        leaves: list[str] = []
+        joins: list[Joining] = []
+        if state.hears_clients:
+            leaves, self._leaves = self._leaves, leaves
+            joins = self.sessions.take_joins(tick)
         for name in leaves:
             state.leave(name)
         for joining in joins:
@@ -266,25 +270,20 @@ class HubCore:
             return False
         tick = world.frame.tick
         self._tell_of_waits(now_ns)
-        admitted, self._left_behind = self._left_behind, {}
-        for name, session in self.sessions.by_name.items():
-            packets = session.inbox
-            session.inbox = []
-            if session.done is not None:
-                packets = [*packets, *session.done.packets]
-                session.done = None
-            if packets:
-                admitted[name] = admitted.get(name, []) + packets
+        admitted = self.sessions.take_sent() if state.hears_clients else {}
         samples = self._samples.pop(tick, [])
-        deliveries = Deliveries(tick + 1, state.close_clients(world.frame, admitted, world.closing.fates))
+        deliveries = state.close_clients(world.frame, admitted, world.closing.fates)
         payload = encode(deliveries)
         for name in world.free:
             state.members[name].downlink += 1
         record = tick_record(world.closing, self._commits[tick][0], samples, admitted, state, payload)
         self.actions.append(Journal(record))
-        self._sent[tick + 1] = payload
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
-        self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
+        if not state.was_final:
+            self._sent[tick + 1] = payload
+            for following in range(tick + 2, state.final + 1):
+                self._sent[following] = encode(Deliveries(following, []))
+            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
         assert self.releases is not None
         for name, flights in world.free.items():
             self.releases.add(name, state.members[name].downlink, tick, flights, now_ns)

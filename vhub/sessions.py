@@ -64,6 +64,8 @@ class Sessions:
         self.by_name: dict[str, Session] = {}
         self.joins: dict[str, Joining] = {}
         """Joins that wait for a tick, by client."""
+        self._left_behind: dict[str, list[Sent]] = {}
+        """What clients had sent before they went."""
         self._hub_boot = hub_boot
         self._actions = actions
 
@@ -118,6 +120,24 @@ class Sessions:
         """Take the joins that take effect at `tick`, in name order."""
         due = [name for name, j in sorted(self.joins.items()) if j.period == 0 or tick % j.period == 0]
         return [self.joins.pop(name) for name in due]
+
+    def leave(self, name: str) -> None:
+        """Forget a client's process; what it sent stays."""
+        session = self.by_name.pop(name)
+        self.joins.pop(name, None)
+        self._left_behind.setdefault(name, []).extend(session.inbox)
+
+    def take_sent(self) -> dict[str, list[Sent]]:
+        """Take what clients have sent since the last call, by client."""
+        taken, self._left_behind = self._left_behind, {}
+        for name, session in self.by_name.items():
+            packets, session.inbox = session.inbox, []
+            if session.done is not None:
+                packets = [*packets, *session.done.packets]
+                session.done = None
+            if packets:
+                taken[name] = taken.get(name, []) + packets
+        return taken
 
     def say_go(self, session: Session, number: int, tick: int, packets: Sequence[Received], acknowledged: int) -> None:
         """Give a lockstep client its tick."""

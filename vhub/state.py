@@ -17,8 +17,8 @@ import msgspec
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Delivered, Received, RobotPacket, Sent
-from foosim.protocol.sampling import Sampling
+from foosim.protocol.messages import Delivered, Deliveries, Received, RobotPacket, Sent
+from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.jitter import gamma_quantiles_ns
 from foosim.vhub.links import Link, LinkState
 from foosim.vhub.packet import Flight
@@ -84,6 +84,10 @@ class HubState:
         self.links: dict[tuple[str, str], Link] = {}
         self.deliveries: dict[int, list[Delivered]] = {-1: [], 0: []}
         """What reaches robots at the last closed tick and at the next one."""
+        self.final = 0
+        """The last tick whose deliveries are final. Behind the next one they are without packets."""
+        self.was_final = False
+        """Whether the deliveries of the next tick were final before the last closing."""
         self.at_door: dict[str, int] = {}
         """Refusals since the last closing by cause, of what never got as far as the state: counted by the next one."""
         self.refused_at_door: list[tuple[str, int]] = []
@@ -145,7 +149,7 @@ class HubState:
 
     def close_clients(
         self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]
-    ) -> list[Delivered]:
+    ) -> Deliveries:
         """Phase two: judge what clients sent, in (source, sequence) order. Return the deliveries of the next tick."""
         tick = frame.tick
         sent_ns = tick * self.tick_ns
@@ -162,7 +166,41 @@ class HubState:
         self.closed = tick
         deliveries = self._arrive_at_robots(tick + 1, frame, fates)
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
-        return deliveries
+        self.was_final = tick < self.final
+        if self.was_final:
+            assert not deliveries, f"deliveries {tick + 1} were final without packets"
+            return Deliveries(tick + 1, [])
+        following = self._following(tick)
+        self.final = tick + 1 + following
+        return Deliveries(tick + 1, deliveries, following)
+
+    @property
+    def hears_clients(self) -> bool:
+        """Whether the closing of the next tick takes joins, leaves and what clients sent.
+
+        Not where the deliveries behind that tick are final already. No lockstep client is due then, and while a
+        free-running one is here it does not happen: it is for those who come and go that this waits.
+        """
+        return self.closed + 1 >= self.final
+
+    def _following(self, tick: int) -> int:
+        """Return for how many ticks behind the next one it is certain that nothing reaches robots.
+
+        That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
+        filled, no lockstep client is due, and no other is here.
+        """
+        members = [member for member in self.members.values() if member.active]
+        if any(member.period == 0 for member in members):
+            return 0
+        if are_answered(self.deliveries[tick]) or are_answered(self.deliveries[tick + 1]):
+            return 0
+        for following in range(limits.RELEASE_AHEAD):
+            sent, arrival = tick + 1 + following, tick + 2 + following
+            if self.sampling.is_due(sent) or any(member.is_due(sent) for member in members):
+                return following
+            if any(flight.destination in self._robots for flight in self._flights.get(arrival, ())):
+                return following
+        return limits.RELEASE_AHEAD
 
     def _admit(self, source: str, sent: Sent) -> bool:
         """Refuse at the door what is no packet of this run: a repeat, or to nobody."""
@@ -294,6 +332,7 @@ class HubState:
                     for pair, s in sorted((pair, link.state) for pair, link in self.links.items())
                 ],
                 "deliveries": sorted(self.deliveries.items()),
+                "final": [self.final, self.was_final],
                 "flights": [_pack(flight) for flight in self.in_flight()],
             }
         )
@@ -312,6 +351,7 @@ class HubState:
             link = Link(source, destination, deployment.network, deployment.seed, LinkState(*values))
             state.links[source, destination] = link
         state.deliveries = {tick: msgspec.convert(packets, list[Delivered]) for tick, packets in content["deliveries"]}
+        state.final, state.was_final = content["final"]
         for packed in content["flights"]:
             flight = _unpack(packed)
             state._flights.setdefault(flight.arrival_tick, []).append(flight)

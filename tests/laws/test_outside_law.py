@@ -55,7 +55,7 @@ from foosim.protocol.messages import (
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.core import RunSettings
+from foosim.supervisor.plan import RunSettings
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
@@ -22,6 +23,7 @@ from foosim.rehearsal.system import Settings
 from foosim.supervisor.core import SupervisorCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import HubRecord, TickRecord
+from foosim.vhub.state import HubState
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS = 200
@@ -113,8 +115,18 @@ def two_solvers(trace: Sequence[Traced], entities: int) -> list[str]:
 
 def test_the_system_writes_before_it_speaks() -> None:
     trace = trace_of(moves=True)
-    assert sum(traced.channel == channels.DELIVERIES.name and traced.what == "publish" for traced in trace) >= TICKS
+    said = [traced for traced in trace if traced.channel == channels.DELIVERIES.name and traced.what == "publish"]
+    deliveries = [decode(Deliveries, traced.payload) for traced in said]
+    ticks = [tick for each in deliveries for tick in range(each.tick, each.last + 1)]
+    assert ticks[: TICKS + 1] == list(range(TICKS + 1)) and len(deliveries) < TICKS, "each once, some together"
     assert spoken_before_written(trace) == []
+
+
+def test_deliveries_that_are_final_early_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    early = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, ["engine=pure"]).digests
+    monkeypatch.setattr(HubState, "_following", lambda state, tick: 0)
+    assert rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, ["engine=pure"]).digests == early
+    assert len(early) == TICKS
 
 
 class _HastyHub(HubCore):

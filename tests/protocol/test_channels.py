@@ -16,7 +16,8 @@ from foosim.protocol import channels, limits
 from foosim.protocol.channels import CHANNELS, Channel, Plane
 from foosim.protocol.loop import channel_of
 from foosim.protocol.units import Pace
-from foosim.supervisor.core import RunSettings, SupervisorCore
+from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.plan import RunSettings
 from foosim.vhub.core import HubCore
 
 ROOT: Final = Path(__file__).parents[2]

@@ -8,8 +8,9 @@ import pytest
 
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.units import parse_pace
-from foosim.supervisor.core import RunSettings, SupervisorCore
+from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.display import LINKS_SHOWN_MAX, Display, plain_line, render_text
+from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import status
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"

@@ -10,7 +10,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.core import RunSettings
+from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import History, fold
 
 TEXT = apply_sets(

@@ -17,7 +17,8 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Build, Epoch, Hello, Ready, Refusal
 from foosim.protocol.units import Pace
-from foosim.supervisor.core import RunSettings, SupervisorCore
+from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.roster import Roster
 from foosim.vhub.core import HubCore
 

@@ -18,7 +18,7 @@ from foosim.protocol.messages import DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat, Re
 from foosim.protocol.units import Pace, parse_pace
 from foosim.rehearsal.rehearse import rehearse, with_nodes
 from foosim.rehearsal.system import IDLE_NS_MAX, OPERATOR, Settings, System
-from foosim.supervisor.core import RunSettings
+from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.status import status
 from foosim.supervisor.watch import Watch, _names

@@ -404,8 +404,10 @@ def test_a_client_that_leaves_hears_nothing_more_and_may_come_back() -> None:
     hub.enter("ear", boot="two", wanted=["red.goal"])
     (welcome,) = hub.said(channels.CLIENT_WELCOME)
     assert welcome.boot == "two"
-    hub.close(2)
-    assert presence(hub) == (True, 1) and hub.state.members["ear"].joined_tick == 2
+    for tick in range(2, hub.state.final + 1):
+        assert presence(hub) == (False, 0), "the deliveries behind this tick are final"
+        hub.close(tick)
+    assert presence(hub) == (True, 1) and hub.state.members["ear"].joined_tick == hub.state.closed
 
 
 def test_the_end_is_said_to_everyone_with_the_next_number() -> None:
