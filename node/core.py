@@ -8,9 +8,9 @@ else in the system sees committed frames only. Neighbours: `step` (the pure part
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -45,9 +45,6 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.start import initial_frame
-
-FRAMES_KEPT: Final = limits.RELEASE_AHEAD + 2
-"""A node is no further ahead of commit than it has orders: an epoch's frame is among these."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +93,8 @@ class NodeCore:
         self._deliveries: dict[int, tuple[bytes, Deliveries]] = {}
         self._parts: dict[int, list[Part]] = {}
         self._sent_parts: dict[int, bytes] = {}
-        self._sent_samples: dict[int, bytes] = {}
+        self._unsampled: set[int] = set()
+        """Ticks at which samples are wanted of frames that are not here."""
         self._held: list[tuple[Channel, str, bytes]] = []
         self._counters: list[int] = []
         self._barrier: Barrier | None = None
@@ -237,11 +235,14 @@ class NodeCore:
         if term.stepper.sampling.is_silent(frame):
             self._counters = []
             return
-        packets, self._counters = term.stepper.sense(frame, term.mine)
-        samples = Samples(frame.tick, frame.digest, self.name, [robot.name for robot in term.mine], packets)
-        payload = encode(samples)
-        self._sent_samples[frame.tick] = payload
-        self.actions.append(Publish(channels.SAMPLES, self.name, payload))
+        self._counters = self._say_samples(frame, term.mine)
+
+    def _say_samples(self, frame: Frame, robots: Sequence[Entity]) -> list[int]:
+        """Say what these robots send at a frame; return the counters of the sensors that sampled."""
+        packets, counters = self.stepper(frame.layout).sense(frame, robots)
+        samples = Samples(frame.tick, frame.digest, self.name, [robot.name for robot in robots], packets)
+        self.actions.append(Publish(channels.SAMPLES, self.name, encode(samples)))
+        return counters
 
     def _begin(self) -> bool:
         """Steps 2 to 4: with order and deliveries, edit the frame and hand my share to the engine."""
@@ -305,9 +306,9 @@ class NodeCore:
         assert self.deployment is not None
         self._patience.progress(self.deployment.tick_ns, now_ns)
         self._history[frame.tick] = frame
-        self._history.pop(frame.tick - FRAMES_KEPT, None)
+        self._history.pop(frame.tick - limits.KEPT_TICKS, None)
         old = frame.tick - limits.KEPT_TICKS
-        for kept in (self._orders, self._deliveries, self._sent_parts, self._sent_samples):
+        for kept in (self._orders, self._deliveries, self._sent_parts):
             kept.pop(old, None)
 
     # --- messages of the tick ----------------------------------------------------------------------------------------
@@ -372,9 +373,18 @@ class NodeCore:
             if sent is not None:
                 self.actions.append(Publish(channels.PART, self.name, sent))
         elif want.kind == channels.SAMPLES.name:
-            sent = self._sent_samples.get(want.tick)
-            if sent is not None:
-                self.actions.append(Publish(channels.SAMPLES, self.name, sent))
+            self._sample_again(want.tick)
+
+    def _sample_again(self, tick: int) -> None:
+        """Say what my robots, also those that I had not at that tick, send at a frame; ask for one that I had not."""
+        frame = self._history.get(tick)
+        if frame is not None:
+            mine = [robot for robot in frame.layout.robots if self.owners.get(robot.name) == self.name]
+            self._say_samples(frame, mine)
+        elif self.frame is not None and tick < self.frame.tick and len(self._unsampled) < limits.KEPT_TICKS:
+            self._unsampled.add(tick)
+            message = encode(Want(self.name, channels.COMMIT.name, tick, self.epoch))
+            self.actions.append(Publish(channels.WANT, self.name, message))
 
     def _ask_again(self, now_ns: int) -> None:
         """Ask for whatever the current tick lacks, the wait doubling."""
@@ -412,10 +422,13 @@ class NodeCore:
         return build_layout(self.deployment, [(entity.name, entity.model) for entity in added])
 
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
-        if epoch.epoch <= self.epoch or self.deployment is None or self.name not in epoch.roster:
+        if epoch.epoch <= self.epoch or self.deployment is None:
             self._repeated += 1
             return
         self.member.check_epoch(epoch)
+        if self.name not in epoch.roster:
+            self._begin_anew(epoch)
+            return
         self.epoch = epoch.epoch
         self.roster = tuple(sorted(epoch.roster))
         self.owners = dict(epoch.owners)
@@ -436,8 +449,22 @@ class NodeCore:
             self.actions.append(Publish(channels.WANT, self.name, message))
             self._patience.progress(self.deployment.tick_ns, now_ns)
 
+    def _begin_anew(self, epoch: Epoch) -> None:
+        """Others go on without this node: nothing of what it computes counts, so it comes back as a newcomer."""
+        if self.epoch == 0:
+            return  # it has not been in yet
+        self.actions.append(Say("warning", f"epoch {epoch.epoch} is without this node, which asks to take part again"))
+        self.epoch = epoch.epoch
+        self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
+        for kept in (self._history, self._orders, self._parts, self._sent_parts, self._held):
+            kept.clear()
+        self.member.begin_anew()
+
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
-        """The frame that the epoch starts from, when mine is not there or not the same."""
+        """The frame that the epoch starts from, when mine is not there or not the same; or one to sample."""
+        if commit.tick in self._unsampled:
+            self._take_old_frame(commit)
+            return
         epoch = self._awaited_epoch
         if epoch is None or commit.tick != epoch.tick or commit.digest != epoch.digest:
             self._repeated += 1
@@ -446,6 +473,18 @@ class NodeCore:
         if frame.digest != epoch.digest:
             raise Malformed(f"commit {commit.tick} whose frame has another digest")
         self._resume(frame, now_ns)
+
+    def _take_old_frame(self, commit: Commit) -> None:
+        """A frame to sample, of any layout that there has been."""
+        for stepper in self._steppers.values():
+            if 8 * stepper.layout.size == len(commit.values):
+                frame = frame_from_bytes(commit.tick, stepper.layout, commit.values, commit.outboxes)
+                if frame.digest == commit.digest:
+                    self._unsampled.discard(commit.tick)
+                    self._history[commit.tick] = frame
+                    self._sample_again(commit.tick)
+                    return
+        raise Malformed(f"commit {commit.tick} whose frame has another digest in every layout")
 
     def _resume(self, frame: Frame, now_ns: int) -> None:
         """Go on from the epoch's frame with the epoch's roster and owners, and with what was held for it."""

@@ -85,9 +85,10 @@ Robot = Annotated[RodRobot | CameraRobot, Field(discriminator="model")]
 
 
 class NodeSpec(Part):
-    """A process that computes: the robots that it owns at the start, and who starts it."""
+    """A process that computes: the robots that it owns at the start, who starts it, whether the run needs it."""
 
     launch: Literal["local", "manual"] = "local"
+    required: bool = False
     robots: list[RobotName] = Field(max_length=limits.ENTITIES_MAX)
 
 
@@ -196,6 +197,7 @@ class Deployment(Part):
     engine: Literal["bullet", "pure"]
     pace: PaceField
     mixed_cpu: bool = False
+    on_node_loss: Literal["adopt", "stop"] = "adopt"
     table: Table
     robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)

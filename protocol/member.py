@@ -51,6 +51,8 @@ class Member:
         self._world = world
         self._actions = actions
         self._said_ready: Layout | None = None
+        self._built: set[bytes] = set()
+        """Digests of the layouts that were said to be ready."""
         self._entered = False
         self._heartbeat_ns = now_ns
 
@@ -92,19 +94,26 @@ class Member:
         """Ask the shell for what this layout needs (a node: an engine)."""
         if all(layout.digest != wanted.digest for wanted in self.layouts):
             self.layouts.append(layout)
-        elif self.is_ready:
+        elif layout.digest in self._built:
             self.ready(layout)
 
     def ready(self, layout: Layout) -> None:
         """Say that this layout is built."""
         self.is_ready = True
         self._said_ready = layout
+        self._built.add(layout.digest)
         ready = Ready(self.name, self.boot, layout.digest, self.simulation or self._fingerprint)
         self._actions.append(Publish(channels.READY, self.name, encode(ready)))
 
     def entered(self) -> None:
         """An epoch with this process in it has begun: nothing is to be said again."""
         self._entered = True
+
+    def begin_anew(self) -> None:
+        """The run goes on without this process: come back by the handshake. What is built stays."""
+        self.build = self.layout = self._said_ready = None
+        self.is_ready = self._entered = False
+        self.deadline_ns = 0
 
     def wake(self, now_ns: int, heartbeat: Callable[[], Heartbeat]) -> None:
         """Say hello or ready again and the heartbeat, each when it is due."""

@@ -57,7 +57,9 @@ class Bus:
     def subscribe(self, process: str, reads: Iterable[tuple[Channel, bool]]) -> None:
         """Let a process read channels: all that comes on them, or only what is addressed to it."""
         for channel, own in reads:
-            self._readers.setdefault((channel.name, channel.plane.name + (process if own else "")), []).append(process)
+            readers = self._readers.setdefault((channel.name, channel.plane.name + (process if own else "")), [])
+            if process not in readers:
+                readers.append(process)
 
     def put(self, sender: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
         """Send a message at `at_ns`; every reader but the sender gets it."""

@@ -84,6 +84,8 @@ class System:
         self.answers: dict[str, Answer] = {}
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
+        self._next: list[Callable[[], object]] = []
+        self._boots = 0
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
         self.supervisor.on_commit = self._committed
@@ -110,7 +112,8 @@ class System:
         self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
-        core = self.settings.node(name, "boot", fingerprint, 0)
+        self._boots += 1
+        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.bus.now_ns)
         solver = self.solvers[name] = Solver(core, self.settings.factory)
 
         def turn(now_ns: int) -> None:
@@ -129,6 +132,8 @@ class System:
         bus = self.bus
         self._wake_all()
         while not self.supervisor.finished:
+            while self._next:
+                self._next.pop(0)()
             arrival_ns = bus.next_ns()
             if arrival_ns is not None and arrival_ns <= bus.now_ns:
                 self._deliver()
@@ -173,9 +178,12 @@ class System:
         now_ns = self.bus.now_ns
         for process in list(self.processes.values()):
             if process.busy_until_ns <= now_ns:
-                process.core.wake(now_ns)
-                process.turn(now_ns)
-                self._perform(process)
+                self._wake(process)
+
+    def _wake(self, process: Process) -> None:
+        process.core.wake(self.bus.now_ns)
+        process.turn(self.bus.now_ns)
+        self._perform(process)
 
     def _core_deadline_ns(self, process: Process) -> int:
         core = process.core
@@ -236,8 +244,7 @@ class System:
         self._last_commit_ns = self.bus.now_ns
         if self.settings.on_commit is not None:
             self.settings.on_commit(frame)
-        for action in self._at_tick.pop(frame.tick, ()):
-            action()
+        self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
 
     def _where(self) -> str:
         nodes = {name: process.core.waiting_for for name, process in self.processes.items() if name in self.solvers}
@@ -248,6 +255,26 @@ class System:
     def at_tick(self, tick: int, action: Callable[[], object]) -> None:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
+
+    def kill(self, name: str) -> None:
+        """End a node's process at once: what it was to be told is gone, and the supervisor sees its connection close."""
+        self.processes.pop(name)
+        self.solvers.pop(name).close()
+        supervisor = self.processes[channels.SUPERVISOR]
+        self.supervisor.process_gone(name, self.bus.now_ns)
+        supervisor.turn(self.bus.now_ns)
+        self._perform(supervisor)
+
+    def start(self, name: str) -> None:
+        """Start a node's process again, with a new boot."""
+        assert name not in self.processes, f"{name} is running"
+        self._enter_node(name, library_fingerprint())
+        self._wake(self.processes[name])
+
+    def pause(self, name: str, for_ns: int) -> None:
+        """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""
+        process = self.processes[name]
+        process.busy_until_ns = max(process.busy_until_ns, self.bus.now_ns + for_ns)
 
     def request(self, verb: str, **arguments: Any) -> str:
         """Ask the supervisor for something; return the request's id."""

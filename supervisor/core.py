@@ -7,7 +7,7 @@ nodes' parts together. It journals, then speaks. A committed tick never changes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
 from foosim.protocol import channels, limits
@@ -46,6 +46,7 @@ from foosim.supervisor.account import Account
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import HeadRecord, RunRecord
+from foosim.supervisor.recovery import Recovery
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.status import SupervisorStatistics
@@ -70,6 +71,7 @@ class SupervisorCore:
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.requests = Requests(self)
+        self.recovery = Recovery(self)
         self.frame: Frame = initial_frame(self.deployment)
         self.chain = CHAIN_START
         self.epoch = 0
@@ -137,8 +139,10 @@ class SupervisorCore:
         """Look for who is silent or overdue, and for the end of an ended run."""
         if self.end is None:
             lost = self.watch.lost(self, now_ns)
-            if lost:
-                self.finish(f"lost {lost}", failed=True)
+            if lost and self.epoch == 0:
+                self.finish(_losses(lost), failed=True)
+            elif lost:
+                self._lose(lost, now_ns)
             elif self._lacks and self._patience.is_over(now_ns):
                 self._ask_again(now_ns)
             if now_ns >= self._prepare_ns:
@@ -179,8 +183,23 @@ class SupervisorCore:
         if process is None:
             return
         process.gone_ns = now_ns
-        if not process.farewell and self.end is None:
-            self.finish(f"lost {name}: its connection closed", failed=True)
+        if not process.farewell and not process.lost and self.end is None:
+            self._lose({name: "its connection closed"}, now_ns)
+
+    def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
+        """Go on without the nodes among those who are lost; without any other the run ends."""
+        others = {name: why for name, why in lost.items() if name not in self.deployment.nodes}
+        if others:
+            self.finish(_losses(others), failed=True)
+            return
+        for name, why in lost.items():
+            if self.end is None:
+                self.recovery.lose(name, why, now_ns)
+
+    def hold(self) -> None:
+        """No node is left: nothing is computed until one joins."""
+        self.members = ()
+        self._parts.clear()
 
     def finish(self, reason: str, failed: bool) -> None:
         """End the run in order at the last committed tick; say it once."""
@@ -284,16 +303,21 @@ class SupervisorCore:
         deliveries = self._deliveries.get(tick)
         if parts is None or deliveries is None or len(parts) < len(self.members) or tick not in self._orders:
             return False
+        assert self.members, "parts of nobody"
         edits = self._orders[tick]
         layout = layout_after(self.frame.layout, edits)
         slots = self._slots if layout is self.frame.layout else Slots(layout, self.owners)
         barrier = Barrier(tick + 1, self.members, slots)
         basis = basis_of(self.frame.digest, edits, deliveries)
-        for part in parts:
-            if part.basis != basis:
-                self._diverged += 1
-                self.finish(f"node {part.node} has diverged: its part {part.tick} has another basis", failed=True)
-                return False
+        diverged = [part.node for part in parts if part.basis != basis]
+        if diverged:
+            self._diverged += len(diverged)
+            why = f"has diverged: its part {tick + 1} has another basis"
+            if len(diverged) == len(parts):
+                self.finish("; ".join(f"node {node} {why}" for node in diverged), failed=True)
+            else:
+                self._lose(dict.fromkeys(diverged, why), now_ns)
+            return False
         try:
             barrier.add_all(parts)
             frame = barrier.assemble()
@@ -312,6 +336,7 @@ class SupervisorCore:
     def _take_frame(self, frame: Frame, edits: list[Edit], now_ns: int) -> None:
         self.frame = frame
         self.chain = chain_next(self.chain, frame.digest)
+        self.recovery.committed(self.committed_ns, now_ns)
         self.committed_ns = now_ns
         self._patience.progress(self.deployment.tick_ns, now_ns)
         self._say_commit(edits)
@@ -355,11 +380,14 @@ class SupervisorCore:
 
     # --- epochs ------------------------------------------------------------------------------------------------------
 
-    def open_epoch(self, owners: dict[str, str], now_ns: int) -> None:
-        """Begin a new epoch at the last commit: journal it, say it, issue the orders from there again."""
+    def open_epoch(self, owners: dict[str, str], now_ns: int, members: Iterable[str] | None = None) -> None:
+        """Begin a new epoch at the last commit: journal it, say it, issue the orders from there again.
+
+        `members` are the nodes that take part from now on; without them they stay.
+        """
         self.epoch += 1
         self.owners = owners
-        self.members = tuple(sorted(self.deployment.nodes))
+        self.members = self.members if members is None else tuple(sorted(members))
         self._parts.clear()
         self._slots = Slots(self.frame.layout, owners)
         frame, added = self.frame, self.added_to(self.frame.layout)
@@ -379,7 +407,7 @@ class SupervisorCore:
             return
         self.pacer.start(now_ns)
         self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
-        self.open_epoch(self.owners, now_ns)
+        self.open_epoch(self.owners, now_ns, self.deployment.nodes)
         self._say_commit([])
 
     def tempo(self) -> bytes:
@@ -427,9 +455,15 @@ class SupervisorCore:
         if reason:
             self._refuse(process.role, process.name, process.boot, reason)
             return
-        if self.epoch > 0 and ready.layout == self.frame.layout.digest and self.frame.tick == 0:
-            self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
-        self._start_if_ready(now_ns)
+        if self.epoch == 0:
+            self._start_if_ready(now_ns)
+        elif process.name in (*self.members, channels.VHUB):
+            if ready.layout == self.frame.layout.digest:
+                self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
+        elif ready.layout == self.frame.layout.digest:
+            self.recovery.join(process, now_ns)
+        else:
+            self.prepare(self.frame.layout)  # the world has changed since the build was said
         self.requests.layout_ready(now_ns)
 
     def _on_heartbeat(self, heartbeat: Heartbeat, payload: bytes, now_ns: int) -> None:
@@ -492,3 +526,8 @@ class SupervisorCore:
             report = decode_json(farewell.report)
             if isinstance(report, dict) and report:
                 process.report = report
+
+
+def _losses(lost: Mapping[str, str]) -> str:
+    """Return who is lost and why as a reason to end."""
+    return "lost " + "; ".join(f"{name}: {why}" for name, why in lost.items())

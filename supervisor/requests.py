@@ -247,6 +247,7 @@ class Requests:
             return self._accept(request, tick, f"{robot} is on {node} already")
         answer = self._accept(request, tick, f"{robot} moved to {node} at tick {tick}")
         core.account.moves += 1
+        core.recovery.moved(robot)
         core.open_epoch({**core.owners, robot: node}, now_ns)
         return answer
 

@@ -33,6 +33,8 @@ class Process:
     report: dict[str, Any] = field(default_factory=dict)
     farewell: bool = False
     gone_ns: int = 0
+    lost: bool = False
+    """The run goes on without it; it may come back by the handshake."""
 
 
 class Roster:
@@ -67,7 +69,7 @@ class Roster:
             hint = f", nearest is {nearest}" if nearest else ""
             return f"no {hello.role} {show(hello.name)} is declared; declared are {', '.join(choices)}{hint}"
         known = self.by_name.get(hello.name)
-        if known is not None and known.boot != hello.boot:
+        if known is not None and known.boot != hello.boot and not known.lost:
             return f"a {known.role} {hello.name} is already here"
         if hello.fingerprint != self._fingerprint and not self.deployment.mixed_cpu:
             return (
@@ -77,8 +79,16 @@ class Roster:
         return ""
 
     def take(self, hello: Hello, now_ns: int) -> Process:
-        """Note a process whose hello was accepted."""
-        return self.by_name.setdefault(hello.name, Process(hello.role, hello.name, hello.boot, heard_ns=now_ns))
+        """Note a process whose hello was accepted; one that was lost begins anew."""
+        known = self.by_name.get(hello.name)
+        if known is None or known.lost:
+            known = self.by_name[hello.name] = Process(hello.role, hello.name, hello.boot, heard_ns=now_ns)
+        return known
+
+    def lose(self, process: Process) -> None:
+        """Go on without a process until it says hello again."""
+        process.lost = True
+        process.ready.clear()
 
     def note_ready(self, process: Process, ready: Ready) -> str:
         """Note a layout that is built; return why the process cannot take part after all, or an empty string."""
@@ -103,5 +113,5 @@ class Roster:
         return [
             name
             for name, process in sorted(self.by_name.items())
-            if now_ns - process.heard_ns > deadline_ns and not process.farewell
+            if now_ns - process.heard_ns > deadline_ns and not process.farewell and not process.lost
         ]

@@ -58,6 +58,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
             }
             for name in sorted(core.deployment.nodes)
         },
+        "recoveries": core.recovery.as_json(),
         "moves": core.account.moves,
         "handovers": core.account.handovers,
         "score": {"red": red, "blue": blue},

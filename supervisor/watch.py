@@ -135,36 +135,36 @@ class Watch:
         hub = self.roster.by_name.get(VHUB)
         return [] if hub is None or hub.heartbeat is None else _names(hub.heartbeat.waiting_for)
 
-    def lost(self, core: SupervisorCore, now_ns: int) -> str:
-        """Return who is lost and why, or an empty string."""
+    def lost(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
+        """Return who is lost, and why."""
         self.now_ns = now_ns
         deadlines = self.deployment.deadlines
         if core.epoch == 0:
             return self._late_to_start(core, now_ns)
         silent = self.roster.silent(now_ns, deadlines.heartbeat_ns)
         if silent:
-            return f"{silent[0]}: no heartbeat for {deadlines.heartbeat_ns / 1e9:g} s"
+            return dict.fromkeys(silent, f"no heartbeat for {deadlines.heartbeat_ns / 1e9:g} s")
         names = self.waiting_for(core)
         if all(name in self.deployment.players or name in self.deployment.clients for name in names):
             self._progress_ns = max(self._progress_ns, now_ns - deadlines.tick_named_ns)  # the vHub has their deadline
-            return ""
+            return {}
         waited = ", ".join(names)
         overdue_ns = now_ns - self._progress_ns
         if overdue_ns > deadlines.tick_lost_ns:
-            return f"{waited}: tick {core.frame.tick} is overdue by {overdue_ns / 1e9:.1f} s"
+            return dict.fromkeys(names, f"tick {core.frame.tick} is overdue by {overdue_ns / 1e9:.1f} s")
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
             core.say("warning", f"tick {core.frame.tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
-        return ""
+        return {}
 
-    def _late_to_start(self, core: SupervisorCore, now_ns: int) -> str:
+    def _late_to_start(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
         """Give local processes and players their time to start; what is started by hand is waited for."""
         local = {name for name, node in self.deployment.nodes.items() if node.launch == "local"}
         local |= {VHUB, *self.deployment.players}
         missing = [name for name in self.waiting_for(core) if name in local]
         if not missing or now_ns - self._begun_ns <= self.deployment.deadlines.start_ns:
-            return ""
-        return f"{', '.join(missing)}: not ready within {self.deployment.deadlines.start_ns / 1e9:g} s"
+            return {}
+        return dict.fromkeys(missing, f"not ready within {self.deployment.deadlines.start_ns / 1e9:g} s")
 
 
 def _names(waiting_for: str) -> list[str]:
