@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from foosim.node.edits import check_edits
+from foosim.node.inputs import Inputs, check_near
 from foosim.node.step import Stepper, Work
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
@@ -32,7 +32,6 @@ from foosim.protocol.messages import (
     Build,
     Commit,
     Deliveries,
-    Edit,
     End,
     Epoch,
     Heartbeat,
@@ -89,8 +88,7 @@ class NodeCore:
         self._term: _Term | None = None
         self._history: dict[int, Frame] = {}
         self._awaited_epoch: Epoch | None = None
-        self._orders: dict[int, list[Edit]] = {}
-        self._deliveries: dict[int, tuple[bytes, Deliveries]] = {}
+        self._inputs = Inputs()
         self._parts: dict[int, list[Part]] = {}
         self._sent_parts: dict[int, bytes] = {}
         self._unsampled: set[int] = set()
@@ -211,7 +209,8 @@ class NodeCore:
             return None
         if self._barrier is not None:
             return channels.PART, len(self._barrier.missing)
-        return channels.DELIVERIES if self.frame.tick in self._orders else channels.ORDER, 1
+        missing = self._inputs.missing(self.frame.tick)
+        return missing[0] if missing else channels.ORDER, 1
 
     @property
     def waiting_for(self) -> str:
@@ -221,9 +220,7 @@ class NodeCore:
         tick = self.frame.tick
         if self._barrier is not None:
             return "" if self.work is not None else f"part of {', '.join(self._barrier.missing)}"
-        lacks = [] if tick in self._orders else ["order"]
-        lacks += [] if tick in self._deliveries else ["deliveries"]
-        return " and ".join(lacks)
+        return " and ".join(channel.name for channel in self._inputs.missing(tick))
 
     # --- one tick ----------------------------------------------------------------------------------------------------
 
@@ -248,8 +245,8 @@ class NodeCore:
         """Steps 2 to 4: with order and deliveries, edit the frame and hand my share to the engine."""
         frame = self.frame
         assert frame is not None and self._term is not None
-        edits = self._orders.get(frame.tick)
-        delivered = self._deliveries.get(frame.tick)
+        edits = self._inputs.edits(frame.tick)
+        delivered = self._inputs.deliveries(frame.tick)
         if edits is None or delivered is None:
             return False
         raw, deliveries = delivered
@@ -308,8 +305,8 @@ class NodeCore:
         self._history[frame.tick] = frame
         self._history.pop(frame.tick - limits.KEPT_TICKS, None)
         old = frame.tick - limits.KEPT_TICKS
-        for kept in (self._orders, self._deliveries, self._sent_parts):
-            kept.pop(old, None)
+        self._inputs.forget(old)
+        self._sent_parts.pop(old, None)
 
     # --- messages of the tick ----------------------------------------------------------------------------------------
 
@@ -326,26 +323,13 @@ class NodeCore:
     def _on_order(self, order: Order, payload: bytes, now_ns: int) -> None:
         if self._fenced(channels.ORDER, order, payload):
             return
-        last = order.tick + order.following
-        if self.frame is None or last < self.frame.tick or last in self._orders:
+        if self.frame is None or not self._inputs.take_order(order, self.frame.tick):
             self._repeated += 1
-            return
-        self._check_near(last)
-        check_edits(order.edits)
-        for tick in range(order.tick, last + 1):
-            self._orders[tick] = order.edits if tick == order.tick else []
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
-        if deliveries.tick in self._deliveries or (
-            self.frame is not None and deliveries.tick < self.frame.tick - limits.KEPT_TICKS
-        ):
+        own_tick = 0 if self.frame is None else self.frame.tick
+        if not self._inputs.take_deliveries(deliveries, payload, own_tick):
             self._repeated += 1
-            return
-        self._check_near(deliveries.last)
-        self._deliveries[deliveries.tick] = (payload, deliveries)
-        for tick in range(deliveries.tick + 1, deliveries.last + 1):
-            empty = Deliveries(tick, [])
-            self._deliveries.setdefault(tick, (encode(empty), empty))
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
         if self._fenced(channels.PART, part, payload):
@@ -353,19 +337,13 @@ class NodeCore:
         if self.frame is None or part.tick <= self.frame.tick:
             self._repeated += 1
             return
-        self._check_near(part.tick)
+        check_near(part.tick, self.frame.tick)
         if part.node not in self.roster or part.node == self.name:
             raise Malformed(f"a part of {part.node} to {self.name}, the roster is {', '.join(self.roster)}")
         waiting = self._parts.setdefault(part.tick, [])
         if len(waiting) >= limits.NODES_MAX * 4:
             raise Malformed(f"{len(waiting)} parts of tick {part.tick} wait already")
         waiting.append(part)
-
-    def _check_near(self, tick: int) -> None:
-        """Refuse what is for a tick so far off that nobody can have reached it."""
-        own = 0 if self.frame is None else self.frame.tick
-        if tick > own + limits.KEPT_TICKS:
-            raise Malformed(f"tick {tick}, this node is at {own}")
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
         if want.kind == channels.PART.name and want.epoch == self.epoch:
@@ -396,8 +374,7 @@ class NodeCore:
         elif self._barrier is not None:
             kinds.append((channels.PART.name, tick + 1))
         else:
-            kinds += [(channels.ORDER.name, tick)] if tick not in self._orders else []
-            kinds += [(channels.DELIVERIES.name, tick)] if tick not in self._deliveries else []
+            kinds += [(channel.name, tick) for channel in self._inputs.missing(tick)]
         for kind, wanted in kinds:
             message = encode(Want(self.name, kind, wanted, self.epoch))
             self.actions.append(Publish(channels.WANT, self.name, message))
@@ -433,7 +410,7 @@ class NodeCore:
         self.roster = tuple(sorted(epoch.roster))
         self.owners = dict(epoch.owners)
         self.member.entered()
-        self._orders.clear()
+        self._inputs.forget_orders()
         self._parts.clear()
         self._sent_parts.clear()
         self.work = None
@@ -456,7 +433,8 @@ class NodeCore:
         self.actions.append(Say("warning", f"epoch {epoch.epoch} is without this node, which asks to take part again"))
         self.epoch = epoch.epoch
         self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
-        for kept in (self._history, self._orders, self._parts, self._sent_parts, self._held):
+        self._inputs.forget_orders()
+        for kept in (self._history, self._parts, self._sent_parts, self._held):
             kept.clear()
         self.member.begin_anew()
 

@@ -16,7 +16,7 @@ from foosim.node.engines import ENGINES, build_in_steps, prepare_spares
 from foosim.node.engines.interface import Engine, EngineFactory
 from foosim.node.step import Stepper, Work
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.layout import Layout
+from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.start import initial_numbers
 
 FINGERPRINT_TICKS: Final = 32
@@ -118,7 +118,10 @@ class Solver:
 
 
 def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
-    """Return the digest of a fixed small run: a kicked ball among turning rods, 32 ticks."""
+    """Return the digest of a fixed small run: a kicked ball among turning rods, 32 ticks.
+
+    It is the same for every layout: what was added to the deployment's world stays parked.
+    """
     deployment: Deployment = stepper.deployment
     layout = stepper.layout
     numbers = initial_numbers(deployment, layout)
@@ -126,8 +129,11 @@ def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
     numbers[ball : ball + 3] = [1.0, 0.3, 0.0]
     for rod in layout.rods:
         numbers[rod.offsets["wanted"] + 1] = 1.0
-    bodies = tuple(entity for entity in layout.entities if entity.has_body)
+    base = build_layout(deployment)
+    declared = [entity for entity in layout.entities if entity.name in base]
+    bodies = tuple(entity for entity in declared if entity.has_body)
     for tick in range(FINGERPRINT_TICKS):
         work = Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})
         stepper.solve(engine, work)
-    return blake2b(np.array(numbers).tobytes(), digest_size=32).digest()
+    content = [number for entity in declared for number in numbers[entity.start : entity.stop]]
+    return blake2b(np.array(content).tobytes(), digest_size=32).digest()

@@ -257,7 +257,7 @@ class System:
         self._at_tick.setdefault(tick, []).append(action)
 
     def kill(self, name: str) -> None:
-        """End a node's process at once: what it was to be told is gone, and the supervisor sees its connection close."""
+        """End a node's process at once: what is on its way to it is lost, the supervisor sees the connection close."""
         self.processes.pop(name)
         self.solvers.pop(name).close()
         supervisor = self.processes[channels.SUPERVISOR]

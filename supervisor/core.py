@@ -14,7 +14,7 @@ from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode_json, encode
+from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed
@@ -22,7 +22,6 @@ from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, layo
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import (
     AddedEntity,
-    Build,
     Commit,
     Deliveries,
     Edit,
@@ -35,7 +34,6 @@ from foosim.protocol.messages import (
     Part,
     Prepare,
     Ready,
-    Refusal,
     Request,
     Tempo,
     Want,
@@ -43,6 +41,7 @@ from foosim.protocol.messages import (
 from foosim.protocol.patience import Patience
 from foosim.protocol.start import initial_frame
 from foosim.supervisor.account import Account
+from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import HeadRecord, RunRecord
@@ -72,6 +71,7 @@ class SupervisorCore:
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.requests = Requests(self)
         self.recovery = Recovery(self)
+        self.handshake = Handshake(self)
         self.frame: Frame = initial_frame(self.deployment)
         self.chain = CHAIN_START
         self.epoch = 0
@@ -98,14 +98,14 @@ class SupervisorCore:
         self._patience = Patience(now_ns)
         self._refused = self._repeated = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
-            Hello: self._on_hello,
-            Ready: self._on_ready,
-            Heartbeat: self._on_heartbeat,
+            Hello: self.handshake.hello,
+            Ready: self.handshake.ready,
+            Heartbeat: self.handshake.heartbeat,
             Part: self._on_part,
             Deliveries: self._on_deliveries,
             Want: self._on_want,
             Request: self.requests.take,
-            Farewell: self._on_farewell,
+            Farewell: self.handshake.farewell,
         }
         self._run = RunRecord(settings.run, settings.deployment_name, settings.deployment_text)
         self.actions.append(Journal(encode(self._run)))
@@ -401,7 +401,7 @@ class SupervisorCore:
         self.watch.begun(now_ns)
         self._patience.progress(self.deployment.tick_ns, now_ns)
 
-    def _start_if_ready(self, now_ns: int) -> None:
+    def start_if_ready(self, now_ns: int) -> None:
         """Open the first epoch when every declared process has built the world."""
         if self.epoch > 0 or self.end is not None or self.roster.missing(self.frame.layout.digest):
             return
@@ -409,6 +409,14 @@ class SupervisorCore:
         self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
         self.open_epoch(self.owners, now_ns, self.deployment.nodes)
         self._say_commit([])
+
+    def say_epoch(self) -> None:
+        """Say the present epoch again."""
+        self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
+
+    def count_repeat(self) -> None:
+        """A message came twice, or for somebody who is not here any more."""
+        self._repeated += 1
 
     def tempo(self) -> bytes:
         """Return the message that tells the vHub the pace."""
@@ -419,73 +427,6 @@ class SupervisorCore:
         self.actions.append(Publish(channels.PREPARE, channels.SUPERVISOR, encode(Prepare(self.added_to(layout)))))
 
     # --- messages ----------------------------------------------------------------------------------------------------
-
-    def _on_hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
-        reason = self.roster.reason_against(hello)
-        if reason:
-            self._refuse(hello.role, hello.name, hello.boot, reason)
-            return
-        if self._has_ended():
-            return
-        self.roster.take(hello, now_ns)
-        run, pace, added = self.settings, str(self.pacer.pace), self.added_to(self.frame.layout)
-        deployment = run.deployment_name, run.deployment_text
-        build = Build(hello.name, hello.boot, run.run, *deployment, pace, added)
-        self.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
-
-    def _has_ended(self) -> bool:
-        """Whether the run is over; say it again to who comes late."""
-        if self.end is not None:
-            self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
-        return self.end is not None
-
-    def _refuse(self, role: str, name: str, boot: str, reason: str) -> None:
-        self.actions.append(Say("warning", f"{role} {name} refused: {reason}"))
-        self.actions.append(Publish(channels.REFUSAL, name, encode(Refusal(name, boot, reason))))
-
-    def _on_ready(self, ready: Ready, payload: bytes, now_ns: int) -> None:
-        process = self.roster.by_name.get(ready.name)
-        if process is None or process.boot != ready.boot:
-            self._repeated += 1
-            return
-        process.heard_ns = now_ns
-        if self._has_ended():
-            return
-        reason = self.roster.note_ready(process, ready)
-        if reason:
-            self._refuse(process.role, process.name, process.boot, reason)
-            return
-        if self.epoch == 0:
-            self._start_if_ready(now_ns)
-        elif process.name in (*self.members, channels.VHUB):
-            if ready.layout == self.frame.layout.digest:
-                self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
-        elif ready.layout == self.frame.layout.digest:
-            self.recovery.join(process, now_ns)
-        else:
-            self.prepare(self.frame.layout)  # the world has changed since the build was said
-        self.requests.layout_ready(now_ns)
-
-    def _on_heartbeat(self, heartbeat: Heartbeat, payload: bytes, now_ns: int) -> None:
-        process = self.roster.by_name.get(heartbeat.sender)
-        if process is None:
-            self._repeated += 1
-            return
-        process.heard_ns = now_ns
-        if not heartbeat.report:
-            self.watch.told(heartbeat)
-            return
-        process.heartbeat = heartbeat
-        report = decode_json(heartbeat.report)
-        process.report = report if isinstance(report, dict) else {}
-        if self.end is not None:
-            self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
-        elif self.epoch > 0 and heartbeat.epoch < self.epoch:
-            self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
-            if heartbeat.sender == channels.VHUB:
-                self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
-        if heartbeat.lost and heartbeat.sender == channels.VHUB and self.end is None:
-            self.finish(f"lost {heartbeat.lost}", failed=True)
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
         if part.epoch != self.epoch or part.tick <= self.frame.tick or part.tick > self.frame.tick + limits.KEPT_TICKS:
@@ -518,14 +459,6 @@ class SupervisorCore:
             self._say_orders(want.tick, want.tick + 1)
         elif want.kind == channels.COMMIT.name and want.tick in self._commits:
             self.actions.append(Publish(channels.COMMIT, want.sender, self._commits[want.tick]))
-
-    def _on_farewell(self, farewell: Farewell, payload: bytes, now_ns: int) -> None:
-        process = self.roster.by_name.get(farewell.name)
-        if process is not None:
-            process.farewell = True
-            report = decode_json(farewell.report)
-            if isinstance(report, dict) and report:
-                process.report = report
 
 
 def _losses(lost: Mapping[str, str]) -> str:

@@ -58,6 +58,14 @@ def ball_text(status: dict[str, Any]) -> str:
     return f"{text}, solved by {ball['solver']}" if ball["solver"] else text
 
 
+def recovery_text(entry: dict[str, Any]) -> str:
+    """`tick 812: lost node blue (its connection closed), went on after 3.1 ms, epoch 2`; or who came (back)."""
+    name = entry["name"]
+    what = f"lost node {name} ({entry['reason']})" if entry["what"] == "node" else f"node {name} takes part"
+    after = "" if entry["outage_ms"] is None else f", went on after {entry['outage_ms']:.1f} ms"
+    return f"tick {entry['tick']}: {what}{after}, epoch {entry['epoch']}"
+
+
 def plain_line(status: dict[str, Any]) -> str:
     """Return one line for a log or a pipe."""
     packets = status["packets"]
@@ -107,7 +115,7 @@ def _processes(status: dict[str, Any]) -> Table:
             "" if node is None else _listed(node["owned"]),
             "" if node is None else str(node["solved_ticks"]),
             "-" if process is None else f"{process['busy']:.0%}",
-            "not here yet" if process is None else process["waiting_for"],
+            "not here yet" if process is None else "lost" if process["lost"] else process["waiting_for"],
         )
     return table
 

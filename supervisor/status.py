@@ -87,6 +87,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "processes": {
             name: {
                 "role": process.role,
+                "lost": process.lost,
                 "busy": 0.0 if process.heartbeat is None else round(process.heartbeat.busy, 3),
                 "tick": 0 if process.heartbeat is None else process.heartbeat.tick,
                 "waiting_for": "" if process.heartbeat is None else process.heartbeat.waiting_for,

@@ -20,9 +20,10 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.errors import Refused
 from foosim.supervisor.control import Control, NoAnswer
-from foosim.supervisor.display import Display
+from foosim.supervisor.display import Display, recovery_text
 from foosim.supervisor.launcher import Child, Launcher, command_line
 from foosim.supervisor.plan import Plan
+from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
 
 POLL_S: Final = 0.02
@@ -33,6 +34,8 @@ END_S: Final = 20.0
 """How long a run that is ending may take before its processes are stopped: the vHub has a capture to close."""
 LEAVE_S: Final = 1.0
 """How long the others may take to end when the supervisor has: it waited for the vHub's capture."""
+STALLED_S: Final = 1.0
+"""How long a node that is lost may take to come back by itself before its process is killed."""
 LOST_S: Final = 3.0
 """How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
 STATUS_S: Final = 1.0
@@ -87,7 +90,12 @@ class Up:
         self._ending_s = 0.0
         self._lost: Child | None = None
         self._lost_s = 0.0
-        self._has_ended = False
+        self._has_begun = self._has_ended = False
+        self._restarts = Restarts()
+        self._stalled: dict[str, float] = {}
+        """Nodes that the run goes on without though their processes live: since when."""
+        self._told = 0
+        """How many of the run's recoveries were shown."""
 
     def run(self) -> Outcome:
         """Start everything, show it until it is over, and return how it ended. Raises Killed."""
@@ -168,9 +176,43 @@ class Up:
             status = control.status(STATUS_S)
         except NoAnswer:
             return
+        now_s = time.monotonic()
+        self._tell_recoveries(status["recoveries"])
         if not self._has_ended:
-            self.display.show(status, time.monotonic())
+            self.display.show(status, now_s)
+        self._has_begun = self._has_begun or status["state"] != "starting"
         self._has_ended = status["state"] in ENDED
+        self._end_stalled(status["processes"], now_s)
+
+    def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
+        """Say what is new, once it is over."""
+        while self._told < len(recoveries) and recoveries[self._told]["outage_ms"] is not None:
+            self.display.say(recovery_text(recoveries[self._told]))
+            self._told += 1
+
+    def _end_stalled(self, processes: dict[str, dict[str, Any]], now_s: float) -> None:
+        """Kill a node's process that hangs: the run goes on without it, and a new one can take part."""
+        lost = [name for name in self._launcher.children if processes.get(name, {}).get("lost")]
+        self._stalled = {name: self._stalled.get(name, now_s) for name in lost}
+        for name, since_s in self._stalled.items():
+            child = self._launcher.children[name]
+            if child.exit_code is None and now_s >= since_s + STALLED_S:
+                self.display.say(f"{name} does not answer any more: it is killed")
+                child.process.kill()
+
+    def _restart_nodes(self, now_s: float) -> None:
+        """Start nodes again that ended while the run goes on; one that ends again and again is given up."""
+        for child in self._launcher.ended():
+            name = child.name
+            is_node = name in self.plan.deployment.nodes
+            if not is_node or child.exit_code == DONE or self._restarts.is_known(name):
+                continue
+            wait_s = self._restarts.ended(name, now_s)
+            after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s"
+            self.display.say(f"{name} {child.ending}, {after}; its log is {child.log}")
+        for name in self._restarts.due(now_s):
+            child = self._launcher.children[name]
+            self._launcher.start(name, child.command, child.log)
 
     def _goes_on(self) -> bool:
         """Look after the children and the Ctrl-C; False when the supervisor has ended."""
@@ -184,12 +226,18 @@ class Up:
         if self._interrupts and not self._ending_s:
             self.display.say("ending the run; a second Ctrl-C kills it")
             self._end_in_order(supervisor, now_s)
+        if self._has_begun and not self._has_ended and not self._ending_s:
+            self._restart_nodes(now_s)
         if self._lost is None:
-            self._lost = next((child for child in self._launcher.ended() if child.exit_code != 0), None)
+            self._lost = next((child for child in self._launcher.ended() if self._ends_run(child)), None)
             self._lost_s = now_s
         elif not self._ending_s and now_s > self._lost_s + LOST_S:
             self._end_in_order(supervisor, now_s)
         return not self._ending_s or now_s < self._ending_s + END_S
+
+    def _ends_run(self, child: Child) -> bool:
+        """Whether the run cannot go on without this child, which has ended."""
+        return child.exit_code != 0 and not (self._has_begun and child.name in self.plan.deployment.nodes)
 
     def _end_in_order(self, supervisor: Child, now_s: float) -> None:
         """Have the supervisor end the run, as the command `down` does."""
@@ -201,7 +249,8 @@ class Up:
         if result is None and self._lost is None:
             self._lost = self._launcher.children[SUPERVISOR]
         reason = "the run did not end in order" if result is None else f"the run has ended: {result['reason']}"
-        lines = [reason, *self._lost_lines(), *self._capture_lines()]
+        recoveries = [] if result is None else result["recoveries"][self._told :]
+        lines = [*map(recovery_text, recoveries), reason, *self._lost_lines(), *self._capture_lines()]
         return Outcome(result, result is None or bool(result["failed"]) or self._lost is not None, tuple(lines))
 
     def _lost_lines(self) -> list[str]:

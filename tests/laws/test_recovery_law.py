@@ -2,35 +2,190 @@
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from foosim.rehearsal.rehearse import rehearse
+from foosim.protocol.units import Pace
+from foosim.rehearsal.bus import Weather
+from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TICKS: Final = 400
+TICKS: Final = 300
+MS: Final = 1_000_000
+NODES: Final = ("n1", "n2", "n3")
+PURE: Final = ("engine=pure",)
+Fault = tuple[int, Callable[[System], object]]
+"""When frame `tick` is committed, what happens."""
+
+
+def kill(name: str) -> Callable[[System], object]:
+    return lambda system: system.kill(name) if name in system.processes else None
+
+
+def start(name: str) -> Callable[[System], object]:
+    return lambda system: None if name in system.processes else system.start(name)
+
+
+def pause(name: str, for_ms: int) -> Callable[[System], object]:
+    return lambda system: system.pause(name, for_ms * MS) if name in system.processes else None
+
+
+def move(robot: str, node: str) -> Callable[[System], object]:
+    return lambda system: system.request("move", robot=robot, node=node)
 
 
 @cache
-def undisturbed() -> tuple[bytes, ...]:
-    return tuple(rehearse(TABLE.read_text(), TABLE.name, TICKS, 1, ["engine=pure"]).digests)
+def undisturbed(sets: tuple[str, ...] = PURE, ticks: int = TICKS) -> Rehearsed:
+    return rehearse(TABLE.read_text(), TABLE.name, ticks, 1, sets)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_killed_nodes(seed: int) -> None:
+def disturbed(
+    faults: Sequence[Fault], nodes: int = 3, sets: tuple[str, ...] = PURE, ticks: int = TICKS, **chosen: Any
+) -> Rehearsed:
     def prepare(system: System) -> None:
-        for tick, name in ((40 + seed, "n2"), (120 + 3 * seed, "n1"), (250, "n3")):
-            system.at_tick(tick, lambda name=name: system.kill(name))  # type: ignore[misc]
-            system.at_tick(tick + 40, lambda name=name: system.start(name))  # type: ignore[misc]
+        for tick, fault in faults:
+            system.at_tick(tick, partial(fault, system))
 
-    run = rehearse(TABLE.read_text(), TABLE.name, TICKS, 3, ["engine=pure"], Settings(), prepare=prepare)
-    assert tuple(run.digests) == undisturbed()
-    told = run.json["recoveries"]
-    assert [(entry["what"], entry["name"]) for entry in told] == [
-        ("node", "n2"), ("join", "n2"), ("node", "n1"), ("join", "n1"), ("node", "n3"), ("join", "n3"),
-    ]  # fmt: skip
-    assert run.json["handovers"] >= 2 and not run.json["failed"]
+    pace = chosen.pop("pace", None)
+    return rehearse(
+        TABLE.read_text(), TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare
+    )
+
+
+def told(run: Rehearsed) -> list[tuple[str, str]]:
+    return [(entry["what"], entry["name"]) for entry in run.json["recoveries"]]
+
+
+def test_nodes_are_killed_and_come_back() -> None:
+    faults = [(40, kill("n2")), (80, start("n2")), (120, kill("n1")), (160, start("n1")), (250, kill("n3"))]
+    run = disturbed(faults)
+    assert run.digests == undisturbed().digests
+    assert told(run) == [("node", "n2"), ("join", "n2"), ("node", "n1"), ("join", "n1"), ("node", "n3")]
+    assert all(entry["outage_ms"] is not None for entry in run.json["recoveries"])
+    assert run.json["handovers"] >= 1 and not run.json["failed"] and run.json["reason"] == "done"
+
+
+def test_with_bullet_it_is_the_same() -> None:
+    faults = [(40, kill("n2")), (80, start("n2")), (120, kill("n1"))]
+    assert disturbed(faults, sets=()).digests == undisturbed(()).digests
+
+
+def test_robots_go_back_to_the_node_that_they_were_adopted_from() -> None:
+    owned: list[dict[str, list[str]]] = []
+
+    def look(system: System) -> None:
+        owned.append({name: sorted(r for r, o in system.supervisor.owners.items() if o == name) for name in NODES})
+
+    run = disturbed([(20, look), (30, kill("n2")), (60, look), (70, start("n2")), (120, look)])
+    before, without, after = owned
+    assert before == after and without["n2"] == [] and before["n2"]
+    assert sorted(robot for robots in without.values() for robot in robots) == sorted(undisturbed_robots(run))
+    assert max(map(len, without.values())) - min(len(without[name]) for name in ("n1", "n3")) <= 1, "evenly"
+
+
+def undisturbed_robots(run: Rehearsed) -> list[str]:
+    return [robot for node in run.json["nodes"].values() for robot in node["owned"]]
+
+
+def test_a_robot_that_was_moved_meanwhile_stays() -> None:
+    run = disturbed([(30, kill("n2")), (60, move("camera", "n3")), (61, move("camera", "n1")), (80, start("n2"))])
+    assert "camera" in run.json["nodes"]["n1"]["owned"] and run.digests == undisturbed().digests
+
+
+def test_the_last_node_is_lost_and_the_world_waits_for_one() -> None:
+    stands: list[int] = []
+
+    def soon(system: System) -> None:
+        stands.append(system.supervisor.frame.tick)
+        system.start("n3")
+
+    def fault(system: System) -> None:
+        for name in NODES:
+            system.kill(name)
+        soon(system)
+
+    run = disturbed([(100, fault), (200, start("n1")), (220, start("n2"))])
+    assert run.digests == undisturbed().digests
+    assert told(run)[:4] == [("node", "n1"), ("node", "n2"), ("node", "n3"), ("join", "n3")]
+    assert stands and {name: len(node["owned"]) > 0 for name, node in run.json["nodes"].items()} == dict.fromkeys(
+        NODES, True
+    )
+
+
+def test_a_zombie_writes_nothing_and_comes_back_by_the_handshake() -> None:
+    """Stopped for three seconds, the node is lost by its silence; then it goes on with what it has in hand."""
+    run = disturbed([(100, pause("n2", 3_000))], pace=Pace("realtime"), ticks=2_200)
+    assert run.digests == undisturbed(ticks=2_200).digests
+    assert told(run) == [("node", "n2"), ("join", "n2")]
+    assert "overdue" in run.json["recoveries"][0]["reason"] or "heartbeat" in run.json["recoveries"][0]["reason"]
+
+
+def test_a_short_pause_costs_nobody_its_membership() -> None:
+    run = disturbed([(100, pause("n2", 200))], pace=Pace("realtime"))
+    assert run.digests == undisturbed().digests and told(run) == []
+
+
+@pytest.mark.parametrize("sets", ["nodes.n2.required=true", "on_node_loss=stop"])
+def test_where_the_deployment_says_so_the_run_ends(sets: str) -> None:
+    run = disturbed([(100, kill("n2"))], sets=(*PURE, sets))
+    assert run.json["failed"] and run.json["reason"] == "lost n2: its connection closed"
+    assert run.digests == undisturbed().digests[: len(run.digests)] and 100 <= run.json["ticks"] <= 105
+
+
+def test_a_ball_that_is_added_while_a_node_is_lost() -> None:
+    faults: list[Fault] = [
+        (50, lambda system: system.request("add", name="b2", position=[0.1, 0.0, 0.02])),
+        (50, kill("n2")),
+        (150, start("n2")),
+        (200, lambda system: system.request("remove", name="b2")),
+        (203, kill("n3")),
+    ]
+    run = disturbed(faults)
+    assert run.json["reason"] == "done" and len(run.digests) == TICKS
+    assert told(run) == [("node", "n2"), ("join", "n2"), ("node", "n3")]
+
+
+FAULTS: Final = st.lists(
+    st.tuples(
+        st.integers(1, TICKS - 1),
+        st.one_of(
+            st.sampled_from(NODES).map(lambda name: ("kill", name)),
+            st.sampled_from(NODES).map(lambda name: ("start", name)),
+            st.tuples(st.just("move"), st.sampled_from(["red.goal", "camera", "blue.attack"]), st.sampled_from(NODES)),
+        ),
+    ),
+    min_size=3,
+    max_size=20,
+)
+DO: Final[dict[str, Callable[..., Callable[[System], object]]]] = {"kill": kill, "start": start, "move": move}
+
+
+@settings(max_examples=20)
+@given(faults=FAULTS, weather=st.sampled_from([None, 1, 2, 3]))
+def test_whatever_happens_the_world_is_the_same(faults: list[Any], weather: int | None) -> None:
+    """Also on a bus that delays, repeats and loses; in the end all come back, so that the run can be finished."""
+    planned = [(tick, DO[what](*names)) for tick, (what, *names) in faults]
+    last = max(tick for tick, _ in faults)
+    planned += [(tick, start(name)) for tick in (last, last + 1) for name in NODES]
+
+    def prepare(system: System) -> None:
+        for tick, fault in planned:
+            system.at_tick(tick, partial(_keep_one, fault, system))
+
+    bad = Weather(weather, 100_000, 2 * MS, loss=0.02, repeat=0.05) if weather is not None else Weather()
+    run = rehearse(TABLE.read_text(), TABLE.name, TICKS, 3, PURE, Settings(weather=bad), prepare=prepare)
+    assert run.digests == undisturbed().digests
+
+
+def _keep_one(fault: Callable[[System], object], system: System) -> None:
+    """Nobody is there to start a node when the last one is gone: start one then."""
+    fault(system)
+    if not any(name in system.processes for name in NODES):
+        system.start("n1")

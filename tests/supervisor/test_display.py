@@ -40,8 +40,8 @@ def running() -> dict[str, Any]:
             "red": {"owned": [f"red.{number}" for number in range(8)], "solved_ticks": 6170},
         },
         "processes": {
-            "blue": {"role": "node", "busy": 0.314, "tick": 6170, "waiting_for": "order"},
-            "vhub": {"role": "vhub", "busy": 0.22, "tick": 6170, "waiting_for": "Done of player-blue"},
+            "blue": {"role": "node", "lost": False, "busy": 0.314, "tick": 6170, "waiting_for": "order"},
+            "vhub": {"role": "vhub", "lost": False, "busy": 0.22, "tick": 6170, "waiting_for": "Done of player-blue"},
         },
         "links": [
             ["player-red", "red.goal", 1234, 1220, 9, 1_302_000],

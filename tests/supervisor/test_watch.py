@@ -56,7 +56,7 @@ class Seen:
             self.system = system
             self.prepare(system)
 
-        sets = ["engine=pure", *self.sets]
+        sets = ["engine=pure", "on_node_loss=stop", *self.sets]
         self.result = rehearse(
             TEXT, TABLE.name, self.ticks, self.nodes, sets, self.settings, pace=self.pace, prepare=prepare
         ).json

@@ -1,0 +1,107 @@
+"""The supervisor's side of the handshake: hello, ready, heartbeat and farewell of nodes and the vHub.
+
+Neighbours: `roster` checks and keeps who is here, `recovery` takes nodes in that come to a running world, `core` opens
+the first epoch; `protocol.member` is the other side.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from foosim.protocol import channels
+from foosim.protocol.actions import Publish, Say
+from foosim.protocol.codec import decode_json, encode
+from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Refusal
+
+if TYPE_CHECKING:
+    from foosim.supervisor.core import SupervisorCore
+
+
+class Handshake:
+    """Takes what processes say of themselves."""
+
+    def __init__(self, core: SupervisorCore) -> None:
+        self._core = core
+
+    def hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
+        """Answer who asks to take part: with what to build, or with a refusal."""
+        core = self._core
+        reason = core.roster.reason_against(hello)
+        if reason:
+            self._refuse(hello.role, hello.name, hello.boot, reason)
+            return
+        if self._has_ended():
+            return
+        core.roster.take(hello, now_ns)
+        run, pace, added = core.settings, str(core.pacer.pace), core.added_to(core.frame.layout)
+        deployment = run.deployment_name, run.deployment_text
+        build = Build(hello.name, hello.boot, run.run, *deployment, pace, added)
+        core.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
+
+    def _has_ended(self) -> bool:
+        """Whether the run is over; say it again to who comes late."""
+        core = self._core
+        if core.end is not None:
+            core.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(core.end)))
+        return core.end is not None
+
+    def _refuse(self, role: str, name: str, boot: str, reason: str) -> None:
+        self._core.actions.append(Say("warning", f"{role} {name} refused: {reason}"))
+        self._core.actions.append(Publish(channels.REFUSAL, name, encode(Refusal(name, boot, reason))))
+
+    def ready(self, ready: Ready, payload: bytes, now_ns: int) -> None:
+        """A layout is built: the run may begin, a node may join, a change of the world may be ordered."""
+        core = self._core
+        process = core.roster.by_name.get(ready.name)
+        if process is None or process.boot != ready.boot or process.lost:
+            core.count_repeat()
+            return
+        process.heard_ns = now_ns
+        if self._has_ended():
+            return
+        reason = core.roster.note_ready(process, ready)
+        if reason:
+            self._refuse(process.role, process.name, process.boot, reason)
+            return
+        if core.epoch == 0:
+            core.start_if_ready(now_ns)
+        elif process.name in (*core.members, channels.VHUB):
+            if ready.layout == core.frame.layout.digest:
+                core.say_epoch()
+        elif ready.layout == core.frame.layout.digest:
+            core.recovery.join(process, now_ns)
+        else:
+            core.prepare(core.frame.layout)  # the world has changed since the build was said
+        core.requests.layout_ready(now_ns)
+
+    def heartbeat(self, heartbeat: Heartbeat, payload: bytes, now_ns: int) -> None:
+        """Note that a process lives, and tell it again what it has missed."""
+        core = self._core
+        process = core.roster.by_name.get(heartbeat.sender)
+        if process is None:
+            core.count_repeat()
+            return
+        process.heard_ns = now_ns
+        if not heartbeat.report:
+            core.watch.told(heartbeat)
+            return
+        process.heartbeat = heartbeat
+        report = decode_json(heartbeat.report)
+        process.report = report if isinstance(report, dict) else {}
+        if core.end is not None:
+            core.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(core.end)))
+        elif core.epoch > 0 and heartbeat.epoch < core.epoch:
+            core.say_epoch()
+            if heartbeat.sender == channels.VHUB:
+                core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))
+        if heartbeat.lost and heartbeat.sender == channels.VHUB and core.end is None:
+            core.finish(f"lost {heartbeat.lost}", failed=True)
+
+    def farewell(self, farewell: Farewell, payload: bytes, now_ns: int) -> None:
+        """The vHub's last word: its capture is closed."""
+        process = self._core.roster.by_name.get(farewell.name)
+        if process is not None:
+            process.farewell = True
+            report = decode_json(farewell.report)
+            if isinstance(report, dict) and report:
+                process.report = report
