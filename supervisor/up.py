@@ -227,6 +227,8 @@ class Up:
             self.display.say("ending the run; a second Ctrl-C kills it")
             self._end_in_order(supervisor, now_s)
         if self._has_begun and not self._has_ended and not self._ending_s:
+            if self._lost is not None and not self._ends_run(self._lost):
+                self._lost = None  # it ended before we saw that the run had begun
             self._restart_nodes(now_s)
         if self._lost is None:
             self._lost = next((child for child in self._launcher.ended() if self._ends_run(child)), None)

@@ -1,0 +1,34 @@
+"""When what ended is started again: the waits double, an old end is forgotten, one that ends for ever is given up."""
+
+from __future__ import annotations
+
+from foosim.supervisor.restarts import WAITS_S, WINDOW_S, Restarts
+
+
+def test_the_waits_double_and_then_it_is_given_up() -> None:
+    restarts = Restarts()
+    now_s = 100.0
+    for wait_s in WAITS_S:
+        assert restarts.ended("blue", now_s) == wait_s and restarts.is_known("blue")
+        assert restarts.due(now_s + wait_s - 0.01) == []
+        assert restarts.due(now_s + wait_s) == ["blue"] and restarts.due(now_s + wait_s) == []
+        assert not restarts.is_known("blue")
+        now_s += wait_s + 0.1
+    assert restarts.ended("blue", now_s) is None
+    assert restarts.failed == ["blue"] and restarts.is_known("blue") and restarts.due(now_s + 1e6) == []
+
+
+def test_an_end_long_ago_does_not_count() -> None:
+    restarts = Restarts()
+    for count in range(20):
+        assert restarts.ended("blue", count * WINDOW_S) == WAITS_S[0]
+        assert restarts.due((count + 0.5) * WINDOW_S) == ["blue"]
+
+
+def test_each_is_counted_for_itself() -> None:
+    restarts = Restarts()
+    for _ in range(3):
+        restarts.ended("blue", 0.0)
+    assert restarts.ended("red", 0.0) == WAITS_S[0]
+    assert restarts.due(10.0) == ["blue", "red"]
+    assert not restarts.is_known("green")
