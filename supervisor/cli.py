@@ -198,6 +198,24 @@ def move(
     _show(control.move(robot, node, run), json)
 
 
+Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
+
+
+@app.command()
+def stop(node: Node, run: Run = None, json: Json = False) -> None:
+    """Have a node end; its robots move to the others first."""
+    _show(control.stop(node, run), json)
+
+
+@app.command()
+def start(node: Node, run: Run = None, json: Json = False) -> None:
+    """Let a node that was stopped take part again, with its robots.
+
+    `up` starts the processes of local nodes; one that is launched by hand has to be started by hand.
+    """
+    _show(control.start(node, run), json)
+
+
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
 def push(
     impulse: Annotated[Numbers, typer.Argument(help="Impulse in N s: X Y Z.", show_default=False)],

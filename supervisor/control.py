@@ -151,6 +151,16 @@ def move(robot: str, node: str, run: str | None = None) -> Answer:
     return _ask(run, "move", robot=robot, node=node)
 
 
+def stop(node: str, run: str | None = None) -> Answer:
+    """Have a node end; its robots move to the others first."""
+    return _ask(run, "stop", node=node)
+
+
+def start(node: str, run: str | None = None) -> Answer:
+    """Let a node that was stopped take part again; where `up` starts nodes, it starts this one."""
+    return _ask(run, "start", node=node)
+
+
 def push(impulse: Vector, name: str = "ball", run: str | None = None) -> Answer:
     """Give a ball an impulse (N s, world frame)."""
     return _ask(run, "push", impulse=impulse, name=name)

@@ -115,9 +115,16 @@ def _processes(status: dict[str, Any]) -> Table:
             "" if node is None else _listed(node["owned"]),
             "" if node is None else str(node["solved_ticks"]),
             "-" if process is None else f"{process['busy']:.0%}",
-            "not here yet" if process is None else "lost" if process["lost"] else process["waiting_for"],
+            _doing(process),
         )
     return table
+
+
+def _doing(process: dict[str, Any] | None) -> str:
+    """Return what a process waits for, or why it does not take part."""
+    if process is None:
+        return "not here yet"
+    return next((state for state in ("stopped", "lost") if process[state]), str(process["waiting_for"]))
 
 
 def _listed(names: list[str]) -> str:

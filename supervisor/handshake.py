@@ -28,7 +28,7 @@ class Handshake:
         core = self._core
         reason = core.roster.reason_against(hello)
         if reason:
-            self._refuse(hello.role, hello.name, hello.boot, reason)
+            self.refuse(hello.role, hello.name, hello.boot, reason)
             return
         if self._has_ended():
             return
@@ -45,7 +45,8 @@ class Handshake:
             core.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(core.end)))
         return core.end is not None
 
-    def _refuse(self, role: str, name: str, boot: str, reason: str) -> None:
+    def refuse(self, role: str, name: str, boot: str, reason: str) -> None:
+        """Tell a process that it does not take part, and why."""
         self._core.actions.append(Say("warning", f"{role} {name} refused: {reason}"))
         self._core.actions.append(Publish(channels.REFUSAL, name, encode(Refusal(name, boot, reason))))
 
@@ -61,7 +62,7 @@ class Handshake:
             return
         reason = core.roster.note_ready(process, ready)
         if reason:
-            self._refuse(process.role, process.name, process.boot, reason)
+            self.refuse(process.role, process.name, process.boot, reason)
             return
         if core.epoch == 0:
             core.start_if_ready(now_ns)

@@ -62,6 +62,18 @@ class Recovery:
             core.hold()
             core.say("error", f"lost node {name}: {reason}; no node is left, the run waits for one")
 
+    def stop(self, name: str, now_ns: int) -> None:
+        """Somebody stops a node: its robots move away, then it is told."""
+        core = self._core
+        core.roster.stopped.add(name)
+        if name in core.members:
+            members = [member for member in core.members if member != name]
+            self._open(self._adopted(name, members), members, now_ns)
+        process = core.roster.by_name.get(name)
+        if process is not None:
+            core.roster.lose(process)
+            core.handshake.refuse(process.role, name, process.boot, "stopped by request")
+
     def join(self, process: Process, now_ns: int) -> None:
         """A node that has built the world takes part from the last commit on, with the robots that were its own."""
         core, name = self._core, process.name

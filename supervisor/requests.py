@@ -1,4 +1,5 @@
-"""What people ask of a running system: pause, resume, step, rate, add, remove, move, push, down, status.
+"""What people ask of a running system: pause, resume, step, rate, add, remove, move, push,
+stop and start (a node), down, status.
 
 A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push at the
 first tick not yet released, add and remove at the first not yet released when all nodes are ready for it, a move at the
@@ -66,6 +67,8 @@ class Requests:
             "remove": self._remove,
             "move": self._move,
             "push": self._push,
+            "stop": self._stop_node,
+            "start": self._start_node,
             "down": self._down,
         }
 
@@ -250,6 +253,30 @@ class Requests:
         core.recovery.moved(robot)
         core.open_epoch({**core.owners, robot: node}, now_ns)
         return answer
+
+    def _stop_node(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        core = self._core
+        node = _chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
+        tick = core.frame.tick
+        if node in core.roster.stopped:
+            return self._accept(request, tick, f"{node} is stopped already")
+        if core.deployment.nodes[node].required:
+            raise Refused(f"{node} is required by the deployment: the run cannot do without it")
+        if core.members == (node,):
+            raise Refused(f"{node} is the only node that is left")
+        answer = self._accept(request, tick, f"{node} stopped at tick {tick}")
+        core.recovery.stop(node, now_ns)
+        return answer
+
+    def _start_node(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        core = self._core
+        node = _chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
+        if node not in core.roster.stopped:
+            doing = "takes part" if node in core.members else "is expected"
+            return self._accept(request, core.frame.tick, f"{node} {doing} already")
+        core.roster.stopped.discard(node)
+        text = f"{node} may take part from tick {core.frame.tick} on, when it has built the world"
+        return self._accept(request, core.frame.tick, text)
 
     def _down(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         tick = self._core.stop()

@@ -43,6 +43,8 @@ class Roster:
     def __init__(self, deployment: Deployment, fingerprint: bytes) -> None:
         self.deployment = deployment
         self.by_name: dict[str, Process] = {}
+        self.stopped: set[str] = set()
+        """Nodes that somebody stopped: they are not let in until somebody starts them."""
         self._fingerprint = fingerprint
         self._simulation = b""
 
@@ -68,6 +70,8 @@ class Roster:
             nearest = nearest_name(hello.name, choices)
             hint = f", nearest is {nearest}" if nearest else ""
             return f"no {hello.role} {show(hello.name)} is declared; declared are {', '.join(choices)}{hint}"
+        if hello.name in self.stopped:
+            return f"{hello.name} is stopped; `foosim-supervisor start {hello.name}` lets it take part again"
         known = self.by_name.get(hello.name)
         if known is not None and known.boot != hello.boot and not known.lost:
             return f"a {known.role} {hello.name} is already here"

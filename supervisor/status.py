@@ -87,7 +87,8 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "processes": {
             name: {
                 "role": process.role,
-                "lost": process.lost,
+                "lost": process.lost and name not in core.roster.stopped,
+                "stopped": name in core.roster.stopped,
                 "busy": 0.0 if process.heartbeat is None else round(process.heartbeat.busy, 3),
                 "tick": 0 if process.heartbeat is None else process.heartbeat.tick,
                 "waiting_for": "" if process.heartbeat is None else process.heartbeat.waiting_for,

@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar
 
 from foosim.protocol import wall
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.command import DONE, FAILED
+from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Refused
 from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.display import Display, recovery_text
@@ -94,6 +94,8 @@ class Up:
         self._restarts = Restarts()
         self._stalled: dict[str, float] = {}
         """Nodes that the run goes on without though their processes live: since when."""
+        self._stopped: set[str] = set()
+        """Nodes that somebody stopped."""
         self._told = 0
         """How many of the run's recoveries were shown."""
 
@@ -182,7 +184,18 @@ class Up:
             self.display.show(status, now_s)
         self._has_begun = self._has_begun or status["state"] != "starting"
         self._has_ended = status["state"] in ENDED
+        self._start_stopped({name for name, process in status["processes"].items() if process["stopped"]})
+        if self._has_begun and not self._has_ended and not self._ending_s:
+            self._restart_nodes(now_s, knows=True)
         self._end_stalled(status["processes"], now_s)
+
+    def _start_stopped(self, stopped: set[str]) -> None:
+        """Start the nodes that are stopped no more."""
+        for name in self._stopped - stopped:
+            child = self._launcher.children.get(name)
+            if child is not None and child.exit_code is not None:
+                self._launcher.start(name, child.command, child.log)
+        self._stopped = stopped
 
     def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
         """Say what is new, once it is over."""
@@ -200,13 +213,18 @@ class Up:
                 self.display.say(f"{name} does not answer any more: it is killed")
                 child.process.kill()
 
-    def _restart_nodes(self, now_s: float) -> None:
-        """Start nodes again that ended while the run goes on; one that ends again and again is given up."""
+    def _restart_nodes(self, now_s: float, knows: bool = False) -> None:
+        """Start nodes again that ended while the run goes on; one that ends again and again is given up.
+
+        `knows`: a status has just told which nodes are stopped.
+        """
         for child in self._launcher.ended():
             name = child.name
             is_node = name in self.plan.deployment.nodes
-            if not is_node or child.exit_code == DONE or self._restarts.is_known(name):
+            if not is_node or name in self._stopped or child.exit_code == DONE or self._restarts.is_known(name):
                 continue
+            if child.exit_code == REFUSED and not knows:
+                continue  # it may have been stopped since the last status
             wait_s = self._restarts.ended(name, now_s)
             after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s"
             self.display.say(f"{name} {child.ending}, {after}; its log is {child.log}")

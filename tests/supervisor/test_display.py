@@ -9,11 +9,12 @@ import pytest
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.display import LINKS_SHOWN_MAX, Display, plain_line, render_text
+from foosim.supervisor.display import LINKS_SHOWN_MAX, Display, plain_line, recovery_text, render_text
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import status
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
+HERE = {"lost": False, "stopped": False}
 
 
 @pytest.fixture
@@ -40,8 +41,8 @@ def running() -> dict[str, Any]:
             "red": {"owned": [f"red.{number}" for number in range(8)], "solved_ticks": 6170},
         },
         "processes": {
-            "blue": {"role": "node", "lost": False, "busy": 0.314, "tick": 6170, "waiting_for": "order"},
-            "vhub": {"role": "vhub", "lost": False, "busy": 0.22, "tick": 6170, "waiting_for": "Done of player-blue"},
+            "blue": {"role": "node", **HERE, "busy": 0.314, "tick": 6170, "waiting_for": "order"},
+            "vhub": {"role": "vhub", **HERE, "busy": 0.22, "tick": 6170, "waiting_for": "Done of player-blue"},
         },
         "links": [
             ["player-red", "red.goal", 1234, 1220, 9, 1_302_000],
@@ -127,3 +128,27 @@ def test_a_display_that_is_no_terminal_prints_lines_with_the_speed_since_the_las
     assert lines[1].startswith("12.34 s | realtime 1.00x | ")
     assert lines[2].startswith("12.84 s | realtime 0.25x | ")
     assert not display.is_live
+
+
+@pytest.mark.parametrize("state", ["lost", "stopped"])
+def test_a_node_that_does_not_take_part_says_so(running: dict[str, Any], state: str) -> None:
+    running["processes"]["blue"][state] = True
+    (line,) = [line for line in render_text(running).splitlines() if line.startswith("blue ")]
+    assert line.rstrip().endswith(f" {state}")
+
+
+@pytest.mark.parametrize(
+    ("entry", "text"),
+    [
+        (
+            {"what": "node", "name": "blue", "reason": "it hangs", "outage_ms": 3.14, "tick": 8, "epoch": 2},
+            "tick 8: lost node blue (it hangs), went on after 3.1 ms, epoch 2",
+        ),
+        (
+            {"what": "join", "name": "blue", "reason": "back", "outage_ms": None, "tick": 9, "epoch": 3},
+            "tick 9: node blue takes part, epoch 3",
+        ),
+    ],
+)
+def test_losses_and_returns_are_lines(entry: dict[str, Any], text: str) -> None:
+    assert recovery_text(entry) == text

@@ -210,6 +210,43 @@ def test_a_move_is_an_epoch_at_the_commit_that_its_answer_names_and_changes_noth
     assert run.digests == undisturbed().digests and run.system.supervisor.account.moves == 1
 
 
+def test_a_node_is_stopped_and_started_again_and_nothing_changes() -> None:
+    run = Run(nodes=3).ask_at(30, "stop", node="n2").ask_at(40, "start", node="n2")
+    run.system.at_tick(50, lambda: run.system.kill("n2"))
+    run.system.at_tick(60, lambda: run.system.start("n2"))
+    run.go()
+    stopped, started = run.answers
+    assert stopped.accepted and stopped.text == f"n2 stopped at tick {stopped.tick}"
+    assert started.accepted and started.text.startswith("n2 may take part from tick ")
+    assert run.digests == undisturbed().digests
+    supervisor = run.system.supervisor
+    assert supervisor.members == ("n1", "n2", "n3") and supervisor.epoch == 3
+    assert set(supervisor.owners.values()) == {"n1", "n2", "n3"}, "its robots came back with it"
+
+
+def test_a_stopped_node_is_not_let_in_before_it_is_started() -> None:
+    run = Run(nodes=2).ask_at(30, "stop", node="n2")
+    run.system.at_tick(40, lambda: run.system.kill("n2"))
+    run.system.at_tick(50, lambda: run.system.start("n2"))
+    run.go()
+    assert run.digests == undisturbed().digests and run.system.supervisor.members == ("n1",)
+    node = run.system.processes["n2"].core
+    assert node.member.refusal == "n2 is stopped; `foosim-supervisor start n2` lets it take part again"
+
+
+def test_what_cannot_be_stopped_or_started() -> None:
+    run = Run(nodes=2).ask_at(20, "stop", node="n9").ask_at(22, "start", node="n1").ask_at(30, "stop", node="n1")
+    run.ask_at(40, "stop", node="n1").ask_at(50, "stop", node="n2").go()
+    assert [(answer.accepted, answer.text) for answer in run.answers] == [
+        (False, "no node 'n9'; there are n1, n2"),
+        (True, "n1 takes part already"),
+        (True, f"n1 stopped at tick {run.answers[2].tick}"),
+        (True, "n1 is stopped already"),
+        (False, "n2 is the only node that is left"),
+    ]
+    assert run.digests == undisturbed().digests
+
+
 def test_a_move_to_where_it_is_is_no_epoch() -> None:
     run = Run(nodes=2).ask_at(50, "move", robot="red.goal", node="n1").go()
     assert run.answers[0].accepted and run.answers[0].text == "red.goal is on n1 already"
@@ -343,7 +380,7 @@ def test_the_same_id_of_another_is_another_request() -> None:
 
 GREAT: Final = 10**400
 BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
-    ("fly", {}, "no verb 'fly'; there are status, pause, resume, step, rate, add, remove, move, push, down"),
+    ("fly", {}, "no verb 'fly'; there are status, pause, resume, step, rate, add, remove, move, push, stop, start, "),
     ("step", {}, "count: a whole number from 1 to 1000000000 is needed, not null"),
     ("step", {"count": 0}, "not 0"),
     ("step", {"count": True}, "not true"),
