@@ -29,7 +29,8 @@ from foosim.protocol.messages import Build, ClientHello, Commit, Epoch, Join, Ro
 from foosim.protocol.start import initial_numbers
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.core import HubCore
+from foosim.vhub.keeping import Keep
 
 CLIENTS: Final = tuple(f"client-{number}" for number in range(4))
 PACKETS_PER_TICK: Final = 25

@@ -26,7 +26,8 @@ from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
-from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.core import HubCore
+from foosim.vhub.keeping import Keep
 from foosim.vhub.records import Closing
 
 OPERATOR: Final = "operator"

@@ -30,7 +30,8 @@ from foosim.protocol.messages import Build, End
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.core import HubCore
+from foosim.vhub.keeping import Keep
 
 CONNECT_S = 60.0
 FORGET_EVERY_NS = 1_000_000_000

@@ -48,7 +48,8 @@ from foosim.protocol.messages import (
 from foosim.protocol.start import initial_numbers
 from foosim.vhub import capture_writer
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.core import HubCore
+from foosim.vhub.keeping import Keep
 from foosim.vhub.records import Closing
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
