@@ -80,6 +80,7 @@ class SupervisorCore:
         self.stop_at = settings.ticks
         self.end: End | None = None
         self.finished = False
+        self.busy = 0.0
         self.account = Account(dict.fromkeys(sorted(self.deployment.nodes), 0))
         self.started_ns = self.committed_ns = 0
         self.on_commit: Callable[[Frame], None] | None = None
