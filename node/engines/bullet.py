@@ -13,12 +13,14 @@ from collections.abc import Generator, Iterator, Sequence
 from math import fsum, sqrt
 from typing import Any, Final
 
-import pybullet as p
-
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.quiet import without_lines
 from foosim.protocol.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector
 from foosim.protocol.table_scene import build_scene
+
+with without_lines(b"pybullet build time:"):
+    import pybullet as p
 
 # Pairs that can touch: balls with everything, nothing else. Rods would rub on the walls that they run through, and
 # without a filter a step costs five times as much.
