@@ -65,13 +65,7 @@ class Push(Message, frozen=True):
     impulse: Vector
 
 
-class Stop(Message, frozen=True):
-    """End the run in order after this tick."""
-
-    reason: Text
-
-
-Edit = Add | Remove | Push | Stop
+Edit = Add | Remove | Push
 Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 

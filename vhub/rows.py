@@ -23,7 +23,7 @@ from foosim.protocol.draws import Slot
 from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Counter, Delivered, Edit, Push, Remove, Stop
+from foosim.protocol.messages import Add, Counter, Delivered, Edit, Push, Remove
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
 from foosim.vhub.records import Closing
 
@@ -50,13 +50,12 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
 class EditRow(Row, frozen=True):
     """A change of the world by an order. Lists are x, y, z in the world frame, empty where the kind has none."""
 
-    kind: Literal["add", "remove", "push", "stop"]
+    kind: Literal["add", "remove", "push"]
     name: str = ""
     model: str = ""
     position: list[float] = []
     velocity: list[float] = []
     impulse: list[float] = []
-    reason: str = ""
 
 
 class DeliveredRow(Row, frozen=True):
@@ -333,9 +332,7 @@ def edit_row(edit: Edit) -> EditRow:
         return EditRow("add", edit.name, edit.model, position=list(edit.position), velocity=list(edit.velocity))
     if isinstance(edit, Remove):
         return EditRow("remove", edit.name)
-    if isinstance(edit, Push):
-        return EditRow("push", edit.name, impulse=list(edit.impulse))
-    return EditRow("stop", reason=edit.reason)
+    return EditRow("push", edit.name, impulse=list(edit.impulse))
 
 
 def edit_of(row: EditRow) -> Edit:
@@ -344,9 +341,7 @@ def edit_of(row: EditRow) -> Edit:
         return Add(row.name, row.model, _vector(row.position), _vector(row.velocity))
     if row.kind == "remove":
         return Remove(row.name)
-    if row.kind == "push":
-        return Push(row.name, _vector(row.impulse))
-    return Stop(row.reason)
+    return Push(row.name, _vector(row.impulse))
 
 
 def delivered_of(row: DeliveredRow) -> Delivered:

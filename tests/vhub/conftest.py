@@ -41,7 +41,6 @@ from foosim.protocol.messages import (
     RobotPacket,
     Samples,
     Sent,
-    Stop,
     Subscription,
     Up,
 )
@@ -187,7 +186,7 @@ class Driver:
         if tick == ADDED_AT:
             return [Add("ball2", "ball", (0.1, -0.0, 1e-9), (0.0, 1.0, -2.5))]
         if tick == PUSHED_AT:
-            return [Push("ball", (0.01, 1 / 3, -0.0)), Stop("a stop that is none")]
+            return [Push("ball", (0.01, 1 / 3, -0.0)), Push("ball2", (0.0, -1e-300, 2.5))]
         return [Remove("ball2")] if tick == REMOVED_AT else []
 
     def _samples(self, tick: int, robot: str) -> list[RobotPacket]:

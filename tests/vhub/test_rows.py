@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Add, Edit, Push, Remove, Stop
+from foosim.protocol.messages import Add, Edit, Push, Remove
 from foosim.vhub.rows import (
     CLIENTS,
     FRAME,
@@ -193,7 +193,6 @@ edits = st.one_of(
     st.builds(Add, names, names, vectors, vectors),
     st.builds(Remove, names),
     st.builds(Push, names, vectors),
-    st.builds(Stop, st.text()),
 )
 
 
