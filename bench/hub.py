@@ -104,7 +104,7 @@ def _start(core: HubCore, text: str, journal: Journal | None) -> None:
         core.receive(channels.UP, name, encode(Join(name, "boot", 0, [])), 0)
     assert core.deployment is not None
     owners = [(robot, "n1") for robot in core.deployment.robots]
-    core.receive(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [])), 0)
+    core.receive(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [], b"")), 0)
     _perform(core, journal, None)
 
 

@@ -364,7 +364,8 @@ class SupervisorCore:
         self._parts.clear()
         self._slots = Slots(self.frame.layout, owners)
         frame, added = self.frame, self.added_to(self.frame.layout)
-        epoch = Epoch(self.epoch, frame.tick, frame.digest, list(self.members), sorted(owners.items()), added)
+        who = list(self.members), sorted(owners.items()), added, self.roster.arithmetic
+        epoch = Epoch(self.epoch, frame.tick, frame.digest, *who)
         payload = encode(epoch)
         self.actions.append(Journal(payload))
         self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, payload))

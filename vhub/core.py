@@ -42,7 +42,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.units import parse_pace
-from foosim.vhub.keeping import Keep, Keeping
+from foosim.vhub.keeping import Keep, KeepEpoch, Keeping
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
@@ -51,7 +51,7 @@ from foosim.vhub.sessions import Session, Sessions, may_lockstep
 from foosim.vhub.state import HubState, Joining, received
 from foosim.vhub.waits import Waits
 
-HubAction = Action | Keep
+HubAction = Action | Keep | KeepEpoch
 
 
 @dataclass(slots=True)
@@ -347,6 +347,7 @@ class HubCore:
         first = self._epoch == 0
         self._epoch, self._epoch_tick = epoch.epoch, epoch.tick
         self._owners = dict(epoch.owners)
+        self.actions.append(KeepEpoch(epoch))
         self.member.entered()
         if first:
             self._sent[0] = encode(Deliveries(0, []))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from foosim.protocol.messages import Epoch
 from foosim.vhub.records import Closing
 
 
@@ -17,6 +18,13 @@ class Keep:
     """Rows for the capture, behind the journal: what one closing gave."""
 
     closing: Closing
+
+
+@dataclass(frozen=True, slots=True)
+class KeepEpoch:
+    """A row for the capture: an epoch that begins."""
+
+    epoch: Epoch
 
 
 class Keeping:

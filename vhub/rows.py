@@ -23,7 +23,7 @@ from foosim.protocol.draws import Slot
 from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Counter, Delivered, Edit, Push, Remove
+from foosim.protocol.messages import Add, Counter, Delivered, Edit, Epoch, Push, Remove
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
 from foosim.vhub.records import Closing
 
@@ -35,6 +35,7 @@ CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
 """-1 where there is nothing to say."""
 DigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 EntityDigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{16}$")]
+ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
 WordHex = Annotated[str, Meta(pattern="^([0-9a-f]{16})?$")]
 Fate = Literal["delivered", "dropped", "in_flight"]
 
@@ -168,6 +169,29 @@ class ClientRow(Row, frozen=True):
     subscriptions: list[SubscriptionRow]
 
 
+class OwnerRow(Row, frozen=True):
+    """A robot and the node that owns it."""
+
+    robot: str
+    node: str
+
+
+class EpochRow(Row, frozen=True):
+    """Who computes from frame `tick` on, whose digest D(tick) is named: the nodes, and the owner of every robot.
+
+    `arithmetic` is the digest of a fixed small run of the nodes' engine, in hex: where it differs, worlds may differ.
+    It is empty where nodes of several kinds take part.
+    """
+
+    tick: Counter
+    epoch: Counter
+    digest: DigestHex
+    roster: list[str]
+    owners: list[OwnerRow]
+    arithmetic: ArithmeticHex
+
+
+EPOCHS: Final = "/epochs"
 TICK: Final = "/tick"
 LAYOUT: Final = "/layout"
 FRAME: Final = "/frame"
@@ -175,6 +199,7 @@ PACKETS: Final = "/packets"
 CLIENTS: Final = "/clients"
 
 ROW_TYPES: Final[Mapping[str, type[Row]]] = {
+    EPOCHS: EpochRow,
     LAYOUT: LayoutRow,
     CLIENTS: ClientRow,
     TICK: TickRow,
@@ -298,6 +323,14 @@ def _tick_row(closing: Closing) -> TickRow:
         ],
         closing.wall_ns,
     )
+
+
+def epoch_entry(epoch: Epoch, plan: Plan) -> Entry:
+    """Return the row of an epoch, in its place."""
+    at_ns = epoch.tick * plan.tick_ns
+    owners = [OwnerRow(robot, node) for robot, node in epoch.owners]
+    row = EpochRow(epoch.tick, epoch.epoch, epoch.digest.hex(), list(epoch.roster), owners, epoch.arithmetic.hex())
+    return EPOCHS, at_ns, at_ns, epoch.tick & 0xFFFF_FFFF, row
 
 
 def layout_row(frame: Frame, base: Layout) -> LayoutRow:

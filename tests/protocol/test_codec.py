@@ -251,13 +251,18 @@ OVERSIZED: Final[dict[str, tuple[Any, Any, Any]]] = {
     ),
     "owners": (
         Epoch,
-        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * limits.ENTITIES_MAX, []),
-        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * (limits.ENTITIES_MAX + 1), []),
+        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * limits.ENTITIES_MAX, [], b""),
+        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * (limits.ENTITIES_MAX + 1), [], b""),
     ),
     "added": (
         Epoch,
-        Epoch(1, 0, bytes(32), ["n"], [], [AddedEntity("b", "ball")] * limits.ENTITIES_MAX),
-        Epoch(1, 0, bytes(32), ["n"], [], [AddedEntity("b", "ball")] * (limits.ENTITIES_MAX + 1)),
+        Epoch(1, 0, bytes(32), ["n"], [], [AddedEntity("b", "ball")] * limits.ENTITIES_MAX, b""),
+        Epoch(1, 0, bytes(32), ["n"], [], [AddedEntity("b", "ball")] * (limits.ENTITIES_MAX + 1), b""),
+    ),
+    "arithmetic": (
+        Epoch,
+        Epoch(1, 0, bytes(32), ["n"], [], [], bytes(32)),
+        Epoch(1, 0, bytes(32), ["n"], [], [], bytes(33)),
     ),
     "a text": (
         End,

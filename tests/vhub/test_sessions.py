@@ -87,7 +87,7 @@ class Hub:
     def begin(self) -> Hub:
         for name in PERIODS:
             self.enter(name)
-        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, []))
+        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
         return self
 
     def commit(self, tick: int, last: bool = False) -> None:
