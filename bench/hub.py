@@ -29,7 +29,8 @@ from foosim.protocol.messages import Build, ClientHello, Commit, Epoch, Join, Ro
 from foosim.protocol.start import initial_numbers
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.core import HubCore
+from foosim.vhub.keeping import Keep
 
 CLIENTS: Final = tuple(f"client-{number}" for number in range(4))
 PACKETS_PER_TICK: Final = 25
@@ -103,7 +104,7 @@ def _start(core: HubCore, text: str, journal: Journal | None) -> None:
         core.receive(channels.UP, name, encode(Join(name, "boot", 0, [])), 0)
     assert core.deployment is not None
     owners = [(robot, "n1") for robot in core.deployment.robots]
-    core.receive(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [])), 0)
+    core.receive(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [], b"")), 0)
     _perform(core, journal, None)
 
 

@@ -55,7 +55,7 @@ class RodSensor(Part):
 
 
 class BallSensor(Part):
-    """Reads the ball's position x, y, z (m), with Gaussian noise on each coordinate: 3 float64."""
+    """Reads the ball's position x, y, z (m), with Gaussian noise on x and y and none on z: 3 float64."""
 
     kind: Literal["ball"]
     rate_hz: Rate = Field(alias="rate")

@@ -130,7 +130,7 @@ def fitting_edits(layout: Layout, edits: Sequence[messages.Edit]) -> list[messag
             if edit.name == BALL or models.get(edit.name) not in ADDABLE:
                 continue
             del models[edit.name]
-        elif isinstance(edit, messages.Push) and models.get(edit.name) not in ADDABLE:
+        elif models.get(edit.name) not in ADDABLE:
             continue
         fitting.append(edit)
     return fitting

@@ -65,13 +65,7 @@ class Push(Message, frozen=True):
     impulse: Vector
 
 
-class Stop(Message, frozen=True):
-    """End the run in order after this tick."""
-
-    reason: Text
-
-
-Edit = Add | Remove | Push | Stop
+Edit = Add | Remove | Push
 Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 
@@ -274,7 +268,10 @@ class Prepare(Message, frozen=True):
 
 
 class Epoch(Message, frozen=True):
-    """Who does what from tick `tick` on: `owners` is (robot, node) for every robot."""
+    """Who does what from tick `tick` on: `owners` is (robot, node) for every robot.
+
+    `arithmetic` is the digest of the nodes' fixed small run; empty where nodes of several kinds are let in.
+    """
 
     epoch: Counter
     tick: Counter
@@ -282,6 +279,7 @@ class Epoch(Message, frozen=True):
     roster: Names
     owners: Annotated[list[tuple[Name, Name]], Meta(max_length=limits.ENTITIES_MAX)]
     added: Added
+    arithmetic: Annotated[bytes, Meta(max_length=32)]
 
 
 class Tempo(Message, frozen=True):

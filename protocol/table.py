@@ -77,8 +77,15 @@ class Surface(Part):
     rolling_friction: LengthOrNone
 
 
+class BallSurface(Part):
+    """What a ball feels of another ball. Not 0: engines take a pair's values as products of both sides'."""
+
+    restitution: Annotated[float, Field(ge=0.01, le=1)]
+    friction: Annotated[float, Field(ge=0.01, le=10)]
+
+
 class Surfaces(Part):
-    """The ball against each kind of body."""
+    """The ball against each kind of body, and against another ball."""
 
     floor: Surface
     walls: Surface
@@ -86,6 +93,7 @@ class Surfaces(Part):
     ramps: Surface
     figures: Surface
     rods: Surface
+    balls: BallSurface
 
 
 class Ball(Part):

@@ -24,10 +24,6 @@ ORANGE: Final[Colour] = (1.0, 0.5, 0.0, 1.0)
 """A white ball would be confused with highlights on the rods."""
 TEAM_COLOURS: Final[dict[str, Colour]] = {"red": (0.80, 0.10, 0.10, 1.0), "blue": (0.10, 0.20, 0.80, 1.0)}
 
-BALL_RESTITUTION: Final = 0.8
-BALL_FRICTION: Final = 0.2
-"""Of one ball with another. [A]: no source found; the table has one ball, others come by `add`."""
-
 ALONG_Y: Final[Quaternion] = (-sqrt(0.5), 0.0, 0.0, sqrt(0.5))
 """Turns a cylinder's axis from z to y."""
 Y_AXIS: Final[Vector] = (0.0, 1.0, 0.0)

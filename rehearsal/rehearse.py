@@ -16,7 +16,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Answer
+from foosim.protocol.messages import Answer, Epoch
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
@@ -103,7 +103,7 @@ def _open_capture(path: Path, text: str, name: str, settings: Settings, pace: Pa
     """Open a capture that gets all closings and log lines of a rehearsal."""
     metadata = {"run": settings.run, "pace": str(pace), "fingerprint": library_fingerprint().hex()}
     writer = CaptureWriter(path, load_deployment(text, name), name, text, metadata)
-    on_closing, on_say = settings.on_closing, settings.on_say
+    on_closing, on_epoch, on_say = settings.on_closing, settings.on_epoch, settings.on_say
     tick = 0
 
     def keep(closing: Closing) -> None:
@@ -113,10 +113,15 @@ def _open_capture(path: Path, text: str, name: str, settings: Settings, pace: Pa
         if on_closing is not None:
             on_closing(closing)
 
+    def begin(epoch: Epoch) -> None:
+        writer.keep(epoch)
+        if on_epoch is not None:
+            on_epoch(epoch)
+
     def log(process: str, level: str, line: str) -> None:
         writer.log(level, f"{process}: {line}", tick)
         if on_say is not None:
             on_say(process, level, line)
 
-    settings.on_closing, settings.on_say = keep, log
+    settings.on_closing, settings.on_epoch, settings.on_say = keep, begin, log
     return writer

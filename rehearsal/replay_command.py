@@ -31,7 +31,7 @@ def foosim_replay(version: VersionOption = False) -> None:
 
 @app.command()
 def info(capture: Capture, json: Json = False) -> None:
-    """Show what a capture holds: run, duration, digests, packets, topics."""
+    """Show what a capture holds: run, duration, digests, nodes and their arithmetic, packets, topics."""
     found = capture_info(capture)
     typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
 
@@ -47,6 +47,8 @@ def _describe(found: CaptureInfo) -> str:
         f"  {found.ticks} ticks of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
         f"  digest of the last frame {found.digest}",
         f"  digest of all ticks {found.chain}",
+        f"  nodes {', '.join(found.nodes) or 'not known'}",
+        f"  arithmetic {', '.join(found.arithmetic) or 'not known'}",
         f"  packets {', '.join(f'{count} {fate}' for fate, count in packets.items())}",
         "  topics",
         *(f"    {topic}: {count}" for topic, count in found.topics.items()),
@@ -64,12 +66,19 @@ def verify(
 ) -> None:
     """Simulate a capture again from its orders and deliveries, and compare the digest of every tick.
 
-    Names the first tick and the entities that differ. The number of nodes need not be the capture's.
+    Names the first tick and the entities that differ. The number of nodes need not be the capture's. Where ticks differ
+    and the capture comes from nodes with another arithmetic than this machine's, standard error says so.
     """
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     found = verify_capture(capture, nodes)
     typer.echo(encode_json(_as_json(found)).decode() if json else _verdict(found))
+    if found.tick >= 0 and found.other_arithmetic:
+        typer.echo(
+            f"the capture's arithmetic is {', '.join(found.other_arithmetic)}, this machine's is {found.arithmetic}: "
+            "they compute different worlds",
+            err=True,
+        )
     raise typer.Exit(DONE if found.equal else FAILED)
 
 

@@ -44,9 +44,15 @@ class Replica:
             self._say(channels.BUILD, node, encode(build))
         self._settle()
         owners = sorted(deployment.owners().items())
-        epoch = Epoch(EPOCH, 0, self.frame.digest, sorted(deployment.nodes), owners, [])
+        epoch = Epoch(EPOCH, 0, self.frame.digest, sorted(deployment.nodes), owners, [], b"")
         self._say(channels.EPOCH, SOURCE, encode(epoch))
         self._settle()
+
+    @property
+    def arithmetic(self) -> bytes:
+        """The digest of the fixed small run of this machine's engine: captures with another one may differ."""
+        core, _ = next(iter(self._nodes.values()))
+        return core.member.simulation
 
     def step(self, edits: Sequence[Edit], delivered: Sequence[Delivered]) -> Frame:
         """Compute the next frame from what the order and the vHub gave to this tick."""

@@ -22,11 +22,12 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Answer, Request
+from foosim.protocol.messages import Answer, Epoch, Request
 from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
-from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.core import HubCore
+from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
 
 OPERATOR: Final = "operator"
@@ -68,6 +69,7 @@ class Settings:
     observer: Observer | None = None
     on_commit: Callable[[Frame], None] | None = None
     on_closing: Callable[[Closing], None] | None = None
+    on_epoch: Callable[[Epoch], None] | None = None
     on_say: Callable[[str, str, str], None] | None = None
     on_journal: Callable[[str, bytes], None] | None = None
 
@@ -233,6 +235,9 @@ class System:
         elif isinstance(action, Keep):
             if settings.on_closing is not None:
                 settings.on_closing(action.closing)
+        elif isinstance(action, KeepEpoch):
+            if settings.on_epoch is not None:
+                settings.on_epoch(action.epoch)
         elif isinstance(action, Say) and settings.on_say is not None:
             settings.on_say(process.name, action.level, action.text)
 

@@ -7,7 +7,7 @@ nodes, and names the first tick and entity that differ. Neighbours: `replica` co
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from foosim.protocol.deployment_file import load_deployment
@@ -28,6 +28,10 @@ class Verified:
     entities: tuple[str, ...] = ()
     missing_tick: int = -1
     """The first tick that the capture lacks, -1 if it is whole."""
+    arithmetic: str = ""
+    """This machine's digest of the fixed small run of an engine, in hex."""
+    other_arithmetic: tuple[str, ...] = ()
+    """Those that the capture has and that are others."""
 
     @property
     def equal(self) -> bool:
@@ -38,27 +42,33 @@ def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
     """Verify a capture file. Raises CaptureError for one that cannot be read."""
     capture = open_capture(path)
     about = capture.about
-    return verify(about.deployment_text, about.deployment_name, capture.captured_ticks(), nodes)
+    found = verify(about.deployment_text, about.deployment_name, capture.captured_ticks(), nodes)
+    kept = {epoch.arithmetic for epoch in capture.epochs}
+    return replace(found, other_arithmetic=tuple(sorted(kept - {"", found.arithmetic})))
 
 
 def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1) -> Verified:
     """Simulate again what `ticks` (from 0 on, in order) say, on `nodes` nodes, and compare."""
     text = with_nodes(text, name, nodes)
     replica = Replica(text, name, load_deployment(text, name))
-    chain = CHAIN_START
     try:
-        for captured in ticks:
-            expected = replica.frame.tick + 1 if captured.tick > 0 else 0
-            if captured.tick != expected:
-                return Verified(replica.frame.tick, nodes, chain, missing_tick=expected)
-            frame = replica.frame if captured.tick == 0 else replica.step(captured.edits, captured.delivered)
-            if frame.digest != captured.digest:
-                return Verified(frame.tick, nodes, chain, frame.tick, _differing(frame, captured))
-            if frame.tick > 0:
-                chain = chain_next(chain, frame.digest)
-        return Verified(replica.frame.tick, nodes, chain)
+        return replace(_compare(replica, ticks, nodes), arithmetic=replica.arithmetic.hex())
     finally:
         replica.close()
+
+
+def _compare(replica: Replica, ticks: Iterable[CapturedTick], nodes: int) -> Verified:
+    chain = CHAIN_START
+    for captured in ticks:
+        expected = replica.frame.tick + 1 if captured.tick > 0 else 0
+        if captured.tick != expected:
+            return Verified(replica.frame.tick, nodes, chain, missing_tick=expected)
+        frame = replica.frame if captured.tick == 0 else replica.step(captured.edits, captured.delivered)
+        if frame.digest != captured.digest:
+            return Verified(frame.tick, nodes, chain, frame.tick, _differing(frame, captured))
+        if frame.tick > 0:
+            chain = chain_next(chain, frame.digest)
+    return Verified(replica.frame.tick, nodes, chain)
 
 
 def _differing(frame: Frame, captured: CapturedTick) -> tuple[str, ...]:

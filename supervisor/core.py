@@ -82,6 +82,7 @@ class SupervisorCore:
         self.stop_at = settings.ticks
         self.end: End | None = None
         self.finished = False
+        self.busy = 0.0
         self.account = Account(dict.fromkeys(sorted(self.deployment.nodes), 0))
         self.started_ns = self.committed_ns = 0
         self.on_commit: Callable[[Frame], None] | None = None
@@ -391,7 +392,8 @@ class SupervisorCore:
         self._parts.clear()
         self._slots = Slots(self.frame.layout, owners)
         frame, added = self.frame, self.added_to(self.frame.layout)
-        epoch = Epoch(self.epoch, frame.tick, frame.digest, list(self.members), sorted(owners.items()), added)
+        who = list(self.members), sorted(owners.items()), added, self.roster.arithmetic
+        epoch = Epoch(self.epoch, frame.tick, frame.digest, *who)
         payload = encode(epoch)
         self.actions.append(Journal(payload))
         self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, payload))

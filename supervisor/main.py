@@ -74,6 +74,7 @@ class SupervisorProcess:
         self._inbox.wake()
 
     def _turn(self, now_ns: int) -> None:
+        self.core.busy = self._loop.busy
         if self._is_told_to_end:
             self._is_told_to_end = False
             self.core.stop()

@@ -28,6 +28,8 @@ class Process:
     boot: str
     ready: set[bytes] = field(default_factory=set)
     """Digests of the layouts that it has built."""
+    arithmetic: bytes = b""
+    """A node's digest of a fixed small run of its engine, once it has one."""
     heard_ns: int = 0
     heartbeat: Heartbeat | None = None
     report: dict[str, Any] = field(default_factory=dict)
@@ -52,6 +54,12 @@ class Roster:
     def expected(self) -> list[str]:
         """Names of the nodes and the vHub that the deployment declares."""
         return [*sorted(self.deployment.nodes), VHUB]
+
+    @property
+    def arithmetic(self) -> bytes:
+        """The digest of the fixed small run that all nodes share; empty when there is none, or several."""
+        digests = {process.arithmetic for process in self.by_name.values() if process.arithmetic}
+        return digests.pop() if len(digests) == 1 else b""
 
     @property
     def nodes(self) -> list[str]:
@@ -105,6 +113,7 @@ class Roster:
                     f"a fixed small run of its engine has digest {ready.fingerprint.hex()[:16]}, the first node's is "
                     f"{self._simulation.hex()[:16]}: its results would differ (the deployment may say mixed_cpu: true)"
                 )
+            process.arithmetic = ready.fingerprint
         process.ready.add(ready.layout)
         return ""
 

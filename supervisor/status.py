@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from foosim.protocol.channels import VHUB
+from foosim.protocol.channels import SUPERVISOR, VHUB
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -74,6 +74,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
     report = {} if hub is None else hub.report
     pacer = core.pacer
     ball = core.frame.vector("ball", "position", 3)
+    waiting_for = ", ".join(core.watch.waiting_for(core))
     return {
         **result(core),
         "capture": report.get("capture") or None,
@@ -82,23 +83,30 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "pace": str(pacer.pace),
         "released": core.released,
         "late": {"lag_ms": pacer.last_lag_ns / 1e6, "waited_for": core.watch.late, "tick": core.watch.late_tick},
-        "waiting_for": ", ".join(core.watch.waiting_for(core)),
+        "waiting_for": waiting_for,
         "ball": {"position": [round(value, 4) for value in ball], "solver": core.account.ball_solver},
-        "processes": {
-            name: {
-                "role": process.role,
-                "lost": process.lost and name not in core.roster.stopped,
-                "stopped": name in core.roster.stopped,
-                "busy": 0.0 if process.heartbeat is None else round(process.heartbeat.busy, 3),
-                "tick": 0 if process.heartbeat is None else process.heartbeat.tick,
-                "waiting_for": "" if process.heartbeat is None else process.heartbeat.waiting_for,
-            }
-            for name, process in sorted(core.roster.by_name.items())
-        },
+        "processes": _processes(core, waiting_for),
         "links": report.get("links", []),
         "refusals": report.get("refusals", {}),
         "clients": report.get("clients", []),
     }
+
+
+def _processes(core: SupervisorCore, waiting_for: str) -> dict[str, Any]:
+    """Return all processes as they last told, in name order, and the supervisor itself behind them."""
+    processes = {
+        name: {
+            "role": process.role,
+            "lost": process.lost and name not in core.roster.stopped,
+            "stopped": name in core.roster.stopped,
+            "busy": 0.0 if process.heartbeat is None else round(process.heartbeat.busy, 3),
+            "tick": 0 if process.heartbeat is None else process.heartbeat.tick,
+            "waiting_for": "" if process.heartbeat is None else process.heartbeat.waiting_for,
+        }
+        for name, process in sorted(core.roster.by_name.items())
+    }
+    own = {"role": SUPERVISOR, "lost": False, "stopped": False, "busy": round(core.busy, 3)}
+    return {**processes, SUPERVISOR: {**own, "tick": core.frame.tick, "waiting_for": waiting_for}}
 
 
 def _state(core: SupervisorCore) -> str:

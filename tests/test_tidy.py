@@ -49,6 +49,7 @@ SHELLS = {
     "protocol/journal.py",
     "protocol/loop.py",
     "protocol/process.py",
+    "protocol/quiet.py",
     "protocol/session.py",
     "protocol/wall.py",
     "rehearsal/rehearse.py",

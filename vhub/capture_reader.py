@@ -35,6 +35,7 @@ from foosim.vhub.capture_writer import DEPLOYMENT, END_METADATA, METADATA, VERSI
 from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.rows import (
     CLIENTS,
+    EPOCHS,
     FORMAT,
     FRAME,
     LAYOUT,
@@ -44,6 +45,7 @@ from foosim.vhub.rows import (
     TICK,
     CaptureError,
     ClientRow,
+    EpochRow,
     FrameRow,
     LayoutRow,
     PacketRow,
@@ -166,6 +168,7 @@ class CaptureData:
     frame_blocks: tuple[Frames, ...]
     """Captured frames, a block for each layout."""
     clients: tuple[ClientRow, ...]
+    epochs: tuple[EpochRow, ...]
 
     @property
     def path(self) -> Path:
@@ -233,7 +236,7 @@ def open_capture(path: Path | str) -> CaptureData:
     digests: list[bytes] = []
     layouts: list[LayoutRow] = []
     frames: list[list[FrameRow]] = []
-    clients: list[ClientRow] = []
+    others: dict[str, list[Any]] = {CLIENTS: [], EPOCHS: []}
     for message in scan.messages():
         if message.topic == TICK:
             tick_row = scan.decode(_DECODERS[TICK], message)
@@ -246,8 +249,8 @@ def open_capture(path: Path | str) -> CaptureData:
             if not frames:
                 raise CaptureError(f"{path}: a frame without a layout before it")
             frames[-1].append(scan.decode(_DECODERS[FRAME], message))
-        elif message.topic == CLIENTS:
-            clients.append(scan.decode(_DECODERS[CLIENTS], message))
+        elif message.topic in others:
+            others[message.topic].append(scan.decode(_DECODERS[message.topic], message))
     for before, after in pairwise(ticks):
         if after <= before:
             raise CaptureError(f"{path}: tick {after} comes behind tick {before}")
@@ -265,7 +268,8 @@ def open_capture(path: Path | str) -> CaptureData:
         np.array(ticks, dtype=np.int64),
         np.frombuffer(b"".join(digests), dtype=np.uint8).reshape(len(digests), 32),
         tuple(blocks),
-        tuple(clients),
+        tuple(others[CLIENTS]),
+        tuple(others[EPOCHS]),
     )
 
 
@@ -289,7 +293,10 @@ def _layout_of(about: About, deployment: Deployment, row: LayoutRow) -> Layout:
 
 @dataclass(frozen=True, slots=True)
 class CaptureInfo:
-    """A capture in short, for people and scripts. Digests are hex; `packets` counts fates."""
+    """A capture in short, for people and scripts. Digests are hex; `packets` counts fates.
+
+    `nodes` are those that took part; `arithmetic` has each digest of a fixed small run of their engine.
+    """
 
     path: str
     bytes: int
@@ -304,6 +311,8 @@ class CaptureInfo:
     duration_ns: int
     digest: str
     chain: str
+    nodes: tuple[str, ...]
+    arithmetic: tuple[str, ...]
     packets: Mapping[str, int]
     topics: Mapping[str, int]
 
@@ -315,6 +324,8 @@ def capture_info(path: Path | str) -> CaptureInfo:
     topics: Counter[str] = Counter()
     fates: Counter[str] = Counter()
     tick, digest, chain = 0, b"", CHAIN_START
+    nodes: set[str] = set()
+    arithmetic: set[str] = set()
     for message in scan.messages():
         topics[message.topic] += 1
         if message.topic == TICK:
@@ -323,6 +334,10 @@ def capture_info(path: Path | str) -> CaptureInfo:
             chain = chain_next(chain, digest) if tick > 0 else chain
         elif message.topic == PACKETS:
             fates[scan.decode(_DECODERS[PACKETS], message).fate] += 1
+        elif message.topic == EPOCHS:
+            epoch = scan.decode(_DECODERS[EPOCHS], message)
+            nodes.update(epoch.roster)
+            arithmetic.add(epoch.arithmetic)
     about = scan.about
     tick_ns = _deployment_of(about).tick_ns
     return CaptureInfo(
@@ -339,6 +354,8 @@ def capture_info(path: Path | str) -> CaptureInfo:
         tick * tick_ns,
         digest.hex(),
         chain.hex(),
+        tuple(sorted(nodes)),
+        tuple(sorted(arithmetic - {""})),
         {"offered": fates.total(), **{fate: fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
         dict(sorted(topics.items())),
     )

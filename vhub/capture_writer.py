@@ -25,9 +25,21 @@ from foosim.protocol import limits
 from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
+from foosim.protocol.messages import Epoch
 from foosim.vhub.mcap_file import McapWriter
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import FORMAT, FRAME, PROFILE, ROW_TYPES, CaptureError, frame_row, plan_of, row_schema, rows_of
+from foosim.vhub.rows import (
+    FORMAT,
+    FRAME,
+    PROFILE,
+    ROW_TYPES,
+    CaptureError,
+    epoch_entry,
+    frame_row,
+    plan_of,
+    row_schema,
+    rows_of,
+)
 from foosim.vhub.viewing import LOG, POSES, SCENE, VIEW_TYPES, View
 
 METADATA: Final = "foosim"
@@ -65,6 +77,9 @@ class _Line:
     level: str
     text: str
     tick: int
+
+
+_Item = Closing | Epoch | _Line
 
 
 def library_versions() -> dict[str, str]:
@@ -105,7 +120,7 @@ class CaptureWriter:
         self._synced_tick = -1
         self._error: BaseException | None = None
         self._error_said = False
-        self._queue: deque[Closing | _Line] = deque()
+        self._queue: deque[_Item] = deque()
         self._queued_rows = self._waits = 0
         self._ending: Mapping[str, str] | None = None
         self._idle = False
@@ -126,9 +141,9 @@ class CaptureWriter:
 
     # --- what the owner calls ----------------------------------------------------------------------------------------
 
-    def keep(self, closing: Closing) -> None:
-        """Hand over what one closing gave; wait while the queue is full."""
-        self._put(closing)
+    def keep(self, item: Closing | Epoch) -> None:
+        """Hand over what one closing gave, or an epoch that begins; wait while the queue is full."""
+        self._put(item)
 
     def log(self, level: str, text: str, tick: int) -> None:
         """Hand over a line of the run's log; `level` is info, warning or error."""
@@ -159,7 +174,7 @@ class CaptureWriter:
             self._synced_tick,
         )
 
-    def _put(self, item: Closing | _Line) -> None:
+    def _put(self, item: _Item) -> None:
         rows = _rows_in(item)
         with self._changed:
             assert self._ending is None, "a row after the end"
@@ -225,7 +240,7 @@ class CaptureWriter:
                 sync_at_ns = now_ns + SYNC_NS
         self._end()
 
-    def _take(self, until_ns: int | None) -> tuple[list[Closing | _Line], bool]:
+    def _take(self, until_ns: int | None) -> tuple[list[_Item], bool]:
         """Take a batch of what has gathered, after a wait for anything, or until something is to be flushed.
 
         Also return whether nothing comes after it.
@@ -241,7 +256,7 @@ class CaptureWriter:
             gather = self._ending is None and 0 < self._queued_rows < BATCH_ROWS
         if gather:
             time.sleep(GATHER_S)
-        items: list[Closing | _Line] = []
+        items: list[_Item] = []
         rows = 0
         with self._changed:
             while self._queue and rows < BATCH_ROWS:
@@ -251,13 +266,17 @@ class CaptureWriter:
             self._changed.notify_all()
             return items, self._ending is not None and not self._queue
 
-    def _write_item(self, item: Closing | _Line) -> None:
+    def _write_item(self, item: _Item) -> None:
         self._is_unsynced = True
         if isinstance(item, _Line):
             data = self._view.log_line(item.level, item.text, item.tick)
             self._write_view(LOG, item.tick, data)
             return
         add, encode, channels = self._mcap.add_message, self._encode, self._channels
+        if isinstance(item, Epoch):
+            topic, log_ns, publish_ns, sequence, row = epoch_entry(item, self._plan)
+            add(channels[topic], log_ns, publish_ns, sequence, encode(row))
+            return
         for topic, log_ns, publish_ns, sequence, row in rows_of(item, self._plan, self._known):
             add(channels[topic], log_ns, publish_ns, sequence, encode(row))
             if topic == FRAME:
@@ -342,5 +361,5 @@ class CaptureWriter:
         return CaptureError(f"{self.path}: cannot be written, {error.strerror}")
 
 
-def _rows_in(item: Closing | _Line) -> int:
-    return 1 if isinstance(item, _Line) else 1 + len(item.fates)
+def _rows_in(item: _Item) -> int:
+    return 1 + len(item.fates) if isinstance(item, Closing) else 1

@@ -42,6 +42,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.units import parse_pace
+from foosim.vhub.keeping import Keep, KeepEpoch, Keeping
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
@@ -50,15 +51,7 @@ from foosim.vhub.sessions import Session, Sessions, may_lockstep
 from foosim.vhub.state import HubState, Joining, received
 from foosim.vhub.waits import Waits
 
-
-@dataclass(frozen=True, slots=True)
-class Keep:
-    """Rows for the capture, behind the journal: what one closing gave."""
-
-    closing: Closing
-
-
-HubAction = Action | Keep
+HubAction = Action | Keep | KeepEpoch
 
 
 @dataclass(slots=True)
@@ -89,6 +82,7 @@ class HubCore:
         self._epoch = self._epoch_tick = 0
         self._owners: dict[str, str] = {}
         self.waits = Waits()
+        self._keeping = Keeping()
         self._commits: dict[int, tuple[bytes, Commit, Frame]] = {}
         self._next_commit = 0
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
@@ -287,8 +281,8 @@ class HubCore:
         assert self.releases is not None
         for name, flights in world.free.items():
             self.releases.add(name, state.members[name].downlink, tick, flights, now_ns)
+        self._keeping.add(world.closing)
         self._release(now_ns)
-        self.actions.append(Keep(world.closing))
         self._world = None
         self._commits.pop(tick - limits.KEPT_TICKS, None)
         self._patience.progress(state.tick_ns, now_ns)
@@ -312,16 +306,17 @@ class HubCore:
         return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added))
 
     def _release(self, now_ns: int) -> None:
-        """Say what is released to free-running clients by now."""
+        """Say what is released to free-running clients by now; closings of which nothing waits go to the capture."""
         if self.releases is None or self.state is None:
             return
-        for release in self.releases.take(now_ns):
+        for release in self.releases.take(now_ns, everything=self.finished):
             for flight in release.flights:
                 flight.released_wall_ns = now_ns
             member = self.state.members[release.client]
             self.sessions.say_down(
                 release.client, release.number, release.tick, received(release.flights), member.sequence
             )
+        self.actions += self._keeping.take(self.releases.waiting_tick)
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
@@ -352,6 +347,7 @@ class HubCore:
         first = self._epoch == 0
         self._epoch, self._epoch_tick = epoch.epoch, epoch.tick
         self._owners = dict(epoch.owners)
+        self.actions.append(KeepEpoch(epoch))
         self.member.entered()
         if first:
             self._sent[0] = encode(Deliveries(0, []))
@@ -477,6 +473,7 @@ class HubCore:
         if last is None and self.state.closed + 1 >= self.ended.tick and now_ns < self._end_ns:
             return
         self.finished = True
+        self._release(now_ns)
         committed = last or self._commits.get(self.state.closed + 1) or self._commits.get(self.state.closed)
         if committed is not None:
             _, commit, frame = committed

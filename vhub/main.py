@@ -30,7 +30,8 @@ from foosim.protocol.messages import Build, End
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.core import HubCore
+from foosim.vhub.keeping import Keep, KeepEpoch
 
 CONNECT_S = 60.0
 FORGET_EVERY_NS = 1_000_000_000
@@ -141,9 +142,9 @@ class HubProcess:
             journal.rotate_if_full(self.core.head, closed)
         journal.forget_before(closed if self._capture is None else self._capture.synced_tick)
 
-    def _keep(self, action: Keep) -> None:
+    def _keep(self, action: Keep | KeepEpoch) -> None:
         if self._capture is not None:
-            self._capture.keep(action.closing)
+            self._capture.keep(action.closing if isinstance(action, Keep) else action.epoch)
 
     def _on_say(self, say: Say) -> None:
         if self._capture is not None:

@@ -61,11 +61,16 @@ class Releases:
         self._waiting.append(Release(at_ns, client, number, tick, flights))
         self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
 
-    def take(self, now_ns: int) -> list[Release]:
-        """Take what is due by now, in order."""
-        due = [release for release in self._waiting if release.at_ns <= now_ns]
+    def take(self, now_ns: int, everything: bool = False) -> list[Release]:
+        """Take what is due by now, in order; at the end of the run `everything`."""
+        due = [release for release in self._waiting if everything or release.at_ns <= now_ns]
         self._waiting = self._waiting[len(due) :]
         return due
+
+    @property
+    def waiting_tick(self) -> int | None:
+        """The oldest tick of which something waits."""
+        return min((release.tick for release in self._waiting), default=None)
 
     @property
     def deadline_ns(self) -> int | None:

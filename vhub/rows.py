@@ -23,7 +23,7 @@ from foosim.protocol.draws import Slot
 from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Counter, Delivered, Edit, Push, Remove, Stop
+from foosim.protocol.messages import Add, Counter, Delivered, Edit, Epoch, Push, Remove
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
 from foosim.vhub.records import Closing
 
@@ -35,6 +35,7 @@ CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
 """-1 where there is nothing to say."""
 DigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 EntityDigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{16}$")]
+ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
 WordHex = Annotated[str, Meta(pattern="^([0-9a-f]{16})?$")]
 Fate = Literal["delivered", "dropped", "in_flight"]
 
@@ -50,13 +51,12 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
 class EditRow(Row, frozen=True):
     """A change of the world by an order. Lists are x, y, z in the world frame, empty where the kind has none."""
 
-    kind: Literal["add", "remove", "push", "stop"]
+    kind: Literal["add", "remove", "push"]
     name: str = ""
     model: str = ""
     position: list[float] = []
     velocity: list[float] = []
     impulse: list[float] = []
-    reason: str = ""
 
 
 class DeliveredRow(Row, frozen=True):
@@ -129,7 +129,8 @@ class PacketRow(Row, frozen=True):
     """One offered packet and its fate, with the cause of a drop and what the verdict came from.
 
     `due_ns` and `arrival_tick` are -1 when it was dropped at sending. The words are the 64-bit draws that were used,
-    in hex. `stamp_ns` is the sender's own; `wall_released_ns` the vHub's monotonic clock, 0 when not known.
+    in hex. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when the packet left for a
+    free-running client, 0 for all others.
     """
 
     source: str
@@ -168,6 +169,29 @@ class ClientRow(Row, frozen=True):
     subscriptions: list[SubscriptionRow]
 
 
+class OwnerRow(Row, frozen=True):
+    """A robot and the node that owns it."""
+
+    robot: str
+    node: str
+
+
+class EpochRow(Row, frozen=True):
+    """Who computes from frame `tick` on, whose digest D(tick) is named: the nodes, and the owner of every robot.
+
+    `arithmetic` is the digest of a fixed small run of the nodes' engine, in hex: where it differs, worlds may differ.
+    It is empty where nodes of several kinds take part.
+    """
+
+    tick: Counter
+    epoch: Counter
+    digest: DigestHex
+    roster: list[str]
+    owners: list[OwnerRow]
+    arithmetic: ArithmeticHex
+
+
+EPOCHS: Final = "/epochs"
 TICK: Final = "/tick"
 LAYOUT: Final = "/layout"
 FRAME: Final = "/frame"
@@ -175,6 +199,7 @@ PACKETS: Final = "/packets"
 CLIENTS: Final = "/clients"
 
 ROW_TYPES: Final[Mapping[str, type[Row]]] = {
+    EPOCHS: EpochRow,
     LAYOUT: LayoutRow,
     CLIENTS: ClientRow,
     TICK: TickRow,
@@ -300,6 +325,14 @@ def _tick_row(closing: Closing) -> TickRow:
     )
 
 
+def epoch_entry(epoch: Epoch, plan: Plan) -> Entry:
+    """Return the row of an epoch, in its place."""
+    at_ns = epoch.tick * plan.tick_ns
+    owners = [OwnerRow(robot, node) for robot, node in epoch.owners]
+    row = EpochRow(epoch.tick, epoch.epoch, epoch.digest.hex(), list(epoch.roster), owners, epoch.arithmetic.hex())
+    return EPOCHS, at_ns, at_ns, epoch.tick & 0xFFFF_FFFF, row
+
+
 def layout_row(frame: Frame, base: Layout) -> LayoutRow:
     """Return the row of a frame's layout; `base` is the deployment's own."""
     layout = frame.layout
@@ -332,9 +365,7 @@ def edit_row(edit: Edit) -> EditRow:
         return EditRow("add", edit.name, edit.model, position=list(edit.position), velocity=list(edit.velocity))
     if isinstance(edit, Remove):
         return EditRow("remove", edit.name)
-    if isinstance(edit, Push):
-        return EditRow("push", edit.name, impulse=list(edit.impulse))
-    return EditRow("stop", reason=edit.reason)
+    return EditRow("push", edit.name, impulse=list(edit.impulse))
 
 
 def edit_of(row: EditRow) -> Edit:
@@ -343,9 +374,7 @@ def edit_of(row: EditRow) -> Edit:
         return Add(row.name, row.model, _vector(row.position), _vector(row.velocity))
     if row.kind == "remove":
         return Remove(row.name)
-    if row.kind == "push":
-        return Push(row.name, _vector(row.impulse))
-    return Stop(row.reason)
+    return Push(row.name, _vector(row.impulse))
 
 
 def delivered_of(row: DeliveredRow) -> Delivered:

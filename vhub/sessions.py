@@ -128,10 +128,15 @@ class Sessions:
         self._left_behind.setdefault(name, []).extend(session.inbox)
 
     def take_sent(self) -> dict[str, list[Sent]]:
-        """Take what clients have sent since the last call, by client."""
+        """Take what clients have sent since the last call, by client.
+
+        Where a join waits for its tick, what came with it waits too: there the client is known.
+        """
         taken, self._left_behind = self._left_behind, {}
         for name, session in self.by_name.items():
-            packets, session.inbox = session.inbox, []
+            packets: list[Sent] = []
+            if name not in self.joins:
+                packets, session.inbox = session.inbox, []
             if session.done is not None:
                 packets = [*packets, *session.done.packets]
                 session.done = None

@@ -13,12 +13,14 @@ from collections.abc import Generator, Iterator, Sequence
 from math import fsum, sqrt
 from typing import Any, Final
 
-import pybullet as p
-
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.quiet import without_lines
 from foosim.protocol.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector
-from foosim.protocol.table_scene import BALL_FRICTION, BALL_RESTITUTION, build_scene
+from foosim.protocol.table_scene import build_scene
+
+with without_lines(b"pybullet build time:"):
+    import pybullet as p
 
 # Pairs that can touch: balls with everything, nothing else. Rods would rub on the walls that they run through, and
 # without a filter a step costs five times as much.
@@ -252,11 +254,12 @@ class BulletEngine:
         A ball has the roots of the values of two balls, everything else what makes the product with a ball its pair
         value; rolling friction is (each side's own times the other's friction), and a ball's own is 0.
         """
-        bounce, grip = sqrt(BALL_RESTITUTION), sqrt(BALL_FRICTION)
+        surfaces = self._table.surfaces
+        bounce, grip = sqrt(surfaces.balls.restitution), sqrt(surfaces.balls.friction)
         if surface == "ball":
             values = (bounce, grip, 0.0)
         else:
-            pair = getattr(self._table.surfaces, surface)
+            pair = getattr(surfaces, surface)
             values = (pair.restitution / bounce, pair.friction / grip, pair.rolling_friction / grip)
         p.changeDynamics(
             body,

@@ -16,7 +16,7 @@ from foosim.node.engines.pure_shapes import Contact, Figures, Scenery
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.scene import Vector, multiply
-from foosim.protocol.table_scene import BALL_FRICTION, BALL_RESTITUTION, ball_body, build_scene
+from foosim.protocol.table_scene import ball_body, build_scene
 
 SILENT: Final = frozenset({"floor", "ramps"})
 """What a ball rolls on: its contacts are not logged."""
@@ -24,7 +24,6 @@ CONTACTS_MAX: Final = 6
 """Contacts with the scenery that are put right in one substep: a corner has three, and once more."""
 DEPTH_MIN: Final = 1e-12
 """Overlaps below this (m) are rounding."""
-BALLS: Final = Pair(BALL_RESTITUTION, BALL_FRICTION, 0.0)
 
 
 class PureEngine:
@@ -38,6 +37,7 @@ class PureEngine:
         scene = build_scene(deployment, layout)
         surfaces = table.surfaces
         pairs = {name: Pair.of(getattr(surfaces, name), name in SILENT) for name in type(surfaces).model_fields}
+        self._among_balls = pairs.pop("balls")
         ball = ball_body(table, "ball").links[0]
         self._ball = (table.ball.radius, ball.mass, ball.inertia[0], table.gravity)
         self._scenery = Scenery(scene.scenery, pairs, table.ball.radius)
@@ -128,7 +128,7 @@ class PureEngine:
                 yield_rod(ball, rod, contact[1], contact[0])
 
     def _clash(self, ball: Ball, other: Ball, substep: int) -> None:
-        impulse = meet_ball(ball, other, BALLS, self._dt)
+        impulse = meet_ball(ball, other, self._among_balls, self._dt)
         if impulse > 0.0:
             ball.log.add(impulse, substep)
             other.log.add(impulse, substep)

@@ -14,7 +14,7 @@ from math import sin, sqrt
 from typing import Final
 
 from foosim.protocol.scene import Body
-from foosim.protocol.table import Surface
+from foosim.protocol.table import BallSurface, Surface
 from foosim.protocol.table_scene import spin_inertia
 
 BOUNCE_SPEED_MIN: Final = 0.05
@@ -33,8 +33,9 @@ class Pair:
     silent: bool = False
 
     @classmethod
-    def of(cls, surface: Surface, silent: bool = False) -> Pair:
-        return cls(surface.restitution, surface.friction, surface.rolling_friction, silent)
+    def of(cls, surface: Surface | BallSurface, silent: bool = False) -> Pair:
+        rolling = surface.rolling_friction if isinstance(surface, Surface) else 0.0
+        return cls(surface.restitution, surface.friction, rolling, silent)
 
 
 class Log:

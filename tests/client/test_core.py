@@ -101,7 +101,7 @@ class Air:
 
     def start(self) -> None:
         owners = [(robot, "n1") for robot in DEPLOYMENT.robots]
-        self.tell(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [])))
+        self.tell(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [], b"")))
 
     def close(self) -> None:
         """Give the hub one more tick: its frame and, at every fifth, one packet of the red goalkeeper."""

@@ -145,7 +145,7 @@ def lies_to_nodes(system: System) -> list[Lie]:
     part = Part(epoch, tick + 1, "n2", bytes(32), [], b"", b"", [])
     push: list[Edit] = [Push("ball", (1.0, 0.0, 0.0))]
     owners = sorted(core.owners.items())
-    new = Epoch(epoch + 9, tick, frame.digest, ["n1", "n2"], owners, [])
+    new = Epoch(epoch + 9, tick, frame.digest, ["n1", "n2"], owners, [], b"")
     said: list[tuple[Channel, str, msgspec.Struct]] = [
         (channels.PART, "n2", replace(part, node="n1")),
         (channels.PART, "n2", replace(part, epoch=0)),
@@ -190,8 +190,8 @@ def lies_to_the_hub(system: System) -> list[Lie]:
         (channels.SAMPLES, "n1", replace(samples, node="n2")),
         (channels.SAMPLES, "n1", samples),
         (channels.SAMPLES, "n1", replace(samples, tick=FAR)),
-        (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], [])),
-        (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], [])),
+        (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], [], b"")),
+        (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], [], b"")),
         (channels.TEMPO, SUPERVISOR, Tempo("1e999x", False)),
         (channels.BUILD, VHUB, Build(VHUB, "other", "run", "t", "", "fast", [])),
         (channels.REFUSAL, VHUB, Refusal(VHUB, "other", "go away")),

@@ -120,3 +120,45 @@ def test_what_is_not_asked_for_is_left_as_it_is(engine: Engine) -> None:
     tick(engine, LAYOUT, numbers)
     changed = {index for index in range(LAYOUT.size) if numbers[index] != before[index]}
     assert changed and all(BALL.start <= index < BALL.offsets["quarantined"] for index in changed)
+
+
+@pytest.mark.parametrize("kind", sorted(ENGINES))
+@pytest.mark.parametrize(("restitution", "friction"), [(0.8, 0.2), (0.3, 0.05), (0.01, 0.01), (1.0, 0.6)])
+def test_balls_meet_with_the_values_of_their_pair(kind: str, restitution: float, friction: float) -> None:
+    """Head-on, one of the two spinning. The impulse of friction is friction x impulse while they slip."""
+    balls = f"table.surfaces.balls={{restitution: {restitution}, friction: {friction}}}"
+    sets = [f"engine={kind}", "table.contact_erp=0", "table.gravity=0 m/s2", balls]
+    deployment = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+    layout = build_layout(deployment, [("ball2", "ball")])
+    pair = [layout["ball"], layout["ball2"]]
+    numbers = initial_numbers(deployment, layout)
+    for ball, side in zip(pair, (-1.0, 1.0), strict=True):
+        place_ball(numbers, ball, (0.03 * side, 0.05, 0.1), (-2.0 * side, 0.0, 0.0))
+    spin = pair[0].offsets["angular_velocity"]
+    numbers[spin : spin + 3] = [0.0, 0.0, 1000.0]
+    engine = ENGINES[kind](deployment, layout)
+    for _ in range(10):
+        engine.load(pair, numbers)
+        engine.step(deployment.substeps)
+        engine.read(pair, numbers)
+    engine.close()
+    one, other = (numbers[ball.offsets["linear_velocity"] : ball.offsets["linear_velocity"] + 3] for ball in pair)
+    assert (other[0] - one[0]) / 4.0 == pytest.approx(restitution, abs=1e-3)
+    assert other[1] == pytest.approx(friction * 2.0 * (1 + restitution), rel=0.01)
+    assert one[1] == pytest.approx(-other[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", sorted(ENGINES))
+def test_what_balls_feel_of_one_another_changes_nothing_else(kind: str) -> None:
+    speeds = []
+    for balls in ("{restitution: 0.8, friction: 0.2}", "{restitution: 0.01, friction: 10}"):
+        sets = [f"engine={kind}", "table.contact_erp=0", f"table.surfaces.balls={balls}"]
+        deployment = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+        numbers = initial_numbers(deployment, LAYOUT)
+        place_ball(numbers, BALL, (0.0, 0.3, 0.03), (1.0, 3.0, 0.0))
+        engine = ENGINES[kind](deployment, LAYOUT)
+        for _ in range(40):
+            tick(engine, LAYOUT, numbers)
+        engine.close()
+        speeds.append(numbers[BALL.offsets["linear_velocity"] : BALL.offsets["linear_velocity"] + 3])
+    assert speeds[0][1] < -1.0 and speeds[1] == pytest.approx(speeds[0], rel=1e-6)

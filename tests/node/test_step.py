@@ -17,7 +17,7 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Delivered, Edit, Push, Remove, Stop
+from foosim.protocol.messages import Add, Delivered, Edit, Push, Remove
 from foosim.protocol.start import initial_frame, initial_numbers, place_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -108,7 +108,7 @@ def test_edits_apply_in_their_order() -> None:
 
 @pytest.mark.parametrize(
     "edit",
-    [Add("ball", "ball", HERE, THERE), Push("red.goal", HERE), Push("nobody", HERE), Remove("ball"), Stop("now")],
+    [Add("ball", "ball", HERE, THERE), Push("red.goal", HERE), Push("nobody", HERE), Remove("ball")],
     ids=lambda edit: type(edit).__name__,
 )
 def test_an_edit_that_does_not_fit_changes_nothing(edit: Edit) -> None:
@@ -119,7 +119,7 @@ def test_an_edit_that_does_not_fit_changes_nothing(edit: Edit) -> None:
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
 def test_edits_with_numbers_that_are_not_finite_are_malformed(bad: float) -> None:
-    check_edits([Add("a2", "ball", HERE, THERE), Push("ball", HERE), Remove("a2"), Stop("x")])
+    check_edits([Add("a2", "ball", HERE, THERE), Push("ball", HERE), Remove("a2")])
     wrong: list[Edit] = [
         Add("a2", "ball", (0.0, bad, 0.0), REST),
         Add("a2", "ball", HERE, (0.0, 0.0, bad)),

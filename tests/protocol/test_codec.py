@@ -28,6 +28,7 @@ from foosim.protocol.messages import (
     Delivered,
     Deliveries,
     Done,
+    End,
     Epoch,
     Hello,
     Order,
@@ -36,7 +37,6 @@ from foosim.protocol.messages import (
     Remove,
     Request,
     Sent,
-    Stop,
     Up,
     Want,
 )
@@ -251,18 +251,23 @@ OVERSIZED: Final[dict[str, tuple[Any, Any, Any]]] = {
     ),
     "owners": (
         Epoch,
-        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * limits.ENTITIES_MAX, []),
-        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * (limits.ENTITIES_MAX + 1), []),
+        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * limits.ENTITIES_MAX, [], b""),
+        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * (limits.ENTITIES_MAX + 1), [], b""),
     ),
     "added": (
         Epoch,
-        Epoch(1, 0, bytes(32), ["n"], [], [AddedEntity("b", "ball")] * limits.ENTITIES_MAX),
-        Epoch(1, 0, bytes(32), ["n"], [], [AddedEntity("b", "ball")] * (limits.ENTITIES_MAX + 1)),
+        Epoch(1, 0, bytes(32), ["n"], [], [AddedEntity("b", "ball")] * limits.ENTITIES_MAX, b""),
+        Epoch(1, 0, bytes(32), ["n"], [], [AddedEntity("b", "ball")] * (limits.ENTITIES_MAX + 1), b""),
+    ),
+    "arithmetic": (
+        Epoch,
+        Epoch(1, 0, bytes(32), ["n"], [], [], bytes(32)),
+        Epoch(1, 0, bytes(32), ["n"], [], [], bytes(33)),
     ),
     "a text": (
-        Order,
-        Order(1, 0, [Stop("r" * limits.TEXT_LENGTH_MAX)]),
-        Order(1, 0, [Stop("r" * (limits.TEXT_LENGTH_MAX + 1))]),
+        End,
+        End(1, "r" * limits.TEXT_LENGTH_MAX, False),
+        End(1, "r" * (limits.TEXT_LENGTH_MAX + 1), False),
     ),
     "arguments": (
         Request,
@@ -298,11 +303,10 @@ def test_number_arrays_are_raw_little_endian_floats(numbers: list[float]) -> Non
 
 
 def test_edits_are_told_apart_by_their_tags() -> None:
-    edits: list[Add | Remove | Push | Stop] = [
+    edits: list[Add | Remove | Push] = [
         Add("b", "ball", (0.0, 0.0, 0.1), (1.0, -0.0, 0.0)),
         Push("ball", (0.0, 1e-300, 0.0)),
         Remove("b"),
-        Stop("x"),
     ]
     order = decode(Order, encode(Order(1, 2, edits)))
     assert order.edits == edits

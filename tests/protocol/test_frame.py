@@ -27,7 +27,7 @@ from foosim.protocol.frame import (
     layout_after,
 )
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Add, Edit, Order, Outbox, Push, Remove, Stop
+from foosim.protocol.messages import Add, Edit, Order, Outbox, Push, Remove
 from foosim.protocol.start import initial_frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -161,7 +161,7 @@ def test_where_an_order_ends_and_deliveries_begin_is_part_of_the_basis() -> None
 
 
 def test_the_content_of_an_order_has_no_epoch() -> None:
-    edits: list[Edit] = [Remove("b"), Stop("x")]
+    edits: list[Edit] = [Remove("b"), Push("ball", REST)]
     assert encode(Order(1, 2, edits)) != encode(Order(9, 2, edits))
     assert edits_content(edits) in encode(Order(1, 2, edits))
     assert edits_content([]) == encode([])
@@ -191,7 +191,7 @@ def test_additions_and_removals_change_the_layout() -> None:
 
 
 def test_what_leaves_the_layout_alone_gives_the_same_one() -> None:
-    for edits in ([], [Push("ball", REST)], [Stop("x")]):
+    for edits in ([], [Push("ball", REST)]):
         assert layout_after(LAYOUT, edits) is LAYOUT
 
 

@@ -9,13 +9,19 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
-from foosim.protocol.deployment_file import load_deployment
+from foosim.node.core import NodeCore
+from foosim.node.engines import ENGINES
+from foosim.node.engines.interface import Engine
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.layout import Layout
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.replay_command import app
-from foosim.rehearsal.system import System
+from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify, verify_capture
 from foosim.vhub.capture_reader import CapturedTick, open_capture
 from foosim.vhub.mcap_file import McapFile, Message
+from foosim.vhub.rows import OwnerRow
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT = TABLE.read_text()
@@ -43,6 +49,12 @@ def test_a_capture_is_simulated_again_bit_for_bit(tmp_path: Path, engine: str, n
     verified = verify_capture(tmp_path / "run.mcap", nodes)
     assert verified.equal and verified.ticks == TICKS
     assert verified.chain.hex() == result.json["digest"]["chain"]
+    first, second = open_capture(tmp_path / "run.mcap").epochs
+    assert first.arithmetic == second.arithmetic == verified.arithmetic != "" and verified.other_arithmetic == ()
+    assert OwnerRow("red.goal", "n1") in first.owners and OwnerRow("red.goal", "n2") in second.owners
+    assert first.roster == second.roster == ["n1", "n2"] and (first.tick, first.epoch, second.epoch) == (0, 1, 2)
+    digests = {tick.tick: tick.digest.hex() for tick in open_capture(tmp_path / "run.mcap").captured_ticks()}
+    assert [epoch.digest for epoch in (first, second)] == [digests[epoch.tick] for epoch in (first, second)]
 
 
 def messages_of(path: Path) -> dict[str, list[tuple[int, int, bytes]]]:
@@ -64,7 +76,7 @@ def test_law_2_two_runs_give_equal_captures(tmp_path: Path) -> None:
     capture_to(tmp_path / "two.mcap")
     one, two = messages_of(tmp_path / "one.mcap"), messages_of(tmp_path / "two.mcap")
     assert sorted(one) == sorted(two)
-    assert {"/tick", "/frame", "/packets", "/tf", "/scene"} <= set(one)
+    assert {"/epochs", "/tick", "/frame", "/packets", "/tf", "/scene"} <= set(one)
     for topic, messages in one.items():
         assert messages == two[topic], topic
 
@@ -97,6 +109,42 @@ def test_a_missing_tick_is_named(tmp_path: Path) -> None:
     ticks = [tick for tick in capture.captured_ticks() if tick.tick != 77]
     found = verify(capture.about.deployment_text, capture.about.deployment_name, ticks)
     assert not found.equal and found.missing_tick == 77
+
+
+class OtherNode(NodeCore):
+    """A node that says another digest of its engine's small run than it has."""
+
+    def engine_ready(self, layout: Layout, fingerprint: bytes) -> None:
+        super().engine_ready(layout, bytes(31) + b"?")
+
+
+def heavier(deployment: Deployment, layout: Layout) -> Engine:
+    """An engine in which everything falls a little faster: another arithmetic, another world."""
+    text = apply_sets(TEXT, TABLE.name, ["table.gravity=9.82 m/s2"])
+    return ENGINES["pure"](load_deployment(text, TABLE.name), layout)
+
+
+def test_where_ticks_differ_the_command_says_that_the_arithmetic_does(tmp_path: Path) -> None:
+    runner = CliRunner()
+    path = tmp_path / "run.mcap"
+    rehearse(TEXT, TABLE.name, 300, 2, ["engine=pure"], Settings(factory=heavier), capture=path)
+    (epoch,) = open_capture(path).epochs
+    own = verify_capture(path).arithmetic
+    assert len(own) == 64 and epoch.arithmetic != own
+    done = runner.invoke(app, ["verify", str(path)])
+    assert done.exit_code == 1 and done.stdout.startswith("differs at tick ")
+    assert f"the capture's arithmetic is {epoch.arithmetic}, this machine's is {own}" in done.stderr
+    shown = runner.invoke(app, ["info", str(path)])
+    assert "\n  nodes n1, n2\n" in shown.stdout and f"\n  arithmetic {epoch.arithmetic}\n" in shown.stdout
+
+
+def test_where_no_tick_differs_another_arithmetic_is_no_news(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    rehearse(TEXT, TABLE.name, 100, 1, ["engine=pure"], Settings(node=OtherNode), capture=path)
+    verified = verify_capture(path, 2)
+    assert verified.equal and verified.other_arithmetic == ((bytes(31) + b"?").hex(),)
+    done = CliRunner().invoke(app, ["verify", str(path)])
+    assert done.exit_code == 0 and done.stderr == ""
 
 
 def test_the_command_says_what_it_found(tmp_path: Path) -> None:

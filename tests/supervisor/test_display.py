@@ -43,6 +43,7 @@ def running() -> dict[str, Any]:
         "processes": {
             "blue": {"role": "node", **HERE, "busy": 0.314, "tick": 6170, "waiting_for": "order"},
             "vhub": {"role": "vhub", **HERE, "busy": 0.22, "tick": 6170, "waiting_for": "Done of player-blue"},
+            "supervisor": {"role": "supervisor", **HERE, "busy": 0.106, "tick": 6170, "waiting_for": "red"},
         },
         "links": [
             ["player-red", "red.goal", 1234, 1220, 9, 1_302_000],
@@ -77,6 +78,7 @@ def test_a_row_for_each_node_with_what_it_owns_solved_and_its_load(running: dict
     assert "red.5 and 2 more" in row_of(text, "not here yet")
     assert "6170" in row_of(text, "not here yet")
     assert row_of(text, "vhub").split() == ["vhub", "22%", "Done", "of", "player-blue"]
+    assert row_of(text, "supervisor").split() == ["supervisor", "11%", "red"]
 
 
 def test_a_row_for_each_link_and_one_for_all(running: dict[str, Any]) -> None:
@@ -98,7 +100,7 @@ def test_the_plain_line_has_the_same_in_short(running: dict[str, Any]) -> None:
     assert plain_line(running) == (
         "12.34 s | realtime 1.00x | lag 0.7 ms (p50 0.3, p99 1.6, max 7.4), waited for player-blue | red 2 : 1 blue | "
         "ball at +0.123 -0.045 +0.018 m, solved by red | packets 22510 offered, 22390 delivered, 113 dropped | "
-        "load blue 31% vhub 22%"
+        "load blue 31% vhub 22% supervisor 11%"
     )
 
 

@@ -92,7 +92,7 @@ def test_a_request_is_in_the_journal_before_the_tick_at_which_it_takes_effect(wa
     )
     history = fold(DEPLOYMENT, watched.records[:cut])
     assert history.frame.tick <= pushed.tick
-    assert [edit.name for edit in history.edits[pushed.tick]] == ["ball"]  # type: ignore[union-attr]
+    assert [edit.name for edit in history.edits[pushed.tick]] == ["ball"]
 
 
 def test_a_further_file_says_what_the_ones_before_said(watched: Watched) -> None:

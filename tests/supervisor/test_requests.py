@@ -315,12 +315,16 @@ def test_down_ends_the_run_after_the_tick_that_its_answer_names(pace: Pace, paus
 
 
 def test_status_is_of_the_tick_that_its_answer_names() -> None:
-    run = Run(nodes=2).ask_at(40, "status").go()
-    (answer,) = run.answers
+    run = Run(nodes=2)
+    run.system.supervisor.busy = 0.4321
+    (answer,) = run.ask_at(40, "status").go().answers
     status = decode_json(answer.result)
     assert status["ticks"] == answer.tick and status["digest"]["frame"] == run.frames[answer.tick - 1].digest.hex()
     assert (status["state"], status["epoch"], sorted(status["nodes"])) == ("running", 1, ["n1", "n2"])
-    assert set(status["processes"]) == {"n1", "n2", "vhub"}
+    assert set(status["processes"]) == {"n1", "n2", "supervisor", "vhub"}
+    own = status["processes"]["supervisor"]
+    assert (own["role"], own["busy"], own["tick"]) == ("supervisor", 0.432, answer.tick)
+    assert own["waiting_for"] == status["waiting_for"]
 
 
 # --- ids and refusals ------------------------------------------------------------------------------------------------

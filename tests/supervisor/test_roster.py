@@ -72,6 +72,7 @@ def test_a_deployment_may_allow_mixed_processors() -> None:
     other = roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
     assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT)) == ""
     assert roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER)) == ""
+    assert roster.arithmetic == b"", "there are several"
 
 
 def test_engines_whose_small_run_differs_are_refused() -> None:
@@ -84,13 +85,16 @@ def test_engines_whose_small_run_differs_are_refused() -> None:
         "a fixed small run of its engine has digest 0000000000000000, the first node's is 00010203"
     )
     assert roster.missing(LAYOUT) == ["blue", "vhub"] and "blue" not in roster.by_name
+    assert roster.arithmetic == PRINT
 
 
 def test_the_vhub_has_no_engine_to_compare() -> None:
     roster = Roster(DEPLOYMENT, PRINT)
     hub = roster.take(Hello("vhub", "vhub", "b", limits.PROTOCOL_VERSION, "table", PRINT), 0)
+    assert roster.arithmetic == b"", "no node is here"
     roster.note_ready(roster.take(HELLO, 0), Ready("red", "boot-1", LAYOUT, PRINT))
     assert roster.note_ready(hub, Ready("vhub", "b", LAYOUT, OTHER)) == ""
+    assert roster.arithmetic == PRINT
 
 
 def test_missing_is_who_has_not_built_this_layout() -> None:

@@ -41,14 +41,14 @@ from foosim.protocol.messages import (
     RobotPacket,
     Samples,
     Sent,
-    Stop,
     Subscription,
     Up,
 )
 from foosim.protocol.start import initial_numbers
 from foosim.vhub import capture_writer
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.core import HubCore, Keep
+from foosim.vhub.core import HubCore
+from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -57,6 +57,7 @@ WATCHER = "watcher"
 ADDED_AT, PUSHED_AT, REMOVED_AT = 25, 30, 45
 DOWN_FROM, DOWN_TO = 20, 40
 GONE_AT, BACK_AT = 35, 50
+EPOCH_AT = 28
 SETS = (
     "clients={watcher: {lockstep: false}}",
     "network.links=[{id: slow, from: watcher, to: '*', delay: 7 ms},"
@@ -81,6 +82,7 @@ class HubRun:
     records: list[bytes] = field(default_factory=list)
     snapshots: list[bytes] = field(default_factory=list)
     closings: list[Closing] = field(default_factory=list)
+    epochs: list[Epoch] = field(default_factory=list)
     deliveries: dict[int, list[bytes]] = field(default_factory=dict)
     downs: list[tuple[str, Go | Down]] = field(default_factory=list)
     head: bytes = b""
@@ -115,6 +117,8 @@ class Driver:
                 self.run.records.append(action.record)
             elif isinstance(action, Keep):
                 self.run.closings.append(action.closing)
+            elif isinstance(action, KeepEpoch):
+                self.run.epochs.append(action.epoch)
             elif isinstance(action, Publish) and action.channel is channels.DELIVERIES:
                 deliveries = decode(Deliveries, action.payload)
                 self.run.deliveries.setdefault(deliveries.tick, []).append(action.payload)
@@ -130,8 +134,14 @@ class Driver:
         for name, player in self.deployment.players.items():
             wanted = [Subscription(robot, heard) for robot, names in player.robots.items() for heard in names]
             self.join(name, self.deployment.ticks(player.rate_hz), wanted)
-        owners = [(robot, "n1") for robot in self.deployment.robots]
-        self.say(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [])))
+        self.begin_epoch(1, "n1", b"")
+
+    def begin_epoch(self, epoch: int, node: str, arithmetic: bytes) -> None:
+        """Begin an epoch at the tick that was closed last, in which one of two nodes owns everything; say it twice."""
+        owners = [(robot, node) for robot in self.deployment.robots]
+        message = Epoch(epoch, max(0, self.tick), bytes([epoch]) * 32, ["n1", "n2"], owners, [], arithmetic)
+        for _ in range(2):
+            self.say(channels.EPOCH, channels.SUPERVISOR, encode(message))
 
     def join(self, name: str, period: int, wanted: list[Subscription], boot: str = "one") -> None:
         hello = ClientHello(name, boot, limits.PROTOCOL_VERSION, "", 0)
@@ -143,8 +153,11 @@ class Driver:
         self.tick += 1
         tick = self.tick
         self._clients_before(tick)
+        if tick == EPOCH_AT:
+            self.begin_epoch(2, "n2", noise(32, "arithmetic"))
         frame = self.frame(tick)
-        commit = Commit(1, tick, frame.digest, frame.values.tobytes(), frame.outbox_items, self.edits(tick), last)
+        epoch = len(self.run.epochs)
+        commit = Commit(epoch, tick, frame.digest, frame.values.tobytes(), frame.outbox_items, self.edits(tick), last)
         self.say(channels.COMMIT, channels.VHUB, encode(commit))
         if last:
             return
@@ -186,7 +199,7 @@ class Driver:
         if tick == ADDED_AT:
             return [Add("ball2", "ball", (0.1, -0.0, 1e-9), (0.0, 1.0, -2.5))]
         if tick == PUSHED_AT:
-            return [Push("ball", (0.01, 1 / 3, -0.0)), Stop("a stop that is none")]
+            return [Push("ball", (0.01, 1 / 3, -0.0)), Push("ball2", (0.0, -1e-300, 2.5))]
         return [Remove("ball2")] if tick == REMOVED_AT else []
 
     def _samples(self, tick: int, robot: str) -> list[RobotPacket]:
@@ -269,7 +282,10 @@ def write_capture(path: Path, run: HubRun) -> Path:
     """Write a run's capture, with three lines of log."""
     metadata = {"run": "run-1", "fingerprint": "00"}
     writer = CaptureWriter(path, run.deployment, NAME, run.text, metadata)
+    epochs = {epoch.tick: epoch for epoch in run.epochs}
     for closing in run.closings:
+        if closing.frame.tick in epochs:
+            writer.keep(epochs[closing.frame.tick])
         writer.keep(closing)
     for line in LOG_LINES:
         writer.log(*line)

@@ -21,8 +21,9 @@ from foosim.protocol.frame import CHAIN_START, chain_next
 from foosim.protocol.scene import forward_kinematics
 from foosim.protocol.table_scene import build_scene
 from foosim.vhub.capture_reader import CaptureData, capture_info, open_capture
-from foosim.vhub.rows import ROW_TYPES, CaptureError, row_schema
+from foosim.vhub.rows import ROW_TYPES, CaptureError, EpochRow, OwnerRow, row_schema
 from foosim.vhub.viewing import VIEW_TYPES
+from tests.vhub.conftest import noise
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -120,8 +121,24 @@ def test_what_the_run_was_is_in_the_capture(capture: CaptureData, hub_run: HubRu
         (35, "watcher", "leaves"),
         (50, "watcher", "joins"),
     ]
-    with pytest.raises(CaptureError, match="no rows of '/tock', there are /clients, /frame, /layout, /packets, /tick"):
+    with pytest.raises(
+        CaptureError, match="no rows of '/tock', there are /clients, /epochs, /frame, /layout, /packets, /tick"
+    ):
         list(capture.rows("/tock"))
+
+
+def test_epochs_come_back_with_nodes_owners_and_arithmetic(capture: CaptureData, hub_run: HubRun, path: Path) -> None:
+    first, second = rows = list(capture.rows("/epochs"))
+    assert rows == list(capture.epochs) and all(isinstance(row, EpochRow) for row in rows)
+    assert isinstance(first, EpochRow) and isinstance(second, EpochRow)
+    assert [(row.tick, row.epoch, row.digest) for row in capture.epochs] == [(0, 1, "01" * 32), (28, 2, "02" * 32)]
+    assert first.roster == second.roster == ["n1", "n2"]
+    robots = list(hub_run.deployment.robots)
+    assert first.owners == [OwnerRow(robot, "n1") for robot in robots]
+    assert second.owners == [OwnerRow(robot, "n2") for robot in robots]
+    assert (first.arithmetic, second.arithmetic) == ("", noise(32, "arithmetic").hex())
+    info = capture_info(path)
+    assert (info.nodes, info.arithmetic) == (("n1", "n2"), (second.arithmetic,))
 
 
 def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
@@ -140,6 +157,7 @@ def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
     }
     assert info.topics == {
         "/clients": 5,
+        "/epochs": 2,
         "/frame": 8,
         "/layout": 3,
         "/log": 3,

@@ -80,7 +80,7 @@ def test_they_are_no_more_than_the_supervisor_lets_nodes_go() -> None:
     hub = Hub()
     for name in PERIODS:
         hub.enter(name, 100)
-    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, []))
+    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
     hub.said()
     hub.commit(0)
     hub.done("hand", 0)

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Add, Edit, Push, Remove, Stop
+from foosim.protocol.messages import Add, Edit, Push, Remove
 from foosim.vhub.rows import (
     CLIENTS,
+    EPOCHS,
     FRAME,
     LAYOUT,
     PACKETS,
@@ -32,6 +33,7 @@ from foosim.vhub.rows import (
     delivered_of,
     edit_of,
     edit_row,
+    epoch_entry,
     plan_of,
     row_schema,
     rows_of,
@@ -46,7 +48,7 @@ def entries(hub_run: HubRun) -> list[Entry]:
     """All rows of the run, in the order in which a writer writes them."""
     plan = plan_of(hub_run.deployment)
     known: Frame | None = None
-    made: list[Entry] = []
+    made: list[Entry] = [epoch_entry(epoch, plan) for epoch in hub_run.epochs]
     for closing in hub_run.closings:
         made += rows_of(closing, plan, known)
         known = closing.frame
@@ -193,7 +195,6 @@ edits = st.one_of(
     st.builds(Add, names, names, vectors, vectors),
     st.builds(Remove, names),
     st.builds(Push, names, vectors),
-    st.builds(Stop, st.text()),
 )
 
 
@@ -210,4 +211,4 @@ def test_an_edit_of_a_wrong_shape_is_refused() -> None:
 
 
 def test_topics_are_those_of_the_readme() -> None:
-    assert {TICK, LAYOUT, FRAME, PACKETS, CLIENTS} == set(ROW_TYPES)
+    assert {EPOCHS, TICK, LAYOUT, FRAME, PACKETS, CLIENTS} == set(ROW_TYPES)

@@ -87,7 +87,7 @@ class Hub:
     def begin(self) -> Hub:
         for name in PERIODS:
             self.enter(name)
-        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, []))
+        self.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
         return self
 
     def commit(self, tick: int, last: bool = False) -> None:
@@ -384,6 +384,48 @@ def test_what_a_client_sent_before_it_went_is_still_judged() -> None:
     (deliveries,) = hub.said(channels.DELIVERIES)
     assert [packet.sequence for packet in deliveries.packets] == [1, 2, 3]
     assert hub.state.refusals == {"duplicate": 1} and hub.state.members["ear"].active
+
+
+@pytest.mark.parametrize("comes_back", [False, True])
+def test_what_is_sent_before_the_join_is_taken_is_judged_with_it(comes_back: bool) -> None:
+    """The join and the packets come while tick 5 waits for a Done: the join is taken at tick 6."""
+    hub = Hub().begin()
+    if comes_back:
+        hub.enter("ear")
+        hub.close(0)
+        hub.core.client_gone("ear", 0)
+    for tick in range(1 if comes_back else 0, 5):
+        hub.close(tick)
+    hub.commit(5)
+    hub.enter("ear", boot="two")
+    hub.say(channels.UP, "ear", Up("ear", "two", [sent(2), sent(1)]))
+    hub.said()
+    hub.done("hand", 5)
+    while hub.state.closed < 5 or not hub.state.hears_clients:
+        assert all(not deliveries.packets for deliveries in hub.said(channels.DELIVERIES))
+        assert hub.state.packets.offered == 0
+        hub.close(hub.state.closed + 1)
+    hub.said()
+    hub.say(channels.UP, "ear", Up("ear", "two", [sent(3), sent(2)]))
+    hub.close(hub.state.closed + 1)
+    (deliveries,) = hub.said(channels.DELIVERIES)
+    assert [(packet.source, packet.sequence) for packet in deliveries.packets] == [("ear", 1), ("ear", 2), ("ear", 3)]
+    assert hub.state.refusals == {"duplicate": 1}
+    assert hub.state.members["ear"].joined_tick == hub.state.closed
+
+
+def test_what_is_sent_without_ever_joining_is_refused() -> None:
+    """One says hello and nothing more; the other is gone again before its join was taken."""
+    hub = Hub().begin()
+    hub.commit(0)
+    hub.say(channels.CLIENT_HELLO, "eye", ClientHello("eye", "one", limits.PROTOCOL_VERSION, "", 0))
+    hub.enter("ear")
+    for name in ("ear", "eye"):
+        hub.say(channels.UP, name, Up(name, "one", [sent(1)]))
+    hub.core.client_gone("ear", 0)
+    hub.done("hand", 0)
+    hub.done("knee", 0)
+    assert hub.state.closed == 0 and hub.state.refusals == {"unknown_source": 2}
 
 
 def presence(hub: Hub) -> tuple[bool, int]:

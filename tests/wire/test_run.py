@@ -159,6 +159,7 @@ def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(house
         assert resumed.text == f"resumed at tick {resumed.tick}"
         house.wait_for("ticks", lambda: asked.status()["ticks"] > resumed.tick)
         assert asked.status()["pace"] == "fast"
+        house.wait_for("its load", lambda: asked.status()["processes"]["supervisor"]["busy"] > 0.0)
         last = asked.ask("down").tick
     code, out, err = house.end(up)
     assert code == 0, err

@@ -59,7 +59,7 @@ def test_processes_say_what_a_rehearsal_says(house: House, monkeypatch: pytest.M
     rehearse(text, "table.yaml", TICKS, None, [*common, *scribes(rehearsed)], capture=capture)
 
     found, expected = said_in(real / "run.mcap"), said_in(capture)
-    assert {"/tick", "/frame", "/packets", "/clients", "/tf", "/scene"} <= set(found)
+    assert {"/epochs", "/tick", "/frame", "/packets", "/clients", "/tf", "/scene"} <= set(found)
     assert len(found["/tick"]) == len(found["/frame"]) == TICKS + 1
     for topic in sorted(expected):
         assert found[topic] == expected[topic], topic

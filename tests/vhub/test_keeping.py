@@ -1,0 +1,113 @@
+"""What goes to the capture once it has left: packets to free-running clients are kept with the time of it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import pytest
+
+from foosim.protocol import channels
+from foosim.protocol.actions import Journal
+from foosim.protocol.messages import End, Tempo, Up
+from foosim.vhub.keeping import Keep, Keeping
+from foosim.vhub.packet import Flight
+from foosim.vhub.records import Closing
+from foosim.vhub.release import Release, Releases
+from tests.vhub.test_sessions import FRAME, MS, Hub, sent
+
+T: Final = 2 * MS
+LATER_NS: Final = 3 * T + 7
+
+
+def closing(tick: int) -> Closing:
+    return Closing(type(FRAME)(tick, FRAME.layout, FRAME.values), b"", [], [])
+
+
+def ticks(kept: list[Keep]) -> list[int]:
+    return [keep.closing.frame.tick for keep in kept]
+
+
+def test_closings_wait_for_the_oldest_of_which_something_waits() -> None:
+    keeping = Keeping()
+    for tick in range(5, 9):
+        keeping.add(closing(tick))
+    assert ticks(keeping.take(5)) == []
+    assert ticks(keeping.take(7)) == [5, 6] and ticks(keeping.take(7)) == []
+    keeping.add(closing(9))
+    assert ticks(keeping.take(None)) == [7, 8, 9] and keeping.take(None) == []
+
+
+@pytest.mark.parametrize("order", [(4, 2, 3), (2, 3, 4)])
+def test_the_oldest_that_waits_is_known_whatever_leaves_first(order: tuple[int, int, int]) -> None:
+    releases = Releases(T)
+    for at_ns, tick in enumerate(order):
+        releases.add(f"client-{tick}", 1, tick, [Flight("camera", "ear", "ball", 1, 0, 0, b"")], at_ns)
+    assert releases.waiting_tick == 2
+    assert [release.tick for release in releases.take(1)] == list(order[:2])
+    assert releases.waiting_tick == order[2]
+    assert [release.tick for release in releases.take(0, everything=True)] == [order[2]]
+    assert not releases.waiting_tick
+
+
+class Later(Releases):
+    """Lets everything leave `LATER_NS` after its tick was closed."""
+
+    def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
+        self._waiting.append(Release(now_ns + LATER_NS, client, number, tick, flights))
+
+
+class Kept:
+    """A hub in which `eye` sends a packet to `ear` in every tick, and what it gave to the capture."""
+
+    def __init__(self) -> None:
+        self.hub = Hub().begin()
+        self.hub.core.releases = Later(T)
+        self.hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
+        for name in ("ear", "eye"):
+            self.hub.enter(name)
+        self.journaled = 0
+        self.kept: list[Closing] = []
+        self.left: list[tuple[int, int]] = []
+        """(number of the packet, when its Down was said)"""
+
+    def close(self, tick: int) -> None:
+        self.hub.now_ns = tick * T
+        self.hub.say(channels.UP, "eye", Up("eye", "one", [sent(tick + 1, "ear")]))
+        self.hub.close(tick)
+        self.hub.core.wake(self.hub.now_ns)
+        self.take()
+
+    def take(self) -> None:
+        actions = [*self.hub.core.actions]
+        self.kept += [action.closing for action in actions if isinstance(action, Keep)]
+        self.journaled += sum(isinstance(action, Journal) for action in actions)
+        for down in self.hub.said(channels.DOWN):
+            self.left += [(packet.sequence, self.hub.now_ns) for packet in down.packets]
+
+    @property
+    def released(self) -> list[tuple[int, int]]:
+        """(number of the packet, when it left as the capture has it)"""
+        to_ear = [flight for closing in self.kept for flight in closing.fates if flight.destination == "ear"]
+        return [(flight.sequence, flight.released_wall_ns) for flight in to_ear if not flight.cause]
+
+
+def test_a_packet_that_leaves_later_is_kept_with_the_time_at_which_it_left() -> None:
+    run = Kept()
+    for tick in range(9):
+        run.close(tick)
+    assert run.journaled >= 9, "the journal waits for nothing"
+    assert [closing.frame.tick for closing in run.kept] == [0, 1, 2, 3, 4], "packets of tick 5 still wait"
+    assert run.left and run.released == run.left
+    assert run.released == [(sequence, (sequence + 4) * T) for sequence in range(1, 5)]
+
+
+def test_at_the_end_what_waits_leaves_and_all_closings_are_kept() -> None:
+    run = Kept()
+    for tick in range(9):
+        run.close(tick)
+    run.hub.commit(9, last=True)
+    run.hub.say(channels.END, "supervisor", End(9, "enough", False))
+    run.take()
+    assert run.hub.core.finished and [closing.frame.tick for closing in run.kept] == list(range(10))
+    assert run.released == run.left and [sequence for sequence, _ in run.left] == list(range(1, 9))
+    assert all(wall_ns for _, wall_ns in run.released)
