@@ -174,14 +174,17 @@ class NodeCore:
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again."""
         self.member.wake(now_ns, self._heartbeat)
-        if self.frame is not None and self.ended is None and self._patience.is_over(now_ns) and self.work is None:
+        if self._is_in and self._patience.is_over(now_ns) and self.work is None:
             self._ask_again(now_ns)
 
     def deadline_ns(self) -> int:
         """When `wake` has something to do next."""
-        if self.frame is None or self.ended is not None:
-            return self.member.deadline_ns
-        return min(self.member.deadline_ns, self._patience.at_ns)
+        return min(self.member.deadline_ns, self._patience.at_ns) if self._is_in else self.member.deadline_ns
+
+    @property
+    def _is_in(self) -> bool:
+        """Whether there is an epoch to go on with."""
+        return self.ended is None and (self.frame is not None or self._awaited_epoch is not None)
 
     @property
     def layouts_wanted(self) -> list[Layout]:
@@ -366,8 +369,7 @@ class NodeCore:
 
     def _ask_again(self, now_ns: int) -> None:
         """Ask for whatever the current tick lacks, the wait doubling."""
-        assert self.frame is not None
-        tick = self.frame.tick
+        tick = 0 if self.frame is None else self.frame.tick
         kinds: list[tuple[str, int]] = []
         if self._awaited_epoch is not None:
             kinds.append((channels.COMMIT.name, self._awaited_epoch.tick))

@@ -53,6 +53,7 @@ class Bus:
         self._key = draw_key(weather.seed, "bus")
         self._heap: list[Message] = []
         self._readers: dict[tuple[str, str], list[str]] = {}
+        self._cut: dict[str, int] = {}
 
     def subscribe(self, process: str, reads: Iterable[tuple[Channel, bool]]) -> None:
         """Let a process read channels: all that comes on them, or only what is addressed to it."""
@@ -61,12 +62,19 @@ class Bus:
             if process not in readers:
                 readers.append(process)
 
+    def cut_off(self, process: str, until_ns: int) -> None:
+        """Lose all that a process says and is told until a virtual time."""
+        self._cut[process] = max(until_ns, self._cut.get(process, 0))
+
+    def _is_cut(self, process: str, at_ns: int) -> bool:
+        return bool(self._cut) and at_ns < self._cut.get(process, 0)
+
     def put(self, sender: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
         """Send a message at `at_ns`; every reader but the sender gets it."""
         plane = channel.plane.name
         for key in ((channel.name, plane), (channel.name, plane + name)):
             for reader in self._readers.get(key, ()):
-                if reader != sender:
+                if reader != sender and not self._is_cut(sender, at_ns) and not self._is_cut(reader, at_ns):
                     self._push(reader, channel, name, payload, at_ns)
 
     def _push(self, reader: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:

@@ -144,7 +144,7 @@ class SupervisorCore:
                 self.finish(_losses(lost), failed=True)
             elif lost:
                 self._lose(lost, now_ns)
-            elif self._lacks and self._patience.is_over(now_ns):
+            if self._lacks and self._patience.is_over(now_ns):
                 self._ask_again(now_ns)
             if now_ns >= self._prepare_ns:
                 self.requests.prepare()

@@ -91,6 +91,11 @@ class Recovery:
         self._open(owners, [*core.members, name], now_ns)
         core.say("info", f"node {name} takes part from tick {core.frame.tick}")
 
+    def take_back(self, process: Process, now_ns: int) -> None:
+        """The last node was lost and is heard of again: no epoch without it told it so, it goes on in the next one."""
+        process.lost = False
+        self.join(process, now_ns)
+
     def moved(self, robot: str) -> None:
         """Somebody chose an owner for a robot: that one stays."""
         self._returns.pop(robot, None)

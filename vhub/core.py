@@ -84,6 +84,7 @@ class HubCore:
         self.waits = Waits()
         self._keeping = Keeping()
         self._commits: dict[int, tuple[bytes, Commit, Frame]] = {}
+        self._early_commits: dict[int, tuple[bytes, Commit]] = {}
         self._next_commit = 0
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
@@ -357,9 +358,19 @@ class HubCore:
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         # A commit up to the epoch's start is as good under its old epoch: what is committed never changes.
         fenced = commit.epoch < self._epoch and commit.tick > self._epoch_tick
-        if commit.tick != self._next_commit or self._layout is None or fenced:
+        ahead = commit.tick - self._next_commit
+        if not 0 <= ahead <= limits.KEPT_TICKS or self._layout is None or fenced:
             self._repeated += 1
-            return
+        elif ahead > 0:  # one before it was lost or is late
+            self._early_commits[commit.tick] = payload, commit
+        else:
+            self._take_commit(commit, payload, now_ns)
+            while self._next_commit in self._early_commits:
+                early_payload, early = self._early_commits.pop(self._next_commit)
+                self._take_commit(early, early_payload, now_ns)
+
+    def _take_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
+        assert self._layout is not None
         layout = layout_after(self._layout, commit.edits)
         frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
         if frame.digest != commit.digest:
