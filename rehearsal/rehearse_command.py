@@ -35,7 +35,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     The same cores, messages and bytes as in the processes of `foosim-supervisor up`: with lockstep players the digests
     are those of `up`, whatever the number of nodes.
 
-    Exit codes: 0 done, 1 failed, 2 bad input.
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created.
     """
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
@@ -56,7 +56,8 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     else:
         score, seconds = result["score"], result["ticks"] * result["tick_ns"] / 1e9
         typer.echo(f"{seconds:.2f} s simulated at {result['rtf']}x, red {score['red']} : {score['blue']} blue")
-        typer.echo(f"{result['handovers']} hand-overs of the ball, packets {result['packets']}")
+        packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
+        typer.echo(f"{result['handovers']} hand-overs of the ball, packets {packets}")
         typer.echo(f"digest of all ticks {result['digest']['chain']}")
     raise typer.Exit(FAILED if result["failed"] else DONE)
 
