@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from foosim.node.inputs import Inputs, check_near
-from foosim.node.step import Stepper, Work
+from foosim.node.step import Stepper, Work, moved_counters
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.assign import Assignment, Share, reach_of
@@ -255,7 +255,7 @@ class NodeCore:
         raw, deliveries = delivered
         layout, numbers = self._term.stepper.edited(frame, edits)
         if layout is not frame.layout:
-            self._counters = _moved_counters(self._counters, frame.layout, layout)
+            self._counters = moved_counters(self._counters, frame.layout, layout)
             self._term = self._make_term(layout)
         term = self._term
         share: Share = term.assignment.shares(numbers)[self.name]
@@ -490,13 +490,3 @@ class NodeCore:
         tick = self.frame.tick if self.frame is not None else 0
         report = encode_json({"solved_ticks": self._solved_ticks})
         return Heartbeat(self.name, tick, self.epoch, self.waiting_for, "", self.busy, report)
-
-
-def _moved_counters(counters: list[int], old: Layout, new: Layout) -> list[int]:
-    """Return the positions of the same counters in another layout."""
-    moved = []
-    for entity in old.robots:
-        for field, slot in entity.offsets.items():
-            if slot in counters and slot >= entity.split and entity.name in new:
-                moved.append(new[entity.name].offsets[field])
-    return moved

@@ -228,3 +228,13 @@ def _clear_log(entity: Entity, numbers: list[float]) -> None:
 def _sensors_of(deployment: Deployment, robot: str) -> list[tuple[str, RodSensor | BallSensor]]:
     """Return (channel, settings) of a robot's sensors, in channel order."""
     return sorted(deployment.robots[robot].sensors.items(), key=lambda item: item[0])
+
+
+def moved_counters(counters: list[int], old: Layout, new: Layout) -> list[int]:
+    """Return the positions of the same counters in another layout."""
+    moved = []
+    for entity in old.robots:
+        for field, slot in entity.offsets.items():
+            if slot in counters and slot >= entity.split and entity.name in new:
+                moved.append(new[entity.name].offsets[field])
+    return moved

@@ -14,6 +14,10 @@ from foosim.protocol.limits import NAME_LENGTH_MAX
 SELECTOR_LENGTH_MAX: Final = 64
 
 NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*$"
+NAME_RULE: Final = (
+    f"a name is a lower case letter, then lower case letters, digits, - and _, at most {NAME_LENGTH_MAX} in all"
+)
+"""The same for people."""
 ROBOT_NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*(\.[a-z0-9_-]+)*$"
 SELECTOR_PATTERN: Final = r"^[a-z0-9_.*?-]+$"
 CLASS_PATTERN: Final = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +11,10 @@ import typer
 from foosim.protocol import limits
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.swarm import fly
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.plan import RunOptions, make_plan
 
@@ -21,11 +24,13 @@ app = new_app()
 @app.command()
 def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     file: Annotated[Path, typer.Argument(help="The deployment file.", show_default=False)],
-    duration: Annotated[str, typer.Option("--for", help="Simulated time to run, e.g. 20s.")],
+    duration: Annotated[str | None, typer.Option("--for", help="Simulated time to run, e.g. 20s.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of all random draws; short for --set seed=N.")] = None,
     nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN; each has an engine of its own.")] = 1,
     engine: Annotated[str | None, typer.Option(help="bullet or pure; short for --set engine=NAME.")] = None,
     sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
+    swarm: Annotated[bool, typer.Option("--swarm", help="Fly the random faults of --seed: see below.")] = False,
+    seeds: Annotated[int, typer.Option(help="With --swarm: how many seeds, from --seed (or 1) on.", min=1)] = 1,
     capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
     version: VersionOption = False,
@@ -35,8 +40,16 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     The same cores, messages and bytes as in the processes of `foosim-supervisor up`: with lockstep players the digests
     are those of `up`, whatever the number of nodes.
 
-    Exit codes: 0 done, 1 failed, 2 bad input.
+    With --swarm a seed decides the number of nodes (3 to 6), the weather on the bus (delay, loss, repeats) and 8 to 20
+    faults of at least three kinds in 320 ticks on the pure engine: nodes killed, paused, cut off, slow, stopped; robots
+    moved, balls added, removed and pushed. Everything that is said and closed is checked against the laws.
+
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created.
     """
+    if swarm:
+        raise typer.Exit(_swarm(file, 1 if seed is None else seed, seeds, json))
+    if duration is None:
+        raise BadValue("--for: how long is needed, e.g. 20s", None)
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     settings = (*(sets or []), *([f"engine={engine}"] if engine is not None else []))
@@ -56,9 +69,34 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     else:
         score, seconds = result["score"], result["ticks"] * result["tick_ns"] / 1e9
         typer.echo(f"{seconds:.2f} s simulated at {result['rtf']}x, red {score['red']} : {score['blue']} blue")
-        typer.echo(f"{result['handovers']} hand-overs of the ball, packets {result['packets']}")
+        packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
+        typer.echo(f"{result['handovers']} hand-overs of the ball, packets {packets}")
         typer.echo(f"digest of all ticks {result['digest']['chain']}")
     raise typer.Exit(FAILED if result["failed"] else DONE)
+
+
+def _swarm(file: Path, first: int, count: int, json: bool) -> int:
+    """Rehearse under the faults of some seeds; return the exit code."""
+    text = read_deployment_text(file)
+    load_deployment(text, str(file))
+    flown = []
+    for seed in range(first, first + count):
+        flight = fly(text, str(file), seed)
+        flown.append(flight)
+        if flight.broken:
+            typer.echo(f"seed {seed}: {flight.broken}\n  foosim-rehearse {file} --swarm --seed {seed}", err=True)
+            for fault in flight.faults:
+                typer.echo(f"  {fault}", err=True)
+    broken = [flight.seed for flight in flown if flight.broken]
+    if json:
+        typer.echo(encode_json({"seeds": [asdict(flight) for flight in flown], "broken": broken}).decode())
+    else:
+        faults, losses = sum(len(flight.faults) for flight in flown), sum(flight.losses for flight in flown)
+        ticks = sum(flight.ticks for flight in flown)
+        typer.echo(
+            f"{count} seeds: {ticks} ticks, {faults} faults, {losses} nodes lost, {len(broken)} seeds broke a law"
+        )
+    return FAILED if broken else DONE
 
 
 def main() -> None:

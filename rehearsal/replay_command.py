@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,11 +13,28 @@ import typer
 from foosim.protocol import limits
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, Refused
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_reader import CaptureInfo, capture_info
+from foosim.vhub.rows import CaptureError
 
 app = new_app()
+
+
+class BadCapture(Refused):
+    """A file that is no capture, or is damaged, is bad input."""
+
+    exit_code = 2
+
+
+@contextmanager
+def _read() -> Iterator[None]:
+    """Have what is wrong with the file end the command as bad input."""
+    try:
+        yield
+    except CaptureError as error:
+        raise BadCapture(str(error)) from None
+
 
 Capture = Annotated[Path, typer.Argument(help="The capture, an MCAP file.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
@@ -25,14 +44,15 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 def foosim_replay(version: VersionOption = False) -> None:
     """Look into a capture, and simulate it again.
 
-    Exit codes: 0 done, 1 differs or failed, 2 bad input, 3 refused.
+    Exit codes: 0 done, 1 differs or failed, 2 bad input (no capture, a damaged one).
     """
 
 
 @app.command()
 def info(capture: Capture, json: Json = False) -> None:
     """Show what a capture holds: run, duration, digests, nodes and their arithmetic, packets, topics."""
-    found = capture_info(capture)
+    with _read():
+        found = capture_info(capture)
     typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
 
 
@@ -71,7 +91,8 @@ def verify(
     """
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
-    found = verify_capture(capture, nodes)
+    with _read():
+        found = verify_capture(capture, nodes)
     typer.echo(encode_json(_as_json(found)).decode() if json else _verdict(found))
     if found.tick >= 0 and found.other_arithmetic:
         typer.echo(

@@ -81,8 +81,8 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     display = Display(sys.stderr if json else sys.stdout)
     try:
         outcome = Up(plan, path, display, run).run()
-    except Killed:
-        print("killed", file=sys.stderr)
+    except Killed as killed:
+        print(killed, file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
     for line in outcome.lines:
         display.say(line)

@@ -7,19 +7,22 @@ side, `run_folder` says where it is, `cli` shows the answers.
 
 from __future__ import annotations
 
+import math
 import os
 import time
+from collections.abc import Iterable
 from types import TracebackType
 from typing import Any, Final, Self
 
 from foosim.protocol import channels
 from foosim.protocol.channels import Plane
 from foosim.protocol.codec import decode, decode_json, encode, encode_json
-from foosim.protocol.errors import Failed, Malformed, Refused
+from foosim.protocol.errors import BadValue, Failed, Malformed, Refused
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Wire
 from foosim.protocol.messages import Answer, Request, Vector
 from foosim.protocol.session import Session
+from foosim.protocol.units import parse_pace
 from foosim.supervisor.run_folder import find_run
 
 ANSWER_S: Final = 30.0
@@ -129,7 +132,8 @@ def step(count: int = 1, run: str | None = None) -> Answer:
 
 
 def rate(pace: str, run: str | None = None) -> Answer:
-    """Change the pace: realtime, fast, or a factor such as 2x."""
+    """Change the pace: realtime, fast, or a factor such as 2x. Raises BadValue."""
+    parse_pace(pace)
     return _ask(run, "rate", pace=pace)
 
 
@@ -137,6 +141,8 @@ def add(
     name: str | None = None, position: Vector | None = None, velocity: Vector | None = None, run: str | None = None
 ) -> Answer:
     """Add a ball at `position` (m, world frame) with `velocity` (m/s); by default at the kick-off spot, at rest."""
+    for key, vector in (("position", position), ("velocity", velocity)):
+        _check_finite(key, vector or ())
     given = {"name": name, "position": position, "velocity": velocity}
     return _ask(run, "add", **{key: value for key, value in given.items() if value is not None})
 
@@ -163,7 +169,15 @@ def start(node: str, run: str | None = None) -> Answer:
 
 def push(impulse: Vector, name: str = "ball", run: str | None = None) -> Answer:
     """Give a ball an impulse (N s, world frame)."""
+    _check_finite("impulse", impulse)
     return _ask(run, "push", impulse=impulse, name=name)
+
+
+def _check_finite(what: str, numbers: Iterable[float]) -> None:
+    """Raise BadValue for a number that JSON cannot say."""
+    for number in numbers:
+        if not math.isfinite(number):
+            raise BadValue(f"{what}: not a finite number", number)
 
 
 def down(run: str | None = None) -> Answer:

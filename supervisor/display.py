@@ -83,9 +83,18 @@ def plain_line(status: dict[str, Any]) -> str:
     return " | ".join(part for part in parts if part)
 
 
-def render(status: dict[str, Any]) -> RenderableType:
-    """Return the whole table."""
-    return Group(_head(status), Text(), _processes(status), Text(), _links(status))
+def render(status: dict[str, Any], links_max: int = LINKS_SHOWN_MAX) -> RenderableType:
+    """Return the whole table, with as many links as asked for."""
+    return Group(_head(status), Text(), _processes(status), Text(), _links(status, links_max))
+
+
+def fitted(status: dict[str, Any], console: Console) -> RenderableType:
+    """Return the table with as many links as the window has lines for: the last row, for all, stays in sight."""
+    whole = render(status)
+    excess = len(console.render_lines(whole, pad=False)) - console.height
+    if excess <= 0:
+        return whole
+    return render(status, max(0, min(len(status["links"]), LINKS_SHOWN_MAX) - excess))
 
 
 def _head(status: dict[str, Any]) -> Text:
@@ -133,7 +142,7 @@ def _listed(names: list[str]) -> str:
     return shown if len(names) <= ENTITIES_SHOWN_MAX else f"{shown} and {len(names) - ENTITIES_SHOWN_MAX} more"
 
 
-def _links(status: dict[str, Any]) -> Table:
+def _links(status: dict[str, Any], links_max: int) -> Table:
     """A row per directed link, the busiest first when there are too many, and a last one for all."""
     table = Table(title="links", title_justify="left", box=None, pad_edge=False)
     table.add_column("from")
@@ -141,7 +150,7 @@ def _links(status: dict[str, Any]) -> Table:
     for column in ("offered", "delivered", "dropped", "mean delay"):
         table.add_column(column, justify="right")
     links = status["links"]
-    shown = sorted(links, key=lambda link: (-link[2], link[:2]))[:LINKS_SHOWN_MAX]
+    shown = sorted(links, key=lambda link: (-link[2], link[:2]))[:links_max]
     for source, destination, offered, delivered, dropped, delay_ns in sorted(shown):
         table.add_row(source, destination, str(offered), str(delivered), str(dropped), f"{delay_ns / 1e6:.2f} ms")
     packets = status["packets"]
@@ -190,9 +199,9 @@ class Display:
         now = (now_s, simulated_s(status))
         if self._shown is not None and now_s > self._shown[0]:
             status = {**status, "speed": (now[1] - self._shown[1]) / (now[0] - self._shown[0])}
-        self._shown = now
+        self._shown = None if status["state"] == "starting" else now  # time that passed before is no one's pace
         if self._live is not None:
-            self._live.update(render(status), refresh=True)
+            self._live.update(fitted(status, self._console), refresh=True)
         else:
             self.say(plain_line(status))
 

@@ -33,7 +33,7 @@ class Lags:
         for cell in sorted(self.cells):
             left -= self.cells[cell]
             if left <= 0:
-                return min((cell + 1) * 0.01, self.max_ns / 1e6)
+                return min((cell + 1) / 100, self.max_ns / 1e6)
         return 0.0
 
 

@@ -20,7 +20,7 @@ from foosim.protocol.errors import Malformed, Refused, show
 from foosim.protocol.frame import layout_after
 from foosim.protocol.layout import BALL, Layout
 from foosim.protocol.messages import Add, Answer, Edit, Push, Remove, Request
-from foosim.protocol.names import is_name, nearest_name
+from foosim.protocol.names import NAME_RULE, is_name, nearest_name
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.records import RequestRecord
 from foosim.supervisor.status import status
@@ -162,7 +162,7 @@ class Requests:
         count = _integer(arguments, "count", 1, 10**9)
         tick = self._core.released
         self._core.pacer.step(tick, count)
-        return self._tempo(request, tick, f"{count} ticks from tick {tick}, then paused")
+        return self._tempo(request, tick, f"{count} tick{'' if count == 1 else 's'} from tick {tick}, then paused")
 
     def _rate(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         pace = parse_pace(arguments.get("pace"))
@@ -181,8 +181,10 @@ class Requests:
         layout = self._next_layout()
         taken = {*layout.names, *(waiting.edit.name for waiting in self._pending)}
         name = _name(arguments, "name", _free_name(taken))
-        if not is_name(name) or name in taken:
-            raise Refused(f"name {show(name)} is taken or no name; taken are {', '.join(sorted(taken))}")
+        if not is_name(name):
+            raise Refused(f"{show(name)} is no name; {NAME_RULE}")
+        if name in taken:
+            raise Refused(f"name {show(name)} is taken; taken are {', '.join(sorted(taken))}")
         if len(taken) >= limits.ENTITIES_MAX:
             raise Refused(f"{len(taken)} entities, at most {limits.ENTITIES_MAX} are allowed")
         table = self._core.deployment.table
@@ -247,7 +249,7 @@ class Requests:
         node = _chosen("node", _name(arguments, "node"), core.members)
         tick = core.frame.tick
         if core.owners[robot] == node:
-            return self._accept(request, tick, f"{robot} is on {node} already")
+            return self._accept(request, tick, f"{robot} is on {node} already, at tick {tick}")
         answer = self._accept(request, tick, f"{robot} moved to {node} at tick {tick}")
         core.account.moves += 1
         core.recovery.moved(robot)

@@ -18,8 +18,8 @@ import msgspec
 import platformdirs
 
 from foosim.protocol import wall
-from foosim.protocol.errors import Failed, Refused
-from foosim.protocol.names import is_name, nearest_name
+from foosim.protocol.errors import BadValue, Failed, Refused
+from foosim.protocol.names import NAME_RULE, is_name, nearest_name
 
 KEPT_RUNS: Final = 20
 """How many runs that are over keep their folder."""
@@ -137,7 +137,7 @@ def runs_folder() -> Path:
 def create_run(world: str, name: str | None = None) -> RunFolder:
     """Make the folder of a new run, by default named by world and time; the oldest ones that are over go."""
     if name is not None and not is_name(name):
-        raise Refused(f"{name!r} is no name for a run: lower case letters, digits, - and _, at most 32")
+        raise BadValue(f"--run: {NAME_RULE}", name)
     parent = runs_folder()
     parent.mkdir(parents=True, exist_ok=True)
     _forget_old(parent)

@@ -8,6 +8,7 @@ looks at them, asks the supervisor for the status that it shows, and hands on a 
 from __future__ import annotations
 
 import signal
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -50,7 +51,7 @@ class CaptureExists(Refused):
 
 
 class Killed(Exception):
-    """A second Ctrl-C: everything was killed."""
+    """A second Ctrl-C: everything was killed. The text says so, and where the unfinished capture is."""
 
 
 def default_capture(world: str) -> Path:
@@ -61,10 +62,15 @@ def default_capture(world: str) -> Path:
 
 
 def check_capture(path: Path) -> Path:
-    """Return the path when nothing is there yet; raises CaptureExists."""
-    if path.exists():
-        raise CaptureExists(f"{path} exists, and a capture is never overwritten")
-    return path
+    """Return the path when nothing is there yet and its folder, made where missing, takes files; raises Refused."""
+    try:
+        if path.exists():
+            raise CaptureExists(f"{path} exists, and a capture is never overwritten")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            return path
+    except OSError as error:
+        raise Refused(f"{path}: cannot be created, {error.strerror}") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +94,8 @@ class Up:
         self._launcher = Launcher()
         self._interrupts = 0
         self._ending_s = 0.0
+        self._is_told = False
+        """Whether the supervisor was told to end the run."""
         self._lost: Child | None = None
         self._lost_s = 0.0
         self._has_begun = self._has_ended = False
@@ -151,9 +159,9 @@ class Up:
         return info if info is not None and info.radio else None
 
     def _await(self, value: Callable[[], T | None]) -> T | None:
-        """Return what `value` gives as soon as it is something; None when the run is over before."""
+        """Return what `value` gives as soon as it is something; None when the run is over, or is to end, before."""
         while self._goes_on():
-            found = value()
+            found = None if self._ending_s else value()
             if found is not None:
                 return found
             time.sleep(POLL_S)
@@ -236,42 +244,56 @@ class Up:
         """Look after the children and the Ctrl-C; False when the supervisor has ended."""
         if self._interrupts > 1:
             self._launcher.kill()
-            raise Killed
+            raise Killed("\n".join(["killed", *self._capture_lines()]))
         supervisor = self._launcher.children[SUPERVISOR]
-        if supervisor.exit_code is not None:
-            return False
         now_s = time.monotonic()
+        if supervisor.exit_code is not None:
+            if supervisor.exit_code == FAILED:  # it may have noticed a loss, and ended, since we looked last
+                self._look_for_lost(now_s)
+            return False
         if self._interrupts and not self._ending_s:
             self.display.say("ending the run; a second Ctrl-C kills it")
-            self._end_in_order(supervisor, now_s)
+            self._ending_s = now_s
         if self._has_begun and not self._has_ended and not self._ending_s:
             if self._lost is not None and not self._ends_run(self._lost):
                 self._lost = None  # it ended before we saw that the run had begun
             self._restart_nodes(now_s)
         if self._lost is None:
-            self._lost = next((child for child in self._launcher.ended() if self._ends_run(child)), None)
-            self._lost_s = now_s
+            self._look_for_lost(now_s)
         elif not self._ending_s and now_s > self._lost_s + LOST_S:
-            self._end_in_order(supervisor, now_s)
+            self._ending_s = now_s
+        if self._ending_s and not self._is_told:
+            self._tell(supervisor)
         return not self._ending_s or now_s < self._ending_s + END_S
 
     def _ends_run(self, child: Child) -> bool:
         """Whether the run cannot go on without this child, which has ended."""
         return child.exit_code != 0 and not (self._has_begun and child.name in self.plan.deployment.nodes)
 
-    def _end_in_order(self, supervisor: Child, now_s: float) -> None:
-        """Have the supervisor end the run, as the command `down` does."""
-        self._ending_s = now_s
-        supervisor.process.send_signal(signal.SIGTERM)
+    def _look_for_lost(self, now_s: float) -> None:
+        """Note the first child that ended as none should; one that was killed before those that ended because of it."""
+        if self._lost is None:
+            bad = [child for child in self._launcher.ended() if self._ends_run(child) and child.name != SUPERVISOR]
+            self._lost = min(bad, key=lambda child: (child.exit_code or 0) > 0, default=None)
+            self._lost_s = now_s
+
+    def _tell(self, supervisor: Child) -> None:
+        """Have the supervisor end the run, as `down` does; before it has a run file, the signal would just kill it."""
+        if self.folder.info() is not None:
+            self._is_told = True
+            supervisor.process.send_signal(signal.SIGTERM)
 
     def _outcome(self) -> Outcome:
         result = self.folder.result()
         if result is None and self._lost is None:
             self._lost = self._launcher.children[SUPERVISOR]
+        if result is not None and self._lost is not None and not result["failed"]:
+            reason = f"lost {self._lost.name}: it {self._lost.ending}"  # the supervisor never knew it
+            result = {**result, "reason": reason, "failed": True}
         reason = "the run did not end in order" if result is None else f"the run has ended: {result['reason']}"
         recoveries = [] if result is None else result["recoveries"][self._told :]
         lines = [*map(recovery_text, recoveries), reason, *self._lost_lines(), *self._capture_lines()]
-        return Outcome(result, result is None or bool(result["failed"]) or self._lost is not None, tuple(lines))
+        return Outcome(result, result is None or bool(result["failed"]), tuple(lines))
 
     def _lost_lines(self) -> list[str]:
         """Say which child ended before the run did, and show the end of its log."""

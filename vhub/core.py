@@ -18,8 +18,8 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
-from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
-from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import build_layout
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
     DONE_OF,
@@ -42,6 +42,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.units import parse_pace
+from foosim.vhub.commits import Commits
 from foosim.vhub.keeping import Keep, KeepEpoch, Keeping
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record, world_packets
@@ -60,6 +61,7 @@ class _World:
 
     frame: Frame
     closing: Closing
+    commit: bytes
     waited: list[str]
     free: dict[str, list[Flight]]
 
@@ -78,14 +80,11 @@ class HubCore:
         self.finished = False
         self.lost = self.capture = self.radio_address = ""
         self.busy = 0.0
-        self._layout: Layout | None = None
         self._epoch = self._epoch_tick = 0
         self._owners: dict[str, str] = {}
         self.waits = Waits()
         self._keeping = Keeping()
-        self._commits: dict[int, tuple[bytes, Commit, Frame]] = {}
-        self._early_commits: dict[int, tuple[bytes, Commit]] = {}
-        self._next_commit = 0
+        self._commits = Commits()
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
@@ -187,7 +186,7 @@ class HubCore:
             return channels.COMMIT, 1
         if self._world is None and self.state.closed + 1 in self._commits:
             return channels.SAMPLES, 1
-        return channels.COMMIT, max(1, self.state.final - self._next_commit)
+        return channels.COMMIT, max(1, self.state.final - self._commits.next_tick)
 
     @property
     def waiting_for(self) -> str:
@@ -200,9 +199,10 @@ class HubCore:
         if self._world is not None:
             return DONE_OF + ", ".join(self._world.waited) if self._world.waited else ""
         tick = self.state.closed + 1
-        if tick not in self._commits:
+        committed = self._commits.get(tick)
+        if committed is None:
             return "commit"
-        _, commit, frame = self._commits[tick]
+        _, commit, frame = committed
         robots = missing_robots((s for _, s in self._samples.get(tick, ())), commit.digest, frame)
         return "end" if commit.last else SAMPLES_OF + ", ".join(sorted({self._owners[robot] for robot in robots}))
 
@@ -220,7 +220,7 @@ class HubCore:
         committed = self._commits.get(tick)
         if committed is None:
             return False
-        _, commit, frame = committed
+        raw, commit, frame = committed
         self.waits.begin(now_ns)
         packets = world_packets((s for _, s in self._samples.get(tick, ())), commit.digest, frame, state.sampling)
         if packets is None or commit.last:
@@ -242,7 +242,7 @@ class HubCore:
         due = state.due_members(tick)
         for name in due:
             self._go(name, tick, released.pop(name, []), now_ns)
-        self._world = _World(frame, closing, [name for name in due if name in self.sessions.by_name], released)
+        self._world = _World(frame, closing, raw, [name for name in due if name in self.sessions.by_name], released)
         return True
 
     def _go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
@@ -252,6 +252,8 @@ class HubCore:
         session = self.sessions.by_name.get(name)
         if session is None:
             return
+        for flight in flights:
+            flight.released_wall_ns = now_ns
         self.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
         deadlines = self.deployment.deadlines
         allowed_ns = deadlines.lockstep_realtime_ns if self.releases.factor else deadlines.lockstep_fast_ns
@@ -271,7 +273,7 @@ class HubCore:
         payload = encode(deliveries)
         for name in world.free:
             state.members[name].downlink += 1
-        record = tick_record(world.closing, self._commits[tick][0], samples, admitted, state, payload)
+        record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
         self.actions.append(Journal(record))
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         if not state.was_final:
@@ -279,13 +281,16 @@ class HubCore:
             for following in range(tick + 2, state.final + 1):
                 self._sent[following] = encode(Deliveries(following, []))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
+        for flight in world.closing.fates:
+            if not flight.cause and flight.destination not in state.members:
+                flight.released_wall_ns = now_ns
         assert self.releases is not None
         for name, flights in world.free.items():
             self.releases.add(name, state.members[name].downlink, tick, flights, now_ns)
         self._keeping.add(world.closing)
         self._release(now_ns)
         self._world = None
-        self._commits.pop(tick - limits.KEPT_TICKS, None)
+        self._commits.forget(tick - limits.KEPT_TICKS)
         self._patience.progress(state.tick_ns, now_ns)
         return True
 
@@ -300,8 +305,10 @@ class HubCore:
 
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""
-        assert self.state is not None and self.member.build is not None and self._layout is not None
-        layout = self._commits[self.state.closed][2].layout if self.state.closed in self._commits else self._layout
+        assert self.state is not None and self.member.build is not None
+        committed = self._commits.get(self.state.closed)
+        layout = self._commits.layout if committed is None else committed[2].layout
+        assert layout is not None
         base = build_layout(self.state.deployment)
         added = [(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
         return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added))
@@ -327,7 +334,7 @@ class HubCore:
             return
         deployment = self.deployment = self.member.deployment
         assert deployment is not None
-        self._layout = self.member.layout
+        self._commits.layout = self.member.layout
         self.state = HubState(deployment)
         self.releases = Releases(deployment.tick_ns)
         self.actions.append(Journal(self.head()))
@@ -335,10 +342,11 @@ class HubCore:
 
     def _ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined."""
-        if self._layout is None or self.deployment is None or self.member.is_ready:
+        layout = self._commits.layout
+        if layout is None or self.deployment is None or self.member.is_ready:
             return
         if not self.sessions.missing(self.deployment):
-            self.member.ready(self._layout)
+            self.member.ready(layout)
 
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self._epoch or self.state is None:
@@ -358,28 +366,11 @@ class HubCore:
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         # A commit up to the epoch's start is as good under its old epoch: what is committed never changes.
         fenced = commit.epoch < self._epoch and commit.tick > self._epoch_tick
-        ahead = commit.tick - self._next_commit
-        if not 0 <= ahead <= limits.KEPT_TICKS or self._layout is None or fenced:
-            self._repeated += 1
-        elif ahead > 0:  # one before it was lost or is late
-            self._early_commits[commit.tick] = payload, commit
-        else:
-            self._take_commit(commit, payload, now_ns)
-            while self._next_commit in self._early_commits:
-                early_payload, early = self._early_commits.pop(self._next_commit)
-                self._take_commit(early, early_payload, now_ns)
-
-    def _take_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
-        assert self._layout is not None
-        layout = layout_after(self._layout, commit.edits)
-        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
-        if frame.digest != commit.digest:
-            raise Malformed(f"commit {commit.tick} whose frame has another digest")
-        self._layout = layout
-        self._next_commit += 1
-        self._commits[commit.tick] = payload, commit, frame
+        taken = [] if fenced else self._commits.take(commit, payload)
+        self._repeated += not taken
         if self.releases is not None:
-            self.releases.committed(commit.tick, now_ns)
+            for tick in taken:
+                self.releases.committed(tick, now_ns)
 
     def _on_samples(self, samples: Samples, payload: bytes, now_ns: int) -> None:
         if self.state is None or not self.state.closed < samples.tick <= self.state.closed + limits.KEPT_TICKS:

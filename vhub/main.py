@@ -59,6 +59,7 @@ class HubProcess:
         self._capture: CaptureWriter | None = None
         self._forget_ns = 0
         self._is_abandoned = False
+        self._why_abandoned = "the vHub was told to end"
         self._log: logging.Logger = start_log(VHUB)
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
         self._radio = Wire(radio, Plane.RADIO, inbox, VHUB)
@@ -109,7 +110,7 @@ class HubProcess:
         if core.member.build is not None and self._journal is None:
             self._begin(core.member.build)
         if self._is_abandoned and core.ended is None and core.state is not None:
-            end = End(core.state.closed + 1, "the vHub was told to end", True)
+            end = End(core.state.closed + 1, self._why_abandoned, True)
             core.receive(channels.END, SUPERVISOR, encode(end), now_ns)
         core.advance(now_ns)
         if now_ns >= self._forget_ns and self._journal is not None and core.state is not None:
@@ -117,7 +118,11 @@ class HubProcess:
             self._turn_journal(self._journal, core.state.closed)
 
     def _begin(self, build: Build) -> None:
-        """Open the journal and the capture, and be present: the supervisor has let us in."""
+        """Be present, since the supervisor has let us in, and open the journal and the capture.
+
+        Present first: whoever cannot open them ends, and the supervisor knows by the presence that it did.
+        """
+        self._wire.declare_alive()
         options, core = self._options, self.core
         assert core.deployment is not None
         folder = options.folder or Path(f"{build.run}.vhub")
@@ -134,7 +139,6 @@ class HubProcess:
                 path, core.deployment, build.deployment_name, build.deployment, metadata, self._say
             )
             core.capture = str(path)
-        self._wire.declare_alive()
 
     def _turn_journal(self, journal: Journal, closed: int) -> None:
         """Between ticks, begin a new file when one is full; what the capture has on the disk may go."""
@@ -159,7 +163,8 @@ class HubProcess:
         if plane is Plane.RADIO:
             self.core.client_gone(name, time.monotonic_ns())
         elif name == SUPERVISOR and self.core.ended is None:
-            self.core.actions.append(Say("error", "lost the supervisor"))
+            self._why_abandoned = "lost the supervisor"
+            self.core.actions.append(Say("error", self._why_abandoned))
             self.stop()
 
     def _close(self) -> None:

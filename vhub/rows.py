@@ -129,8 +129,8 @@ class PacketRow(Row, frozen=True):
     """One offered packet and its fate, with the cause of a drop and what the verdict came from.
 
     `due_ns` and `arrival_tick` are -1 when it was dropped at sending. The words are the 64-bit draws that were used,
-    in hex. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when the packet left for a
-    free-running client, 0 for all others.
+    in hex. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when the packet left
+    for its receiver, 0 when it did not.
     """
 
     source: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,7 +17,8 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import Layout
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
-from foosim.rehearsal.replay_command import app
+from foosim.rehearsal.rehearse_command import app as rehearse_app
+from foosim.rehearsal.replay_command import BadCapture, app
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify, verify_capture
 from foosim.vhub.capture_reader import CapturedTick, open_capture
@@ -158,4 +160,15 @@ def test_the_command_says_what_it_found(tmp_path: Path) -> None:
     content = msgspec.json.decode(shown.output)
     assert content["ticks"] == TICKS and content["chain"] == result.json["digest"]["chain"]
     assert content["packets"]["offered"] == result.json["packets"]["offered"]
+    for bad in (["info", str(tmp_path / "nowhere.mcap")], ["verify", __file__]):
+        shown = runner.invoke(app, bad)
+        assert isinstance(shown.exception, BadCapture) and shown.exception.exit_code == 2
+        assert str(shown.exception).startswith(f"{bad[1]}: ")
     assert load_deployment(open_capture(path).about.deployment_text, "x").world == "table"
+
+
+def test_a_rehearsal_tells_people_its_packets_in_words() -> None:
+    table = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
+    done = CliRunner().invoke(rehearse_app, [str(table), "--for", "0.1s", "--engine", "pure"])
+    assert done.exit_code == 0
+    assert re.search(r"packets \d+ offered, \d+ delivered, \d+ dropped, \d+ in flight, 0 refused\n", done.output)

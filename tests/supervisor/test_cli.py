@@ -11,6 +11,7 @@ import pytest
 
 from foosim.supervisor import cli
 from foosim.supervisor.run_folder import runs_folder
+from foosim.supervisor.up import check_capture
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 COMMANDS = (
@@ -104,7 +105,7 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--listen", "nowhere:x"), 2, "not an address (HOST, HOST:PORT or tcp/HOST:PORT), 'nowhere:x'"),
         (("--listen", "127.0.0.1:65535"), 2, "no room for 2 ports"),
         (("--listen", "0.0.0.0"), 3, "say --insecure to mean it"),
-        (("--run", "Über"), 3, "is no name for a run"),
+        (("--run", "Über"), 2, "--run: a name is a lower case letter, then"),
         (("--capture", "a.mcap", "--no-capture"), 2, "exclude each other"),
         (("--bogus",), 2, "No such option"),
     ],
@@ -127,6 +128,20 @@ def test_an_existing_capture_is_refused_before_anything_starts(command: Command,
     assert not runs_folder().exists()
 
 
+def test_a_capture_that_cannot_be_created_is_refused_before_anything_starts(command: Command, tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"no folder")
+    done = command("up", TABLE, "--for", "1s", "--capture", tmp_path / "file" / "mine.mcap")
+    assert done.code == 3
+    assert done.err.startswith(f"{tmp_path}/file/mine.mcap: cannot be created, ")
+    assert not runs_folder().exists()
+
+
+def test_the_folder_of_a_capture_is_made_and_left_empty(tmp_path: Path) -> None:
+    path = tmp_path / "far" / "away" / "mine.mcap"
+    assert check_capture(path) == path
+    assert list(path.parent.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     "arguments",
     [("status",), ("pause",), ("step", "3"), ("push", "0", "0", "1"), ("move", "red.goal", "blue"), ("down",)],
@@ -139,3 +154,17 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
     assert command("step", "many").code == 2
     assert command("step", "0").code == 2
     assert command("push", "0", "0").code == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("rate", "quick"), "not a pace (realtime, fast or a factor such as 2x), 'quick'"),
+        (("rate", "0x"), "out of range 0.001x to 1000x, '0x'"),
+        (("push", "0", "nan", "0"), "impulse: not a finite number, nan"),
+        (("add", "--position", "0", "0", "inf"), "position: not a finite number, inf"),
+        (("add", "--velocity", "nan", "0", "0"), "velocity: not a finite number, nan"),
+    ],
+)
+def test_a_value_that_no_run_could_take_is_bad_input(command: Command, arguments: tuple[str, ...], text: str) -> None:
+    assert command(*arguments) == (2, "", f"{text}\n")

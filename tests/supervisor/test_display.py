@@ -5,11 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.display import LINKS_SHOWN_MAX, Display, plain_line, recovery_text, render_text
+from foosim.supervisor.display import LINKS_SHOWN_MAX, Display, fitted, plain_line, recovery_text, render_text
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import status
 
@@ -154,3 +155,23 @@ def test_a_node_that_does_not_take_part_says_so(running: dict[str, Any], state: 
 )
 def test_losses_and_returns_are_lines(entry: dict[str, Any], text: str) -> None:
     assert recovery_text(entry) == text
+
+
+def test_what_passed_before_the_first_tick_does_not_count_as_slow(running: dict[str, Any]) -> None:
+    stream = io.StringIO()
+    with Display(stream) as display:
+        display.show({**running, "state": "starting", "ticks": 0}, 100.0)
+        display.show(running, 200.0)
+    assert " | realtime 1.00x | " in stream.getvalue().splitlines()[1]
+
+
+@pytest.mark.parametrize("height", [17, 18, 24])
+def test_a_low_window_shows_fewer_links_and_keeps_the_row_for_all(running: dict[str, Any], height: int) -> None:
+    running["links"] = [["camera", f"player-{number}", number, number, 0, 0] for number in range(40)]
+    console = Console(width=80, height=height, file=io.StringIO(), color_system=None)
+    with console.capture() as captured:
+        console.print(fitted(running, console))
+    lines = captured.get().splitlines()
+    assert len(lines) == height
+    assert "player-39 " in captured.get()
+    assert lines[-1].startswith("all") and "22510" in lines[-1] and " more" in lines[-1]

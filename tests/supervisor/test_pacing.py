@@ -168,3 +168,10 @@ def test_lags_take_bounded_memory() -> None:
         made.add(lag)
     assert len(made.cells) <= 1_000_001 and max(made.cells) == 1_000_000
     assert Lags().quantile_ms(0.5) == 0.0
+
+
+def test_a_quantile_is_a_whole_number_of_cells() -> None:
+    lags = Lags()
+    for lag_ns in (1_890_001, 5_000_000):
+        lags.add(lag_ns)
+    assert lags.quantile_ms(0.5) == 1.9

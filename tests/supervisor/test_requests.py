@@ -249,7 +249,8 @@ def test_what_cannot_be_stopped_or_started() -> None:
 
 def test_a_move_to_where_it_is_is_no_epoch() -> None:
     run = Run(nodes=2).ask_at(50, "move", robot="red.goal", node="n1").go()
-    assert run.answers[0].accepted and run.answers[0].text == "red.goal is on n1 already"
+    (answer,) = run.answers
+    assert answer.accepted and answer.text == f"red.goal is on n1 already, at tick {answer.tick}"
     assert run.system.supervisor.epoch == 1 and run.system.supervisor.account.moves == 0
 
 
@@ -272,6 +273,12 @@ def test_a_pause_holds_the_world_before_the_tick_that_its_answer_names(pace: Pac
 
 def _gaps(times_ns: list[int], but: int) -> list[int]:
     return [times_ns[i] - times_ns[i - 1] for i in range(1, len(times_ns)) if i != but]
+
+
+def test_one_tick_is_one() -> None:
+    run = Run(pace=REALTIME).ask_at(40, "pause").ask_after(40, 500 * MS, "step", count=1)
+    run.ask_after(40, 1000 * MS, "resume").go()
+    assert run.answers[1].text == f"1 tick from tick {run.answers[0].tick}, then paused"
 
 
 def test_a_step_computes_so_many_ticks_and_pauses() -> None:
@@ -408,11 +415,11 @@ BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
     ("push", {"impulse": [0.0, 0.0, 11.0]}, "impulse (0.0, 0.0, 11.0) is above 10.0 N s"),
     ("push", {"name": "bal", "impulse": [0, 0, 0]}, "no free body 'bal'; there are ball, nearest is ball"),
     ("push", {"name": 7, "impulse": [0, 0, 0]}, "name: a name is needed, not 7"),
-    ("add", {"name": "ball"}, "name 'ball' is taken or no name; taken are ball, "),
-    ("add", {"name": "red.goal"}, "is taken or no name"),
-    ("add", {"name": "Not A Name"}, "name 'Not A Name' is taken or no name"),
-    ("add", {"name": ""}, "name '' is taken or no name"),
-    ("add", {"name": "x" * 33}, "is taken or no name"),
+    ("add", {"name": "ball"}, "name 'ball' is taken; taken are ball, "),
+    ("add", {"name": "camera"}, "name 'camera' is taken"),
+    ("add", {"name": "Not A Name"}, "'Not A Name' is no name; a name is a lower case letter, then "),
+    ("add", {"name": ""}, "'' is no name; "),
+    ("add", {"name": "x" * 33}, "is no name; "),
     ("add", {"position": [9.0, 0.0, 0.1]}, "is outside the table: at most (0.6, 0.34, 0.15) m"),
     ("add", {"position": [0.0, 0.0, 0.0]}, "is outside the table"),
     ("add", {"position": [-GREAT, 0, 0]}, "three numbers of at most"),

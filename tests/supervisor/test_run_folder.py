@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.errors import Refused
+from foosim.protocol.errors import BadValue, Refused
 from foosim.supervisor.run_folder import (
     KEPT_RUNS,
     NoRun,
@@ -112,7 +112,7 @@ def test_a_name_that_is_taken_or_none_is_refused() -> None:
     create_run("table", "mine")
     with pytest.raises(Refused, match="there is a run mine already"):
         create_run("table", "mine")
-    with pytest.raises(Refused, match="no name for a run"):
+    with pytest.raises(BadValue, match=r"--run: a name is a lower case letter, .*, '\.\./mine'"):
         create_run("table", "../mine")
 
 

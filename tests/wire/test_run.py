@@ -22,6 +22,9 @@ from foosim.vhub.capture_reader import open_capture
 if TYPE_CHECKING:
     from tests.wire.conftest import House
 
+LONG = "deadlines={heartbeat: 100 s, tick_named: 50 s, tick_lost: 100 s, start: 100 s}"
+"""Nobody is given up for being slow."""
+
 KEYS = {
     *("ticks", "tick_ns", "rtf", "lag_ms", "digest", "packets", "nodes", "moves", "handovers", "score", "capture"),
 }
@@ -98,6 +101,15 @@ def test_ctrl_c_before_the_first_tick_ends_it_too(house: House) -> None:
     assert (code, last_json(out)["ticks"]) == (0, 0), err
 
 
+def test_ctrl_c_before_the_supervisor_listens_ends_it_in_order(house: House) -> None:
+    up = house.up("--json")
+    house.read_until(up.stderr, "run table-")
+    up.send_signal(signal.SIGINT)
+    code, out, err = house.end(up)
+    assert (code, last_json(out)["reason"]) == (0, "stopped"), err
+    assert house.processes_with(str(house.folder)) == {}
+
+
 def test_a_second_ctrl_c_kills_everything(house: House) -> None:
     up = house.up("--pace", "fast")
     house.ticking()
@@ -107,7 +119,8 @@ def test_a_second_ctrl_c_kills_everything(house: House) -> None:
     house.read_until(up.stdout, "a second Ctrl-C kills it")
     up.send_signal(signal.SIGINT)
     code, _, err = house.end(up)
-    assert (code, err) == (130, "killed\n")
+    (capture,) = (house.folder / "captures").iterdir()
+    assert (code, err) == (130, f"killed\ncapture captures/{capture.name} (unfinished)\n")
     assert house.processes_with(info.simulation) == {}
 
 
@@ -130,7 +143,10 @@ def test_a_process_that_is_lost_ends_the_run_in_order_and_is_named(house: House,
     if process == "vhub":
         assert f"{capture.name} (unfinished)" in err
     else:
-        assert open_capture(capture).about.finished
+        about = open_capture(capture).about
+        assert about.finished
+        named = "supervisor" if process == "supervisor" else f"{process}: its connection closed"
+        assert about.end["reason"] in (f"lost {named}", f"lost the {named}")
     assert house.processes_with(str(house.folder)) == {}
 
 
@@ -140,6 +156,29 @@ def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House) -> N
     assert code == 1, err
     assert "player-red ended with exit code" in out
     assert "Taem" in out
+
+
+def test_a_child_that_the_supervisor_never_knew_fails_the_run(house: House) -> None:
+    with socket.socket() as taken:
+        port = free_port()
+        taken.bind(("127.0.0.1", port + 1))
+        taken.listen()
+        code, out, err = house.end(house.up("--json", "--listen", f"127.0.0.1:{port}"))
+    content = last_json(out)
+    assert code == 1
+    assert (content["reason"], content["failed"]) == ("lost vhub: it ended with exit code 1", True)
+    assert "the run has ended: lost vhub: it ended with exit code 1\n" in err
+    assert f"cannot listen on tcp/127.0.0.1:{port + 1}: Address already in use" in err
+
+
+def test_a_vhub_that_cannot_open_its_capture_is_gone_at_once(house: House) -> None:
+    (house.folder / "file").touch()
+    run = house.start("foosim-supervisor", "run", house.table, "--set", LONG, "--run", "mine")
+    info = house.wait_for("the run file", house.live().info)
+    code, _, err = house.run("foosim-vhub", "--connect", info.simulation, "--capture", "file/run.mcap")
+    assert code == 3 and "file/run.mcap: cannot be created" in err
+    code, _, err = house.end(run)
+    assert code == 1 and "run ends at tick 0: lost vhub: its connection closed" in err
 
 
 def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(house: House) -> None:

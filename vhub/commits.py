@@ -1,0 +1,65 @@
+"""The commits that the vHub has: frames in order, and what came before its turn.
+
+A layout is what the commits before say, so they are read in order; one that comes early waits for those before it.
+Neighbours: `core` closes the ticks of these frames.
+"""
+
+from __future__ import annotations
+
+from foosim.protocol import limits
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
+from foosim.protocol.layout import Layout
+from foosim.protocol.messages import Commit
+
+Committed = tuple[bytes, Commit, Frame]
+"""A commit as it came, read, and its frame."""
+
+
+class Commits:
+    """Committed frames by tick. `layout` is that of the newest, None while the world is not known."""
+
+    def __init__(self) -> None:
+        self.layout: Layout | None = None
+        self.next_tick = 0
+        self._frames: dict[int, Committed] = {}
+        self._early: dict[int, tuple[bytes, Commit]] = {}
+
+    def take(self, commit: Commit, payload: bytes) -> list[int]:
+        """Take a commit; return the ticks whose frames are there by it, none for a repeat or one that came early.
+
+        Raises `Malformed` for a frame with another digest than the commit says.
+        """
+        ahead = commit.tick - self.next_tick
+        if self.layout is None or not 0 <= ahead <= limits.KEPT_TICKS:
+            return []
+        if ahead > 0:
+            self._early[commit.tick] = payload, commit
+            return []
+        taken = [self._read(commit, payload)]
+        while self.next_tick in self._early:
+            early_payload, early = self._early.pop(self.next_tick)
+            taken.append(self._read(early, early_payload))
+        return taken
+
+    def get(self, tick: int) -> Committed | None:
+        """Return the commit of a tick; None while it is not there, or is forgotten."""
+        return self._frames.get(tick)
+
+    def __contains__(self, tick: int) -> bool:
+        return tick in self._frames
+
+    def forget(self, tick: int) -> None:
+        """Nobody asks for this tick any more."""
+        self._frames.pop(tick, None)
+
+    def _read(self, commit: Commit, payload: bytes) -> int:
+        assert self.layout is not None
+        layout = layout_after(self.layout, commit.edits)
+        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        if frame.digest != commit.digest:
+            raise Malformed(f"commit {commit.tick} whose frame has another digest")
+        self.layout = layout
+        self.next_tick += 1
+        self._frames[commit.tick] = payload, commit, frame
+        return commit.tick
