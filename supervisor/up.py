@@ -100,8 +100,8 @@ class Up:
         self._lost_s = 0.0
         self._has_begun = self._has_ended = False
         self._restarts = Restarts()
-        self._stalled: dict[str, float] = {}
-        """Nodes that the run goes on without though their processes live: since when."""
+        self._stalled: dict[str, tuple[int, float]] = {}
+        """Nodes that the run goes on without though their processes live: which process, since when."""
         self._stopped: set[str] = set()
         """Nodes that somebody stopped."""
         self._told = 0
@@ -213,12 +213,13 @@ class Up:
 
     def _end_stalled(self, processes: dict[str, dict[str, Any]], now_s: float) -> None:
         """Kill a node's process that hangs: the run goes on without it, and a new one can take part."""
-        lost = [name for name in self._launcher.children if processes.get(name, {}).get("lost")]
-        self._stalled = {name: self._stalled.get(name, now_s) for name in lost}
-        for name, since_s in self._stalled.items():
-            child = self._launcher.children[name]
-            if child.exit_code is None and now_s >= since_s + STALLED_S:
-                self.display.say(f"{name} does not answer any more: it is killed")
+        lost = [child for name, child in self._launcher.children.items() if processes.get(name, {}).get("lost")]
+        self._stalled = {child.name: self._stalled.get(child.name, (child.process.pid, now_s)) for child in lost}
+        for child in lost:
+            pid, since_s = self._stalled[child.name]
+            same = pid == child.process.pid  # and not one that was started since, and has not said hello yet
+            if same and child.exit_code is None and now_s >= since_s + STALLED_S:
+                self.display.say(f"{child.name} does not answer any more: it is killed")
                 child.process.kill()
 
     def _restart_nodes(self, now_s: float, knows: bool = False) -> None:

@@ -78,15 +78,17 @@ class _Forgetful(SupervisorCore):
 
 
 PLANTED: Final = {
-    "nodes that ask for nothing again": Settings(node=_Impatient),
-    "a vHub that speaks before it writes": Settings(hub=_Hasty),
-    "a supervisor that forgets its orders": Settings(supervisor=_Forgetful),
+    "nodes that ask for nothing again": (4, Settings(node=_Impatient)),
+    "a vHub that speaks before it writes": (1, Settings(hub=_Hasty)),
+    "a supervisor that forgets its orders": (2, Settings(supervisor=_Forgetful)),
 }
+"""By what is wrong: a seed that finds it."""
 
 
 @pytest.mark.parametrize("fault", PLANTED)
 def test_a_planted_fault_is_found(fault: str) -> None:
-    assert any(fly(TABLE.read_text(), TABLE.name, seed, PLANTED[fault]).broken for seed in range(1, 9))
+    seed, settings = PLANTED[fault]
+    assert fly(TABLE.read_text(), TABLE.name, seed, settings).broken
 
 
 def test_the_command_tells_how_seeds_went() -> None:
