@@ -78,16 +78,12 @@ class Recovery:
         """A node that has built the world takes part from the last commit on, with the robots that were its own."""
         core, name = self._core, process.name
         owners = dict(core.owners)
-        for robot, node in sorted(self._returns.items()):
-            if node == name or not core.members:
-                owners[robot] = name
+        if not core.members:  # nobody else is here: what is theirs is adopted until they return
+            self._returns = {**owners, **self._returns}
+            owners = dict.fromkeys(owners, name)
+        owners.update((robot, name) for robot, node in self._returns.items() if node == name)
         self._returns = {robot: node for robot, node in self._returns.items() if node != name}
-        if not core.members:  # the last owners are gone: what is theirs is adopted until they return
-            for robot, node in owners.items():
-                if node != name:
-                    self._returns.setdefault(robot, node)
-                    owners[robot] = name
-        self._note("join", name, "back" if self._was_lost(name) else "new")
+        self._note("join", name, "back" if self._was_lost(name) else "started")
         self._open(owners, [*core.members, name], now_ns)
         core.say("info", f"node {name} takes part from tick {core.frame.tick}")
 
