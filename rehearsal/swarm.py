@@ -34,6 +34,7 @@ NODES: Final = (3, 6)
 PATIENT: Final = ("deadlines.tick_lost=5 s", "deadlines.lockstep_fast=1 h")
 """A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
 MS: Final = 1_000_000
+RESTART_NS: Final = 500 * MS
 
 T = TypeVar("T")
 
@@ -301,7 +302,13 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None) -> Fl
     alone = with_nodes(text, name, 1, ["players={}"])
     replica = Replica(alone, name, load_deployment(alone, name))
     laws = Laws(replica)
-    chosen = replace(settings or Settings(), weather=plan.weather, observer=laws.see, on_closing=laws.close)
+    chosen = replace(
+        settings or Settings(),
+        weather=plan.weather,
+        restart_ns=RESTART_NS,
+        observer=laws.see,
+        on_closing=laws.close,
+    )
     system = System(RunSettings(f"swarm-{seed}", name, text, Pace("fast"), TICKS), chosen)
     for fault in plan.faults:
         system.at_tick(fault.tick, partial(fault.do, system))

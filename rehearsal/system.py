@@ -66,6 +66,8 @@ class Settings:
     supervisor: type[SupervisorCore] = SupervisorCore
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
+    restart_ns: int = 0
+    """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
     observer: Observer | None = None
     on_commit: Callable[[Frame], None] | None = None
     on_closing: Callable[[Closing], None] | None = None
@@ -124,6 +126,8 @@ class System:
             while core.work is not None:
                 solver.solve(core.work)
                 core.advance(now_ns)
+            if core.member.refusal and self.settings.restart_ns and self.solvers.get(name) is solver:
+                self._next.append(lambda: self._start_again(name, solver))
 
         self._enter(name, core, turn, channels.NODE_READS)
 
@@ -275,6 +279,15 @@ class System:
         assert name not in self.processes, f"{name} is running"
         self._enter_node(name, library_fingerprint())
         self._wake(self.processes[name])
+
+    def _start_again(self, name: str, refused: Solver) -> None:
+        """A process that is refused ends; its launcher starts another one after a while."""
+        if self.solvers.get(name) is not refused:
+            return
+        self.processes.pop(name)
+        self.solvers.pop(name).close()
+        self._enter_node(name, library_fingerprint())
+        self.pause(name, self.settings.restart_ns)
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""

@@ -21,6 +21,7 @@ FOUND: Final = {
     6: "a vHub that forgets commits that come early never catches up",
     168: "a supervisor that notices a loss does not ask again",
     188: "a newcomer that waits for its first frame does not ask again; the last node, lost and alive, is never let in",
+    2126: "a node that was refused for its own ghost is not started again",
 }
 
 
