@@ -362,8 +362,8 @@ class NodeCore:
         if frame is not None:
             mine = [robot for robot in frame.layout.robots if self.owners.get(robot.name) == self.name]
             self._say_samples(frame, mine)
-        elif self.frame is not None and tick < self.frame.tick and len(self._unsampled) < limits.KEPT_TICKS:
-            self._unsampled.add(tick)
+        elif self.frame is not None and self.frame.tick - limits.KEPT_TICKS <= tick < self.frame.tick:
+            self._unsampled = {kept for kept in self._unsampled if kept >= self.frame.tick - limits.KEPT_TICKS} | {tick}
             message = encode(Want(self.name, channels.COMMIT.name, tick, self.epoch))
             self.actions.append(Publish(channels.WANT, self.name, message))
 

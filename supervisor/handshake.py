@@ -83,8 +83,8 @@ class Handshake:
             core.count_repeat()
             return
         process.heard_ns = now_ns
-        if process.lost and not core.members and core.epoch > 0 and process.name not in core.roster.stopped:
-            core.recovery.take_back(process, now_ns)
+        if process.lost:
+            core.recovery.hear(process, now_ns)
         if not heartbeat.report:
             core.watch.told(heartbeat)
             return

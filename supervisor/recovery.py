@@ -87,10 +87,16 @@ class Recovery:
         self._open(owners, [*core.members, name], now_ns)
         core.say("info", f"node {name} takes part from tick {core.frame.tick}")
 
-    def take_back(self, process: Process, now_ns: int) -> None:
-        """The last node was lost and is heard of again: no epoch without it told it so, it goes on in the next one."""
-        process.lost = False
-        self.join(process, now_ns)
+    def hear(self, process: Process, now_ns: int) -> None:
+        """A lost node is heard of. An epoch without it tells it so, but there is none when it was the last one.
+
+        Then it goes on in the next one, if it had built the world and its arithmetic was compared.
+        """
+        core = self._core
+        runs = core.epoch > 0 and core.end is None
+        if runs and not core.members and process.ready and process.name not in core.roster.stopped:
+            process.lost = False
+            self.join(process, now_ns)
 
     def moved(self, robot: str) -> None:
         """Somebody chose an owner for a robot: that one stays."""

@@ -100,7 +100,6 @@ class Roster:
     def lose(self, process: Process) -> None:
         """Go on without a process until it says hello again."""
         process.lost = True
-        process.ready.clear()
 
     def note_ready(self, process: Process, ready: Ready) -> str:
         """Note a layout that is built; return why the process cannot take part after all, or an empty string."""
@@ -119,7 +118,8 @@ class Roster:
 
     def missing(self, layout: bytes) -> list[str]:
         """Return who is not ready for a layout yet, of those that the deployment declares."""
-        return [name for name in self.expected if name not in self.by_name or layout not in self.by_name[name].ready]
+        here = {name for name, process in self.by_name.items() if not process.lost and layout in process.ready}
+        return [name for name in self.expected if name not in here]
 
     def silent(self, now_ns: int, deadline_ns: int) -> list[str]:
         """Return who has not been heard of for longer than the deadline."""

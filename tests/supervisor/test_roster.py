@@ -15,7 +15,7 @@ from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Build, Epoch, Hello, Ready, Refusal
+from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Refusal
 from foosim.protocol.units import Pace
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
@@ -234,3 +234,27 @@ def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> N
         account = process.statistics()
         refused = account.refused if isinstance(account, NodeStatistics) else account.malformed
         assert refused == len(wrong)
+
+
+@pytest.mark.parametrize("case", ["built", "not built", "stopped", "others are here", "the run has ended"])
+def test_the_last_node_that_was_lost_goes_on_when_it_is_heard_of_again(case: str) -> None:
+    """But none whose arithmetic was never compared, and nobody once the run is over."""
+    core = SupervisorCore(RunSettings("run", TABLE.name, TEXT, Pace("fast")), PRINT, 0)
+    process = core.roster.take(HELLO, 0)
+    if case != "not built":
+        core.roster.note_ready(process, Ready("red", HELLO.boot, core.frame.layout.digest, PRINT))
+    core.roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
+    core.open_epoch(core.owners, 0, ["blue", "red"])
+    core.recovery.lose("red", "silent", 0)
+    if case == "stopped":
+        core.roster.stopped.add("red")
+    if case != "others are here":
+        core.recovery.lose("blue", "silent", 0)
+    if case == "the run has ended":
+        core.finish("enough", failed=False)
+    epoch = core.epoch
+    heartbeat = Heartbeat("red", 0, 1, "", "", 0.0, b"{}")
+    core.receive(channels.HEARTBEAT, "red", encode(heartbeat), 0)
+    taken = case == "built"
+    assert (core.members == ("red",), process.lost, core.epoch - epoch) == (taken, not taken, int(taken))
+    assert not taken or set(core.owners.values()) == {"red"}

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import msgspec
 import pytest
 
 from foosim.rehearsal.rehearse import rehearse
-from foosim.vhub.mcap_file import McapFile, Message
+from tests.replay.test_verify import messages_of
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
@@ -25,20 +24,6 @@ def scribes(folder: Path) -> list[str]:
         sets.append(f"players.player-{team}.class=scribe:Scribe")
         sets.append(f"players.player-{team}.parameters={{team: {team}, path: '{folder / team}.txt'}}")
     return sets
-
-
-def said_in(path: Path) -> dict[str, list[tuple[int, int, bytes]]]:
-    """Return (time, sequence, bytes) of every topic of a capture but the log; rows without their wall-clock fields."""
-    topics: dict[str, list[tuple[int, int, bytes]]] = {}
-    with path.open("rb") as stream:
-        for content in McapFile(stream, path.stat().st_size, str(path)).contents():
-            if isinstance(content, Message) and content.topic != "/log":
-                data = content.data
-                if data[:1] == b"{":
-                    row = {key: value for key, value in msgspec.json.decode(data).items() if not key.startswith("wall")}
-                    data = msgspec.json.encode(row)
-                topics.setdefault(content.topic, []).append((content.log_ns, content.sequence, data))
-    return topics
 
 
 @pytest.mark.parametrize("engine", ["bullet", "pure"])
@@ -58,7 +43,7 @@ def test_processes_say_what_a_rehearsal_says(house: House, monkeypatch: pytest.M
     capture = rehearsed / "run.mcap"
     rehearse(text, "table.yaml", TICKS, None, [*common, *scribes(rehearsed)], capture=capture)
 
-    found, expected = said_in(real / "run.mcap"), said_in(capture)
+    found, expected = messages_of(real / "run.mcap"), messages_of(capture)
     assert {"/epochs", "/tick", "/frame", "/packets", "/clients", "/tf", "/scene"} <= set(found)
     assert len(found["/tick"]) == len(found["/frame"]) == TICKS + 1
     for topic in sorted(expected):
