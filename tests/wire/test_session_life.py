@@ -170,14 +170,20 @@ def test_a_session_is_not_used_in_a_forked_child() -> None:
 
 
 CLIENT_RUNTIME = """
-import os, sys
+import os, sys, time
 from foosim.protocol.session import CLIENT_RUNTIME, ROUTER_RUNTIME, Session, use_client_runtime
 if sys.argv[1] == "client":
     use_client_runtime()
 with Session.router("tcp/127.0.0.1:0") as router, Session.client(router.locator, 30.0) as client:
     assert client.alive("nobody/*") == set()
-    threads = {open(f"/proc/self/task/{task}/comm").read().strip() for task in os.listdir("/proc/self/task")}
-print(sorted(thread for thread in threads if thread.startswith("rx")), os.environ.get("ZENOH_RUNTIME"))
+    wanted = [f"rx-{number}" for number in range(int(sys.argv[2]))]
+    while True:  # a thread gives itself its name when it first runs
+        names = [open(f"/proc/self/task/{task}/comm").read().strip() for task in os.listdir("/proc/self/task")]
+        receiving = sorted(name for name in names if name.startswith("rx"))
+        if receiving == wanted or len(receiving) > len(wanted):
+            break
+        time.sleep(0.01)
+print(receiving, os.environ.get("ZENOH_RUNTIME"))
 try:
     use_client_runtime()
 except AssertionError:
@@ -189,7 +195,7 @@ except AssertionError:
 @pytest.mark.parametrize(("kind", "receiving"), [("client", 0), ("router", sessions.ROUTER_THREADS)])
 def test_a_router_has_a_receiving_thread_for_each_stuck_link(kind: str, receiving: int) -> None:
     """With two, one stuck client stopped healthy ones for seconds."""
-    done = run_python(CLIENT_RUNTIME, kind)
+    done = run_python(CLIENT_RUNTIME, kind, str(receiving))
     threads = [f"rx-{number}" for number in range(receiving)]
     assert done.stdout.splitlines() == [f"{threads} None", "too late"], done.stderr
 
