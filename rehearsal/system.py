@@ -94,6 +94,8 @@ class System:
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
         self._timers: list[tuple[int, int, Callable[[], object]]] = []
+        self._dying: dict[str, int] = {}
+        """Processes that end amid their next actions: how many of these they still perform."""
         self._boots = 0
         self._run = settings
         self._journal: list[bytes] = []
@@ -227,6 +229,10 @@ class System:
         actions = process.core.actions
         if not actions:
             return
+        left = self._dying.pop(process.name, None)
+        if left is not None:
+            del actions[left:]
+            self.processes.pop(process.name)
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
@@ -293,10 +299,7 @@ class System:
         self._next.append(action)
 
     def kill(self, name: str) -> None:
-        """End a node or the supervisor at once: what is on its way to it is lost, the supervisor sees that a node goes.
-
-        What a supervisor has not written by then it has not said either.
-        """
+        """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
         self.processes.pop(name)
         if name == channels.SUPERVISOR:
             return
@@ -307,6 +310,14 @@ class System:
         self.supervisor.process_gone(name, self.bus.now_ns)
         supervisor.turn(self.bus.now_ns)
         self._perform(supervisor)
+
+    def end_amid(self, name: str, actions: int) -> None:
+        """End the supervisor amid its next turn, when it has performed so many of its actions."""
+        self._dying[name] = actions
+
+    def is_dying(self, name: str) -> bool:
+        """Whether a process ends amid its next turn."""
+        return name in self._dying
 
     def start(self, name: str) -> None:
         """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""
