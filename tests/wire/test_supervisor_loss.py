@@ -73,7 +73,8 @@ def test_who_is_left_alone_holds_and_ends(house: House) -> None:
     for other in others:
         code, _, err = house.end(other)
         assert code == 1 and "lost the supervisor, and it has not come back" in err, err
-    again = house.start("foosim-supervisor", "run", house.table, *run[:-1], "deadlines={start: 99 s}", "--run", info.run)
+    other_file = [*run[:-1], "deadlines={start: 99 s}", "--run", info.run]
+    again = house.start("foosim-supervisor", "run", house.table, *other_file)
     code, _, err = house.end(again)
     assert code == 3 and f"run {info.run} was started with another deployment" in err
 
