@@ -25,6 +25,13 @@ class Commits:
         self._frames: dict[int, Committed] = {}
         self._early: dict[int, tuple[bytes, Commit]] = {}
 
+    def start(self, layout: Layout | None, last: Committed | None) -> None:
+        """Begin with the world's layout, behind the last frame that was closed where there is one."""
+        self.layout = layout
+        if last is not None:
+            self.next_tick = last[1].tick + 1
+            self._frames[last[1].tick] = last
+
     def take(self, commit: Commit, payload: bytes) -> list[int]:
         """Take a commit; return the ticks whose frames are there by it, none for a repeat or one that came early.
 

@@ -147,9 +147,7 @@ class HubState:
                 self._send(flight, tick, fates)
         return self._arrive_at_clients(tick, fates)
 
-    def close_clients(
-        self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]
-    ) -> Deliveries:
+    def close_clients(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]) -> Deliveries:
         """Phase two: judge what clients sent, in (source, sequence) order. Return the deliveries of the next tick."""
         tick = frame.tick
         sent_ns = tick * self.tick_ns
