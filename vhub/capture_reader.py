@@ -31,8 +31,8 @@ from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
 from foosim.protocol.table_scene import build_scene
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
-from foosim.vhub.capture_writer import DEPLOYMENT, END_METADATA, METADATA, VERSIONS
-from foosim.vhub.mcap_file import McapFile, Message
+from foosim.vhub.capture_file import DEPLOYMENT, END_METADATA, METADATA, VERSIONS
+from foosim.vhub.mcap_file import MAGIC, McapFile, Message
 from foosim.vhub.rows import (
     CLIENTS,
     EPOCHS,
@@ -229,6 +229,28 @@ class CaptureData:
         return poses_of(found, link)
 
 
+def read_about(path: Path) -> About:
+    """Return what a capture, finished or not, says about itself before its first row. Raises CaptureError."""
+    scan = _Scan(path)
+    for _ in scan.messages():
+        break
+    try:
+        with path.open("rb") as stream:
+            stream.seek(max(0, path.stat().st_size - len(MAGIC)))
+            scan.about.finished = stream.tell() > 0 and stream.read() == MAGIC
+    except OSError as error:
+        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+    return scan.about
+
+
+def deployment_of(about: About) -> Deployment:
+    """Return the deployment that a capture has attached. Raises CaptureError when it is not valid here."""
+    try:
+        return load_deployment(about.deployment_text, about.deployment_name)
+    except Refused as error:
+        raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
+
+
 def open_capture(path: Path | str) -> CaptureData:
     """Open a capture, also an unfinished one. Raises CaptureError when it is none, or damaged."""
     scan = _Scan(Path(path))
@@ -254,7 +276,7 @@ def open_capture(path: Path | str) -> CaptureData:
     for before, after in pairwise(ticks):
         if after <= before:
             raise CaptureError(f"{path}: tick {after} comes behind tick {before}")
-    deployment = _deployment_of(scan.about)
+    deployment = deployment_of(scan.about)
     blocks = []
     for layout_row, rows in zip(layouts, frames, strict=True):
         layout = _layout_of(scan.about, deployment, layout_row)
@@ -271,13 +293,6 @@ def open_capture(path: Path | str) -> CaptureData:
         tuple(others[CLIENTS]),
         tuple(others[EPOCHS]),
     )
-
-
-def _deployment_of(about: About) -> Deployment:
-    try:
-        return load_deployment(about.deployment_text, about.deployment_name)
-    except Refused as error:
-        raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
 
 
 def _layout_of(about: About, deployment: Deployment, row: LayoutRow) -> Layout:
@@ -339,7 +354,7 @@ def capture_info(path: Path | str) -> CaptureInfo:
             nodes.update(epoch.roster)
             arithmetic.add(epoch.arithmetic)
     about = scan.about
-    tick_ns = _deployment_of(about).tick_ns
+    tick_ns = deployment_of(about).tick_ns
     return CaptureInfo(
         str(path),
         path.stat().st_size,
