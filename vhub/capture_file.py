@@ -21,7 +21,7 @@ from foosim.protocol.codec import decode_json, encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Epoch
+from foosim.protocol.messages import Epoch, Origin
 from foosim.vhub.mcap_file import McapWriter
 from foosim.vhub.mcap_scan import Scanned, scan
 from foosim.vhub.packet import IN_FLIGHT
@@ -47,6 +47,8 @@ METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 DEPLOYMENT: Final = "deployment.yaml"
 VERSIONS: Final = "versions.json"
+ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
+"""Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
 CHUNK_BYTES: Final = 4 * 1024 * 1024
 """A chunk is ended at this size, or when it is to be flushed; a reader holds one at a time."""
 _LIBRARIES: Final = (
@@ -86,6 +88,14 @@ class Progress:
     epoch: int = -1
     in_flight: bool = False
     """Whether what was in flight at the end of the run is written."""
+
+
+def origin_metadata(origin: Origin | None) -> dict[str, str]:
+    """Return what a capture says of where its run began."""
+    if origin is None:
+        return {}
+    digest, chain = origin.digest.hex(), origin.chain.hex()
+    return {ORIGIN: origin.source, ORIGIN_TICK: str(origin.tick), ORIGIN_DIGEST: digest, ORIGIN_CHAIN: chain}
 
 
 def library_versions() -> dict[str, str]:

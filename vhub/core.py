@@ -334,8 +334,8 @@ class HubCore:
             return
         deployment = self.deployment = self.member.deployment
         assert deployment is not None
-        self._commits.layout = self.member.layout
-        self.state = HubState(deployment)
+        self._commits.layout, self._commits.next_tick = self.member.layout, self.member.first_tick
+        self.state = HubState(deployment, self.member.first_tick)
         self.releases = Releases(deployment.tick_ns)
         self.actions.append(Journal(self.head()))
         self._ready_if_complete()
@@ -359,8 +359,9 @@ class HubCore:
         self.actions.append(KeepEpoch(epoch))
         self.member.entered()
         if first:
-            self._sent[0] = encode(Deliveries(0, []))
-            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[0]))
+            tick = self.state.closed + 1
+            self._sent[tick] = encode(Deliveries(tick, []))
+            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[tick]))
             self._patience.progress(self.state.tick_ns, now_ns)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
