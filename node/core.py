@@ -330,7 +330,7 @@ class NodeCore:
             self._repeated += 1
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
-        own_tick = 0 if self.frame is None else self.frame.tick
+        own_tick = self.member.first_tick if self.frame is None else self.frame.tick
         if not self._inputs.take_deliveries(deliveries, payload, own_tick):
             self._repeated += 1
 

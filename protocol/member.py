@@ -71,6 +71,11 @@ class Member:
         self._world = deployment.world
         return True
 
+    @property
+    def first_tick(self) -> int:
+        """The tick of the frame that the run began with."""
+        return 0 if self.build is None or self.build.origin is None else self.build.origin.tick
+
     def refuse(self, payload: bytes) -> bool:
         """Take a refusal; False when it is meant for another boot."""
         refusal = decode(Refusal, payload)

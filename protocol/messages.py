@@ -229,6 +229,16 @@ class AddedEntity(Item, frozen=True):
 Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
 
 
+class Origin(Item, frozen=True):
+    """Where a run begins that does not begin anew: at frame `tick` of `source`, with that frame's digest and the chain
+    over all frames up to it."""
+
+    tick: Counter
+    source: Text
+    digest: Digest
+    chain: Digest
+
+
 class Build(Message, frozen=True):
     """Everything that a process needs to build the world: one address was all that it had to know."""
 
@@ -239,6 +249,7 @@ class Build(Message, frozen=True):
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     pace: Name
     added: Added
+    origin: Origin | None = None
 
 
 class Refusal(Message, frozen=True, tag="refusal"):

@@ -18,7 +18,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, layout_after
+from foosim.protocol.frame import Frame, basis_of, chain_next, layout_after
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import (
     AddedEntity,
@@ -39,7 +39,7 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.patience import Patience
-from foosim.protocol.start import initial_frame
+from foosim.protocol.start import first_chain, first_frame
 from foosim.supervisor.account import Account
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.pacing import Pacer
@@ -72,14 +72,15 @@ class SupervisorCore:
         self.requests = Requests(self)
         self.recovery = Recovery(self)
         self.handshake = Handshake(self)
-        self.frame: Frame = initial_frame(self.deployment)
-        self.chain = CHAIN_START
+        self.frame: Frame = first_frame(self.deployment, settings.start)
+        self.chain = first_chain(settings.origin)
+        self.first_tick = self.frame.tick
         self.epoch = 0
         self.owners = self.deployment.owners()
         self.members: tuple[str, ...] = ()
-        self.released = 0
+        self.released = self.first_tick
         """The first tick whose order is not released."""
-        self.stop_at = settings.ticks
+        self.stop_at = settings.last_tick
         self.end: End | None = None
         self.finished = False
         self.busy = 0.0
@@ -108,7 +109,7 @@ class SupervisorCore:
             Request: self.requests.take,
             Farewell: self.handshake.farewell,
         }
-        self._run = RunRecord(settings.run, settings.deployment_name, settings.deployment_text)
+        self._run = RunRecord(settings.run, settings.deployment_name, settings.deployment_text, settings.start)
         self.actions.append(Journal(encode(self._run)))
 
     # --- what the shell calls --------------------------------------------------------------------------------------
@@ -134,7 +135,7 @@ class SupervisorCore:
         while self._commit_next(now_ns):
             self._release(now_ns)
         if self.stop_at and self.frame.tick >= self.stop_at:
-            self.finish("done" if self.stop_at == self.settings.ticks else "stopped", failed=False)
+            self.finish("done" if self.stop_at == self.settings.last_tick else "stopped", failed=False)
 
     def wake(self, now_ns: int) -> None:
         """Look for who is silent or overdue, and for the end of an ended run."""
@@ -286,7 +287,7 @@ class SupervisorCore:
             self._orders.pop(tick - limits.KEPT_TICKS, None)
             if tick == self.frame.tick:
                 self._patience.progress(self.deployment.tick_ns, now_ns)
-            if tick == 0:
+            if tick == self.first_tick:
                 self.started_ns = now_ns
             self.watch.released(tick, now_ns)
         self._say_orders(first, self.released)
@@ -407,7 +408,7 @@ class SupervisorCore:
         """Open the first epoch when every declared process has built the world."""
         if self.epoch > 0 or self.end is not None or self.roster.missing(self.frame.layout.digest):
             return
-        self.pacer.start(now_ns)
+        self.pacer.start(now_ns, self.frame.tick)
         self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
         self.open_epoch(self.owners, now_ns, self.deployment.nodes)
         self._say_commit([])

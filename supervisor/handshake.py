@@ -35,7 +35,7 @@ class Handshake:
         core.roster.take(hello, now_ns)
         run, pace, added = core.settings, str(core.pacer.pace), core.added_to(core.frame.layout)
         deployment = run.deployment_name, run.deployment_text
-        build = Build(hello.name, hello.boot, run.run, *deployment, pace, added)
+        build = Build(hello.name, hello.boot, run.run, *deployment, pace, added, run.origin)
         core.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
 
     def _has_ended(self) -> bool:

@@ -16,7 +16,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, Epoch
-from foosim.protocol.start import initial_frame
+from foosim.protocol.start import Start, first_frame
 
 
 class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_unknown_fields=True):
@@ -25,6 +25,7 @@ class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_
     run: str
     deployment_name: str
     deployment: str
+    start: Start | None = None
 
 
 class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request", forbid_unknown_fields=True):
@@ -88,9 +89,9 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
 def _begin(deployment: Deployment, first: object) -> History:
     """Return the history that a file's first record stands for."""
     if isinstance(first, RunRecord):
-        return History(first, initial_frame(deployment))
+        return History(first, first_frame(deployment, first.start))
     assert isinstance(first, HeadRecord), "a file starts with the run or with what was before it"
-    history = History(first.run, initial_frame(deployment))
+    history = History(first.run, first_frame(deployment, first.run.start))
     if first.commit:
         commit = decode(Commit, first.commit)
         layout = build_layout(deployment, [(entity.name, entity.model) for entity in first.added])

@@ -25,12 +25,11 @@ class Commits:
         self._frames: dict[int, Committed] = {}
         self._early: dict[int, tuple[bytes, Commit]] = {}
 
-    def start(self, layout: Layout | None, last: Committed | None) -> None:
-        """Begin with the world's layout, behind the last frame that was closed where there is one."""
-        self.layout = layout
+    def start(self, layout: Layout | None, tick: int, last: Committed | None = None) -> None:
+        """Begin with the frame of a tick and the layout before it; `last` is the frame before, where that is known."""
+        self.layout, self.next_tick = layout, tick
         if last is not None:
-            self.next_tick = last[1].tick + 1
-            self._frames[last[1].tick] = last
+            self._frames[tick - 1] = last
 
     def take(self, commit: Commit, payload: bytes) -> list[int]:
         """Take a commit; return the ticks whose frames are there by it, none for a repeat or one that came early.

@@ -347,8 +347,8 @@ class HubCore:
         self.releases = Releases(deployment.tick_ns)
         self.sessions.downlinks.kept_ns = deployment.deadlines.client_back_ns
         if past is None:
-            self.state = HubState(deployment)
-            self._commits.start(self.member.layout, None)
+            self.state = HubState(deployment, self.member.first_tick)
+            self._commits.start(self.member.layout, self.member.first_tick)
         else:
             self._go_on(past, now_ns)
         self.actions.append(Journal(self.head()))
@@ -358,7 +358,7 @@ class HubCore:
         """Be the vHub that was there before: say its last deliveries again, and ask for what comes after."""
         assert self.deployment is not None
         state = self.state = past.state
-        self._commits.start(past.layout, past.committed)
+        self._commits.start(past.layout, state.closed + 1, past.committed)
         self.door.written = past.inputs
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
@@ -398,8 +398,9 @@ class HubCore:
         self.actions += [Journal(self._epoch_payload), KeepEpoch(epoch)]
         self.member.entered()
         if first:
-            self._sent[0] = encode(Deliveries(0, []))
-            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[0]))
+            tick = self.state.closed + 1
+            self._sent[tick] = encode(Deliveries(tick, []))
+            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[tick]))
             self._patience.progress(self.state.tick_ns, now_ns)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:

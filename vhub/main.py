@@ -29,6 +29,7 @@ from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
+from foosim.vhub.capture_file import origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
@@ -134,6 +135,7 @@ class HubProcess:
                 "started": wall.now_text(),
                 "pace": build.pace,
                 "fingerprint": library_fingerprint().hex(),
+                **origin_metadata(build.origin),
             }
             self._capture = CaptureWriter(
                 path, core.deployment, build.deployment_name, build.deployment, metadata, self._say
