@@ -40,6 +40,8 @@ from foosim.protocol.names import CHANNEL_ECHO
 
 AGAIN_NS: Final = 200_000_000
 """After how long hello is said again; a Join's wait doubles from there, up to a second."""
+AWAY_AGAIN_NS: Final = 50_000_000
+"""The same while the vHub is gone: the run waits for who comes back."""
 NEVER_NS: Final = limits.COUNTER_MAX
 GAPS_KEPT: Final = 1024
 """How many numbers of missing downlinks are remembered, so that a late one is told from a repeat."""
@@ -170,7 +172,7 @@ class ClientCore:
             return
         self.is_away = True
         self._lost_ns = now_ns + self.deployment.deadlines.vhub_back_ns
-        self._again_ns, self._again_after_ns = now_ns, AGAIN_NS
+        self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
         self._resend_ns = NEVER_NS
         self.actions.append(Say("warning", "the vHub is gone; waits for it to come back"))
 

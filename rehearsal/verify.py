@@ -62,9 +62,7 @@ def start_of(capture: CaptureData) -> Start | None:
     return start_with(first, origin.source, origin.chain, added_to(capture.deployment, first.layout))
 
 
-def verify(
-    text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1, start: Start | None = None
-) -> Verified:
+def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1, start: Start | None = None) -> Verified:
     """Simulate again what `ticks` (from 0, or from that of `start` on, in order) say, on `nodes` nodes, and compare."""
     text = with_nodes(text, name, nodes)
     replica = Replica(text, name, load_deployment(text, name), start=start)

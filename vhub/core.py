@@ -309,13 +309,14 @@ class HubCore:
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""
         assert self.state is not None and self.member.build is not None
-        committed = self._commits.get(self.state.closed)
-        layout = self._commits.layout if committed is None else committed[2].layout
+        commit, _, frame = self._commits.get(self.state.closed) or (b"", None, None)
+        layout = self._commits.layout if frame is None else frame.layout
         assert layout is not None
         base = build_layout(self.state.deployment)
         added = [(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
-        commit = b"" if committed is None else committed[0]
-        return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added, commit, self._epoch_payload))
+        return encode(
+            HeadRecord(self.member.build.run, self.state.snapshot(), added, commit, self._epoch_payload, self.capture)
+        )
 
     def _release(self, now_ns: int) -> None:
         """Say what is released to free-running clients by now; closings of which nothing waits go to the capture."""
@@ -359,10 +360,9 @@ class HubCore:
         assert self.deployment is not None
         state = self.state = past.state
         self._commits.start(past.layout, state.closed + 1, past.committed)
-        self.door.written = past.inputs
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
-        self.sessions.expect(state, now_ns + self.deployment.deadlines.client_back_ns)
+        self.door.go_on(past.inputs, now_ns)
         self.actions += past.words()
         if past.epoch is not None:
             self._take_epoch(past.epoch)
@@ -459,10 +459,8 @@ class HubCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = 0 if self.state is None else self.state.closed + 1
-        return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, self._report())
-
-    def _report(self) -> bytes:
-        return report(self.state, self.capture, self.radio_address)
+        told = report(self.state, self.capture, self.radio_address)
+        return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, told)
 
     # --- the end -----------------------------------------------------------------------------------------------------
 
@@ -497,4 +495,5 @@ class HubCore:
 
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""
-        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, self._report())))
+        told = report(self.state, self.capture, self.radio_address)
+        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, told)))

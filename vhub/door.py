@@ -31,6 +31,25 @@ class Door:
         """Who joins and leaves at the tick that is closed next, where that is written already."""
         self._leaves: list[str] = []
 
+    def go_on(self, written: InputsRecord | None, now_ns: int) -> None:
+        """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick."""
+        core = self._core
+        assert core.state is not None and core.deployment is not None
+        self.written = written
+        here = {name for name, member in core.state.members.items() if member.active}
+        if written is not None:
+            here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
+        core.sessions.expect(here, now_ns + core.deployment.deadlines.client_back_ns)
+
+    def _known(self, name: str) -> Member | Joining | None:
+        """Return what is known of a client, the latest first: as it joins, or as the state has it."""
+        core = self._core
+        written = [] if self.written is None else self.written.joins
+        for joining in (core.sessions.joins.get(name), *written):
+            if joining is not None and joining.name == name:
+                return joining
+        return None if core.state is None else core.state.members.get(name)
+
     def come_and_go(self, tick: int) -> tuple[list[Joining], list[str]]:
         """Take who joins and leaves at a tick. Its Go depends on it, and is said before the record is written."""
         core = self._core
@@ -63,7 +82,7 @@ class Door:
         if join.period and not may_lockstep(core.state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
-        known = core.state.members.get(join.name)
+        known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
             core.repeated += 1
             return
@@ -120,9 +139,8 @@ class Door:
         session = core.sessions.by_name.get(name)
         if session is None or core.state is None or core.deployment is None or core.ended is not None:
             return
-        joining = core.sessions.joins.get(name)
-        member = core.state.members.get(name)
-        if any(known is not None and known.period > 0 for known in (joining, member)):
+        known = self._known(name)
+        if known is not None and known.period > 0:
             session.away_ns = now_ns + core.deployment.deadlines.client_back_ns
             return
         self._leave(name)
@@ -134,8 +152,8 @@ class Door:
             return
         for name in core.sessions.late(now_ns):
             session = core.sessions.by_name[name]
-            member = core.sessions.joins.get(name) or core.state.members.get(name)
-            if member is not None and member.period > 0:
+            known = self._known(name)
+            if known is not None and known.period > 0:
                 session.away_ns = -1  # its session stays: a tick may be waiting for it
                 core.lose(name, "its connection closed" if session.boot else "it did not come back to the vHub")
             else:
@@ -144,11 +162,12 @@ class Door:
     def _leave(self, name: str) -> None:
         core = self._core
         core.sessions.leave(name)
-        if core.state is not None and name in core.state.members:
+        if self._known(name) is not None:
             self._leaves.append(name)
 
 
-def _is_member(known: Member, join: Join) -> bool:
+def _is_member(known: Member | Joining, join: Join) -> bool:
     """Whether a client takes part as it asks to."""
     wanted = {(item.robot, item.channel) for item in join.subscriptions}
-    return known.active and known.period == join.period and set(known.subscriptions) == wanted
+    active = isinstance(known, Joining) or known.active
+    return active and known.period == join.period and {(robot, name) for robot, name in known.subscriptions} == wanted

@@ -35,6 +35,8 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     added: list[tuple[str, str]]
     commit: bytes = b""
     epoch: bytes = b""
+    capture: str = ""
+    """Where the capture is; empty when there is none."""
 
 
 class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", forbid_unknown_fields=True):

@@ -156,3 +156,15 @@ def _number(past: Past, folded: Folded) -> None:
         if not member.is_due(tick):
             down = Down(member.downlink, tick, member.sequence, received(flights), False)
             past.downlinks.setdefault(name, []).append((member.downlink, encode(down)))
+
+
+def first_tick_of(records: Sequence[bytes]) -> int | None:
+    """Return the first tick of which a journal has a record, or would have; None when there is no journal."""
+    ticks = (record.tick for raw in records if isinstance(record := decode_any(HubRecord, raw), TickRecord))
+    return next(ticks, limits.COUNTER_MAX) if records else None
+
+
+def was_captured(records: Sequence[bytes]) -> str | None:
+    """Return the path of the capture that a journal is of, empty when there is none; None when there is no journal."""
+    heads = (record for raw in records[:1] if isinstance(record := decode_any(HubRecord, raw), HeadRecord))
+    return next((head.capture for head in heads), None)

@@ -7,7 +7,7 @@ world must remember of a client is in `state`. Neighbours: `core`, `door` (what 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from foosim.protocol import channels, limits
@@ -166,11 +166,10 @@ class Sessions:
         here = {name for name, member in state.members.items() if member.active} | self.joins.keys()
         return [name for name in declared if may_lockstep(deployment, name) and name not in here]
 
-    def expect(self, state: HubState, until_ns: int) -> None:
-        """The clients that a state knows come back, by then, to this vHub, which is another one."""
-        for name, member in sorted(state.members.items()):
-            if member.active:
-                self.by_name[name] = Session(name, "", away_ns=until_ns)
+    def expect(self, names: Iterable[str], until_ns: int) -> None:
+        """These clients come back, by then, to this vHub, which is another one."""
+        for name in sorted(names):
+            self.by_name[name] = Session(name, "", away_ns=until_ns)
 
     def late(self, now_ns: int) -> list[str]:
         """Return the clients that were away for too long, in name order."""
