@@ -45,6 +45,7 @@ from foosim.protocol.start import first_chain, first_frame
 from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account
 from foosim.supervisor.arrivals import Arrivals
+from foosim.supervisor.balance import Balancer
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
@@ -87,8 +88,8 @@ class SupervisorCore:
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.requests = Requests(self)
-        self.recovery = Recovery(self)
-        self.absence = Absence(self)
+        self.recovery, self.absence = Recovery(self), Absence(self)
+        self.balancer = Balancer(self.deployment.owners()) if settings.balance else None
         self.handshake = Handshake(self)
         self.frame: Frame = first_frame(self.deployment, settings.start)
         self.chain = first_chain(settings.origin)
@@ -168,6 +169,8 @@ class SupervisorCore:
                 self._lose(lost, now_ns)
             if self.take_over is not None:
                 self.take_over.wake(now_ns)
+            if self.balancer is not None:
+                self.balancer.wake(self, now_ns)
             if self._lacks and self._patience.is_over(now_ns):
                 self._ask_again(now_ns)
             if now_ns >= self._prepare_ns:

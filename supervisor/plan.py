@@ -58,6 +58,8 @@ class RunSettings:
     pace: Pace
     ticks: int = 0
     start: Start | None = None
+    balance: bool = False
+    """Whether robots move by the nodes' measured load."""
 
     @property
     def origin(self) -> Origin | None:
