@@ -11,7 +11,6 @@ from typing import Annotated
 
 import typer
 
-from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, INTERRUPTED, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
@@ -37,7 +36,10 @@ Sets = Annotated[
     typer.Option("--set", help="Change the deployment, e.g. --set table.ball.mass='27 g'; may be repeated."),
 ]
 Engine = Annotated[str | None, typer.Option("--engine", help="bullet or pure; short for --set engine=NAME.")]
-Listen = Annotated[str, typer.Option("--listen", help="HOST[:PORT]; the radio plane listens at PORT + 1.")]
+Listen = Annotated[
+    str | None,
+    typer.Option("--listen", help="HOST[:PORT], by default as deployed; the radio plane listens at PORT + 1."),
+]
 Insecure = Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")]
 RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
 
@@ -63,7 +65,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
     sets: Sets = None,
     engine: Engine = None,
-    listen: Listen = LOOPBACK,
+    listen: Listen = None,
     insecure: Insecure = False,
     run: RunName = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
@@ -99,7 +101,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     seed: Seed = None,
     sets: Sets = None,
     engine: Engine = None,
-    listen: Listen = LOOPBACK,
+    listen: Listen = None,
     insecure: Insecure = False,
     run: RunName = None,
 ) -> None:
@@ -120,7 +122,7 @@ def _options(
     seed: int | None,
     sets: list[str] | None,
     engine: str | None,
-    listen: str,
+    listen: str | None,
     insecure: bool,
 ) -> RunOptions:
     settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]

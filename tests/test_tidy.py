@@ -59,6 +59,8 @@ SHELLS = {
     "supervisor/cli.py",
     "supervisor/control.py",
     "supervisor/display.py",
+    "supervisor/guard.py",
+    "supervisor/hosts.py",
     "supervisor/launcher.py",
     "supervisor/main.py",
     "supervisor/plan.py",

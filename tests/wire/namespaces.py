@@ -1,0 +1,199 @@
+"""Machines in miniature: network namespaces on one switch, each with an address, a link of its own, and a real sshd.
+
+They need root, `ip`, `tc` and `sshd`; tests say with `needed` what is missing, and are skipped then. Names have the
+process id in them, so that several test processes do not meet; whatever is left of one that was killed is removed by
+the next. Links are cut as on a real network: a link down loses what is on the way, and a *wrong neighbour* (packets
+leave for a station that does not exist) loses one direction without telling anybody.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Final, Self
+
+SSHD: Final = "/usr/sbin/sshd"
+PREFIX: Final = "fs"
+NOBODY: Final = "02:00:00:00:ff:ff"
+"""The address of no station."""
+
+
+def missing() -> str:
+    """Return what is missing for machines in miniature, or an empty text."""
+    if os.geteuid() != 0:
+        return "network namespaces need root"
+    absent = [tool for tool in ("ip", "tc", "ssh", "ssh-keygen", SSHD) if shutil.which(tool) is None]
+    if absent:
+        return f"not installed: {', '.join(absent)} (sh tools/system_packages.sh)"
+    made = subprocess.run(["ip", "netns", "add", f"{PREFIX}{os.getpid()}-try"], capture_output=True, check=False)
+    if made.returncode != 0:
+        return "network namespaces cannot be made here"
+    run("ip", "netns", "del", f"{PREFIX}{os.getpid()}-try")
+    return ""
+
+
+def run(*command: str | Path) -> str:
+    """Output of a command that must succeed."""
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+    return done.stdout
+
+
+class Machine:
+    """One machine: a namespace, its address, its end of the link to the switch."""
+
+    def __init__(self, name: str, namespace: str, switch: str, address: str) -> None:
+        self.name = name
+        self.namespace = namespace
+        self.address = address
+        self._switch = switch
+        self._port = f"p-{name}"
+        self.sshd: subprocess.Popen[bytes] | None = None
+
+    def inside(self, *command: str | Path) -> list[str]:
+        """Return a command line that runs in this machine's network."""
+        return ["ip", "netns", "exec", self.namespace, *map(str, command)]
+
+    def connect(self) -> None:
+        """Put the machine's link into the switch."""
+        link = ("ip", "-n", self._switch, "link")
+        run(*link, "add", self._port, "type", "veth", "peer", "name", "eth0", "netns", self.namespace)
+        run(*link, "set", self._port, "master", "switch", "up")
+        run("ip", "-n", self.namespace, "link", "set", "lo", "up")
+        run("ip", "-n", self.namespace, "addr", "add", f"{self.address}/24", "dev", "eth0")
+        run("ip", "-n", self.namespace, "link", "set", "eth0", "up")
+
+    def link(self, state: str) -> None:
+        """Pull the cable out at the switch (`down`), or put it in again (`up`)."""
+        run("ip", "-n", self._switch, "link", "set", self._port, state)
+
+    def deafen(self, other: Machine) -> None:
+        """Lose all that this machine sends to another one, silently."""
+        neighbour = ("ip", "-n", self.namespace, "neigh", "replace", other.address)
+        run(*neighbour, "lladdr", NOBODY, "dev", "eth0", "nud", "permanent")
+
+    def heal(self, other: Machine) -> None:
+        """Undo `deafen`."""
+        run("ip", "-n", self.namespace, "neigh", "del", other.address, "dev", "eth0")
+
+    def limit(self, rate: str) -> None:
+        """Let what this machine sends, and what is sent to it, have this rate (`2mbit`)."""
+        bucket = ("root", "tbf", "rate", rate, "burst", "16kb", "latency", "200ms")
+        run("ip", "netns", "exec", self.namespace, "tc", "qdisc", "replace", "dev", "eth0", *bucket)
+        run("ip", "netns", "exec", self._switch, "tc", "qdisc", "replace", "dev", self._port, *bucket)
+
+    def unlimit(self) -> None:
+        """Undo `limit`."""
+        run("ip", "netns", "exec", self.namespace, "tc", "qdisc", "del", "dev", "eth0", "root")
+        run("ip", "netns", "exec", self._switch, "tc", "qdisc", "del", "dev", self._port, "root")
+
+
+class Machines:
+    """Several machines on one switch. Use it in `with`; nothing of it stays."""
+
+    def __init__(self, folder: Path, *names: str) -> None:
+        self.folder = folder
+        self._prefix = f"{PREFIX}{os.getpid()}-"
+        self.by_name = {
+            name: Machine(name, self._prefix + name, self._prefix + "switch", f"10.77.0.{number}")
+            for number, name in enumerate(names, 1)
+        }
+
+    def __getitem__(self, name: str) -> Machine:
+        return self.by_name[name]
+
+    def __enter__(self) -> Self:
+        remove_leftovers()
+        switch = self._prefix + "switch"
+        try:
+            for namespace in (switch, *(machine.namespace for machine in self.by_name.values())):
+                run("ip", "netns", "add", namespace)
+            run("ip", "-n", switch, "link", "add", "switch", "type", "bridge", "forward_delay", "0")
+            run("ip", "-n", switch, "link", "set", "switch", "up")
+            for machine in self.by_name.values():
+                machine.connect()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(self, *about: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End every process in the namespaces, and remove them."""
+        for machine in self.by_name.values():
+            remove(machine.namespace)
+            if machine.sshd is not None:
+                machine.sshd.wait()
+        remove(self._prefix + "switch")
+
+    def serve_ssh(self, name: str, **environment: str) -> None:
+        """Start a real sshd on a machine; `environment` is what those who log in there have."""
+        folder = self.folder / f"ssh-{name}"
+        folder.mkdir()
+        for key in (folder / "host_key", self.key):
+            if not key.exists():
+                run("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key)
+        Path("/run/sshd").mkdir(exist_ok=True)
+        machine = self.by_name[name]
+        lines = [
+            f"ListenAddress {machine.address}",
+            f"HostKey {folder / 'host_key'}",
+            f"AuthorizedKeysFile {self.key}.pub",
+            "PidFile none",
+            "UsePAM no",
+            "StrictModes no",
+            "PermitRootLogin prohibit-password",
+            "PasswordAuthentication no",
+            *([f"SetEnv {' '.join(f'{key}={value}' for key, value in environment.items())}"] if environment else []),
+        ]
+        (folder / "sshd_config").write_text("\n".join(lines) + "\n")
+        with (folder / "log").open("wb") as log:
+            command = machine.inside(SSHD, "-D", "-e", "-f", folder / "sshd_config")
+            machine.sshd = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        kind, key_text, *_ = (folder / "host_key.pub").read_text().split()
+        with (self.folder / "known_hosts").open("a") as known:
+            known.write(f"{machine.address} {kind} {key_text}\n")
+        deadline_s = time.monotonic() + 60.0
+        while b"Server listening" not in (folder / "log").read_bytes():
+            assert machine.sshd.poll() is None and time.monotonic() < deadline_s, (folder / "log").read_text()
+            time.sleep(0.02)
+
+    @property
+    def key(self) -> Path:
+        """The key that opens every machine."""
+        return self.folder / "key"
+
+    @property
+    def ssh_config(self) -> Path:
+        """A configuration of ssh as a user has it: with the key, and the machines' host keys."""
+        path = self.folder / "ssh_config"
+        path.write_text(
+            f"Host *\n  IdentityFile {self.key}\n  IdentitiesOnly yes\n  UserKnownHostsFile {self.folder}/known_hosts\n"
+            "  GlobalKnownHostsFile /dev/null\n"
+        )
+        return path
+
+
+def remove(namespace: str) -> None:
+    """Kill what runs in a namespace, and remove it."""
+    with suppress(AssertionError):
+        for pid in run("ip", "netns", "pids", namespace).split():
+            with suppress(ProcessLookupError):
+                os.kill(int(pid), signal.SIGKILL)
+        run("ip", "netns", "del", namespace)
+
+
+def remove_leftovers() -> None:
+    """Remove the namespaces of test processes that are no more."""
+    for line in run("ip", "netns", "list").splitlines():
+        namespace = line.split()[0] if line.strip() else ""
+        owner = namespace.removeprefix(PREFIX).partition("-")[0]
+        if namespace.startswith(PREFIX) and owner.isdigit() and not Path(f"/proc/{owner}").exists():
+            remove(namespace)
