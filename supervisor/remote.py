@@ -24,6 +24,8 @@ NOT_RUNNABLE: Final = 126
 OTHER_VERSION: Final = 125
 """What a guard ends with that is of another version than the launcher."""
 BY_SIGNAL: Final = 128
+OWN_BUS: Final = "export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-/run/user/$(id -u)}"
+"""Where a user's own systemd is found; a login by ssh does not always say."""
 CAPTURE: Final = "capture.mcap"
 """What a vHub on another machine calls its capture, in the run's folder there."""
 
@@ -74,8 +76,8 @@ class Remote:
 
     def unit_started(self, name: str) -> list[str]:
         """Return the command line that starts a node's unit: the system's for root, else the user's own."""
-        script = f'[ "$(id -u)" = 0 ] && user= || user=--user; exec systemctl $user --no-block start {unit_name(name)}'
-        return self.ssh(["sh", "-c", script])
+        script = f'if [ "$(id -u)" = 0 ]; then user=; else user=--user; {OWN_BUS}; fi'
+        return self.ssh(["sh", "-c", f"{script}; exec systemctl $user --no-block start {unit_name(name)}"])
 
     def why(self, code: int, lines: Sequence[str]) -> str:
         """Return why ssh, or what it ran, ended with this code, for people; `lines` are the last ones of its log."""

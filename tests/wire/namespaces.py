@@ -9,15 +9,16 @@ leave for a station that does not exist) loses one direction without telling any
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Final, Self
 
-SSHD: Final = "/usr/sbin/sshd"
+from tests.wire import sshd
+from tests.wire.sshd import Sshd, run
+
+TOOLS: Final = ("ip", "tc")
 PREFIX: Final = "fs"
 NOBODY: Final = "02:00:00:00:ff:ff"
 """The address of no station."""
@@ -27,21 +28,13 @@ def missing() -> str:
     """Return what is missing for machines in miniature, or an empty text."""
     if os.geteuid() != 0:
         return "network namespaces need root"
-    absent = [tool for tool in ("ip", "tc", "ssh", "ssh-keygen", SSHD) if shutil.which(tool) is None]
-    if absent:
-        return f"not installed: {', '.join(absent)} (sh tools/system_packages.sh)"
+    if sshd.missing(*TOOLS):
+        return sshd.missing(*TOOLS)
     made = subprocess.run(["ip", "netns", "add", f"{PREFIX}{os.getpid()}-try"], capture_output=True, check=False)
     if made.returncode != 0:
         return "network namespaces cannot be made here"
     run("ip", "netns", "del", f"{PREFIX}{os.getpid()}-try")
     return ""
-
-
-def run(*command: str | Path) -> str:
-    """Output of a command that must succeed."""
-    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
-    return done.stdout
 
 
 class Machine:
@@ -53,7 +46,6 @@ class Machine:
         self.address = address
         self._switch = switch
         self._port = f"p-{name}"
-        self.sshd: subprocess.Popen[bytes] | None = None
 
     def inside(self, *command: str | Path) -> list[str]:
         """Return a command line that runs in this machine's network."""
@@ -98,6 +90,7 @@ class Machines:
 
     def __init__(self, folder: Path, *names: str) -> None:
         self.folder = folder
+        self.sshs: dict[str, Sshd] = {}
         self._prefix = f"{PREFIX}{os.getpid()}-"
         self.by_name = {
             name: Machine(name, self._prefix + name, self._prefix + "switch", f"10.77.0.{number}")
@@ -129,56 +122,19 @@ class Machines:
         """End every process in the namespaces, and remove them."""
         for machine in self.by_name.values():
             remove(machine.namespace)
-            if machine.sshd is not None:
-                machine.sshd.wait()
+        for server in self.sshs.values():
+            server.stop()
         remove(self._prefix + "switch")
 
     def serve_ssh(self, name: str, **environment: str) -> None:
         """Start a real sshd on a machine; `environment` is what those who log in there have."""
-        folder = self.folder / f"ssh-{name}"
-        folder.mkdir()
-        for key in (folder / "host_key", self.key):
-            if not key.exists():
-                run("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key)
-        Path("/run/sshd").mkdir(exist_ok=True)
         machine = self.by_name[name]
-        lines = [
-            f"ListenAddress {machine.address}",
-            f"HostKey {folder / 'host_key'}",
-            f"AuthorizedKeysFile {self.key}.pub",
-            "PidFile none",
-            "UsePAM no",
-            "StrictModes no",
-            "PermitRootLogin prohibit-password",
-            "PasswordAuthentication no",
-            *([f"SetEnv {' '.join(f'{key}={value}' for key, value in environment.items())}"] if environment else []),
-        ]
-        (folder / "sshd_config").write_text("\n".join(lines) + "\n")
-        with (folder / "log").open("wb") as log:
-            command = machine.inside(SSHD, "-D", "-e", "-f", folder / "sshd_config")
-            machine.sshd = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
-        kind, key_text, *_ = (folder / "host_key.pub").read_text().split()
-        with (self.folder / "known_hosts").open("a") as known:
-            known.write(f"{machine.address} {kind} {key_text}\n")
-        deadline_s = time.monotonic() + 60.0
-        while b"Server listening" not in (folder / "log").read_bytes():
-            assert machine.sshd.poll() is None and time.monotonic() < deadline_s, (folder / "log").read_text()
-            time.sleep(0.02)
-
-    @property
-    def key(self) -> Path:
-        """The key that opens every machine."""
-        return self.folder / "key"
+        self.sshs[name] = Sshd(self.folder, machine.address, 22, machine.inside(), **environment)
 
     @property
     def ssh_config(self) -> Path:
-        """A configuration of ssh as a user has it: with the key, and the machines' host keys."""
-        path = self.folder / "ssh_config"
-        path.write_text(
-            f"Host *\n  IdentityFile {self.key}\n  IdentitiesOnly yes\n  UserKnownHostsFile {self.folder}/known_hosts\n"
-            "  GlobalKnownHostsFile /dev/null\n"
-        )
-        return path
+        """A configuration of ssh that reaches every machine."""
+        return self.folder / "ssh_config"
 
 
 def remove(namespace: str) -> None:

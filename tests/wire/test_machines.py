@@ -18,7 +18,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.vhub.capture_reader import open_capture
 from tests.wire import namespaces
 from tests.wire.conftest import LONG
-from tests.wire.namespaces import Machine, Machines
+from tests.wire.namespaces import Machines
 from tests.wire.test_run import last_json
 
 if TYPE_CHECKING:
