@@ -16,8 +16,8 @@ from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
 from foosim.protocol import limits, names, units
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.errors import BadValue
-from foosim.protocol.hosts import Host, Listen, Placed
-from foosim.protocol.names import LineName, Name, Team
+from foosim.protocol.hosts import Host, Listen, Name, Placed
+from foosim.protocol.names import LineName, Team
 from foosim.protocol.references import LINK_RULES_MAX, SELECTORS_MAX
 from foosim.protocol.table import Part, Table
 from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import AfterValidator, Field, StringConstraints
 
+from foosim.protocol import limits, names
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.errors import BadValue
-from foosim.protocol.names import Name
 from foosim.protocol.table import Part
 from foosim.protocol.units import custom_error
 
@@ -27,6 +27,7 @@ FOLDER_PATTERN: Final = r"^/[^\x00-\x1f\x7f]*$"
 OPTION_PATTERN: Final = r"^[^\x00-\x1f\x7f]+$"
 SSH_OPTIONS_MAX: Final = 32
 
+Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 Folder = Annotated[str, StringConstraints(pattern=FOLDER_PATTERN, max_length=400)]
 SshOption = Annotated[str, StringConstraints(pattern=OPTION_PATTERN, max_length=400)]
 

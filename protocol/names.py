@@ -7,9 +7,7 @@ import difflib
 import re
 from collections.abc import Iterable
 from itertools import takewhile
-from typing import Annotated, Final, Literal
-
-from pydantic import StringConstraints
+from typing import Final, Literal
 
 from foosim.protocol.limits import NAME_LENGTH_MAX
 
@@ -23,9 +21,6 @@ NAME_RULE: Final = (
 ROBOT_NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*(\.[a-z0-9_-]+)*$"
 SELECTOR_PATTERN: Final = r"^[a-z0-9_.*?-]+$"
 CLASS_PATTERN: Final = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$"
-
-Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=NAME_LENGTH_MAX)]
-"""The name of a node, player, client, host, channel, world or link rule, as a field of the deployment."""
 
 LineName = Literal["goal", "defence", "midfield", "attack"]
 LINE_NAMES: Final[tuple[LineName, ...]] = ("goal", "defence", "midfield", "attack")

@@ -28,8 +28,7 @@ import typer
 from foosim.protocol.command import DONE, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue, Failed
 from foosim.protocol.names import NAME_RULE, is_name
-from foosim.supervisor.launcher import GRACE_S, child_environment, script
-from foosim.supervisor.remote import BY_SIGNAL, GUARD, OTHER_VERSION
+from foosim.supervisor.children import BY_SIGNAL, GRACE_S, GUARD, OTHER_VERSION, child_environment, script
 
 BLOCK_BYTES: Final = 1 << 20
 TAKE_OVER_S: Final = 10.0

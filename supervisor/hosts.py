@@ -15,7 +15,8 @@ from typing import IO, Final
 from foosim.protocol.addresses import Address, parse_address
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Failed, Refused
-from foosim.supervisor.remote import CAPTURE, GUARD, Remote
+from foosim.supervisor.children import GUARD
+from foosim.supervisor.remote import CAPTURE, Remote
 
 BLOCK_BYTES: Final = 1 << 20
 SIZE_LINE_MAX: Final = 32
@@ -58,8 +59,8 @@ def fetch_capture(remote: Remote, run: str, path: Path) -> None:
         part.unlink(missing_ok=True)
         code = process.returncode
         why = "; ".join(lines[-1:]) if code == 1 else remote.why(code, lines) if code else problem
-        where = f"~/.local/state/foosim/hosts/{run}/{CAPTURE}"
-        raise Failed(f"the capture stays on host {remote.name}, in {where}: {why or problem}")
+        where = f"host {remote.name}, in foosim's state folder as hosts/{run}/{CAPTURE}"
+        raise Failed(f"the capture stays on {where}: {why or problem}")
     part.replace(path)
     forget = remote.ssh([remote.path(GUARD), "forget", run])
     try:

@@ -11,10 +11,8 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import signal
 import subprocess
-import sysconfig
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,11 +20,9 @@ from pathlib import Path
 from typing import Final
 
 from foosim.protocol.errors import Failed
-from foosim.protocol.process import PARENT_VARIABLE
+from foosim.supervisor.children import GRACE_S, child_environment, script
 from foosim.supervisor.remote import Remote
 
-GRACE_S: Final = 5.0
-"""How long a child has after SIGTERM before it is killed."""
 POLL_S: Final = 0.02
 LINES: Final = 30
 """How much of a log's end tells why ssh ended."""
@@ -82,22 +78,6 @@ class Child:
         except OSError:
             return []
         return [line for line in lines if line.strip()][-count:]
-
-
-def script(name: str) -> str:
-    """Return the path of one of foosim's commands: beside this Python, else on PATH."""
-    beside = Path(sysconfig.get_path("scripts")) / name
-    return str(beside) if beside.is_file() else shutil.which(name) or name
-
-
-def child_environment(pipe: int) -> dict[str, str]:
-    """Return the environment of a child of this process that is to die with it; `pipe` ends when this process does."""
-    return {
-        **os.environ,
-        PARENT_VARIABLE: f"{os.getpid()}:{pipe}",
-        "OPENBLAS_NUM_THREADS": "1",  # nothing here uses BLAS; its threads only take memory
-        "PYTHONUNBUFFERED": "1",
-    }
 
 
 class Launcher:

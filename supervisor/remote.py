@@ -11,19 +11,15 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from pathlib import PurePosixPath
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.hosts import Host, places
+from foosim.supervisor.children import BY_SIGNAL, GUARD, OTHER_VERSION
 
-GUARD: Final = "foosim-guard"
 SSH_FAILED: Final = 255
 NOT_FOUND: Final = 127
 NOT_RUNNABLE: Final = 126
-OTHER_VERSION: Final = 125
-"""What a guard ends with that is of another version than the launcher."""
-BY_SIGNAL: Final = 128
 OWN_BUS: Final = "export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-/run/user/$(id -u)}"
 """Where a user's own systemd is found; a login by ssh does not always say."""
 CAPTURE: Final = "capture.mcap"
@@ -67,7 +63,7 @@ class Remote:
 
     def path(self, command: str) -> str:
         """Return one of foosim's commands as it is called there."""
-        return command if self.host.commands is None else str(PurePosixPath(self.host.commands) / command)
+        return command if self.host.commands is None else f"{self.host.commands.rstrip('/')}/{command}"
 
     def guarded(self, run: str, name: str, command: Sequence[str]) -> list[str]:
         """Return the command line that starts a process of a run there, and ends it when the connection ends."""
@@ -100,7 +96,7 @@ class Remote:
         if self.is_away(code, lines):
             said_last = next(line for line in reversed(lines) if any(said in line for said in _AWAY))
             return f"{where} cannot be reached: {said_last.strip()}"
-        return f"{where}: the connection ended"
+        return f"{where}: the connection ended, or the guard there was killed"
 
     @staticmethod
     def is_away(code: int, lines: Sequence[str]) -> bool:

@@ -57,6 +57,7 @@ SHELLS = {
     "rehearsal/rehearse_command.py",
     "rehearsal/replay_command.py",
     "rehearsal/verify.py",
+    "supervisor/children.py",
     "supervisor/cli.py",
     "supervisor/control.py",
     "supervisor/display.py",
