@@ -126,7 +126,7 @@ def test_machines_that_are_cut_off_come_back_to_the_same_world(cluster: Cluster)
     up = cluster.up(*cluster.deployed())
     cluster.house.live()
     cluster.house.info()
-    cluster.house.wait_for("the first ticks", lambda: cluster.ask("status")["ticks"] > 10)
+    cluster.house.wait_for("the ball in play", lambda: cluster.ask("status")["ticks"] > 150)
     status = cluster.ask("status")
     hosts = {name: process["host"] for name, process in status["processes"].items()}
     assert hosts == {"red": "right", "blue": "left", "vhub": "hub", "supervisor": ""}
