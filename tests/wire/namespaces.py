@@ -60,6 +60,14 @@ class Machine:
         run("ip", "-n", self.namespace, "addr", "add", f"{self.address}/24", "dev", "eth0")
         run("ip", "-n", self.namespace, "link", "set", "eth0", "up")
 
+    def processes(self) -> list[str]:
+        """Return the command lines of the processes on this machine."""
+        found = []
+        for pid in run("ip", "netns", "pids", self.namespace).split():
+            with suppress(OSError):
+                found.append(Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode())
+        return found
+
     def link(self, state: str) -> None:
         """Pull the cable out at the switch (`down`), or put it in again (`up`)."""
         run("ip", "-n", self._switch, "link", "set", self._port, state)

@@ -130,6 +130,8 @@ def test_machines_that_are_cut_off_come_back_to_the_same_world(cluster: Cluster)
     status = cluster.ask("status")
     hosts = {name: process["host"] for name, process in status["processes"].items()}
     assert hosts == {"red": "right", "blue": "left", "vhub": "hub", "supervisor": ""}
+    for machine, mark in ((cluster.right, "--name red"), (cluster.left, "--name blue"), (cluster.hub, "foosim-vhub")):
+        assert any(mark in line for line in machine.processes()), "it runs where it is said to"
     sup, left, right = cluster.sup, cluster.left, cluster.right
     left.limit("4mbit")
 
