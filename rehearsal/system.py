@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from heapq import heappop, heappush
 from typing import Any, Final
 
 from foosim.client.core import ClientCore
@@ -26,6 +27,7 @@ from foosim.protocol.messages import Answer, Epoch, Request
 from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.records import fold
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
@@ -66,6 +68,8 @@ class Settings:
     supervisor: type[SupervisorCore] = SupervisorCore
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
+    keeps_journals: bool = False
+    """Whether the supervisor's journal is kept, so that it can be started again."""
     restart_ns: int = 0
     """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
     observer: Observer | None = None
@@ -89,15 +93,21 @@ class System:
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
+        self._timers: list[tuple[int, int, Callable[[], object]]] = []
+        self._frames: list[Frame] = []
+        """Committed in the present turn of the supervisor."""
+        self._dying: dict[str, int] = {}
+        """Processes that end amid their next actions: how many of these they still perform."""
         self._boots = 0
+        self._run = settings
+        self._journal: list[bytes] = []
+        """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
-        self.supervisor.on_commit = self._committed
         self.hub = rehearsal.hub("boot", fingerprint, 0)
         deployment = self.supervisor.deployment
-        self._enter(channels.SUPERVISOR, self.supervisor, self.supervisor.advance, channels.SUPERVISOR_READS)
+        self._enter_supervisor()
         self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
-        self.processes[channels.SUPERVISOR].took = self.supervisor.watch.took
         self.processes[channels.VHUB].took = self.hub.waits.took
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
@@ -114,6 +124,12 @@ class System:
     ) -> None:
         self.bus.subscribe(name, reads)
         self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
+
+    def _enter_supervisor(self) -> None:
+        core = self.supervisor
+        core.on_commit = self._frames.append
+        self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
+        self.processes[channels.SUPERVISOR].took = core.watch.took
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -145,6 +161,9 @@ class System:
                 self._deliver()
                 continue
             deadline_ns = self._deadline_ns()
+            if self._timers and self._timers[0][0] <= min(deadline_ns, arrival_ns or deadline_ns):
+                self._go_off()
+                continue
             if arrival_ns is not None and arrival_ns <= deadline_ns:
                 bus.now_ns = arrival_ns
                 self._deliver()
@@ -212,6 +231,10 @@ class System:
         actions = process.core.actions
         if not actions:
             return
+        left = self._dying.pop(process.name, None)
+        if left is not None:
+            del actions[left:]
+            self.processes.pop(process.name)
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
@@ -224,6 +247,8 @@ class System:
             else:
                 self._keep(leaves_ns, process, action)
         actions.clear()
+        if process.core is self.supervisor and self._frames:
+            self._tell_commits(was_cut=left is not None)
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             farewell = self.hub.farewell()
             self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
@@ -234,6 +259,8 @@ class System:
         settings = self.settings
         if isinstance(action, Journal):
             self._trace(now_ns, process, "journal", "", action.record)
+            if settings.keeps_journals and process.core is self.supervisor:
+                self._journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
         elif isinstance(action, Keep):
@@ -249,11 +276,17 @@ class System:
         if self.settings.observer is not None:
             self.settings.observer(Traced(now_ns, process.name, what, channel, payload))
 
-    def _committed(self, frame: Frame) -> None:
-        self._last_commit_ns = self.bus.now_ns
-        if self.settings.on_commit is not None:
-            self.settings.on_commit(frame)
-        self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
+    def _tell_commits(self, was_cut: bool) -> None:
+        """Tell of the frames that were committed; what a supervisor that ended had not written never was."""
+        frames = self._frames.copy()
+        self._frames.clear()
+        written = fold(self.supervisor.deployment, self._journal).frame.tick if was_cut else frames[-1].tick
+        for frame in frames:
+            if frame.tick <= written:
+                self._last_commit_ns = self.bus.now_ns
+                if self.settings.on_commit is not None:
+                    self.settings.on_commit(frame)
+                self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
 
     def _where(self) -> str:
         nodes = {name: process.core.waiting_for for name, process in self.processes.items() if name in self.solvers}
@@ -265,19 +298,50 @@ class System:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
 
+    def later(self, after_ns: int, action: Callable[[], object]) -> None:
+        """Call `action` when some virtual time has passed."""
+        self._boots += 1
+        heappush(self._timers, (self.bus.now_ns + after_ns, self._boots, action))
+
+    def _go_off(self) -> None:
+        due_ns, _, action = heappop(self._timers)
+        self.bus.now_ns = max(self.bus.now_ns, due_ns)
+        self._next.append(action)
+
     def kill(self, name: str) -> None:
-        """End a node's process at once: what is on its way to it is lost, the supervisor sees the connection close."""
+        """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
         self.processes.pop(name)
+        if name == channels.SUPERVISOR:
+            return
         self.solvers.pop(name).close()
-        supervisor = self.processes[channels.SUPERVISOR]
+        supervisor = self.processes.get(channels.SUPERVISOR)
+        if supervisor is None:
+            return
         self.supervisor.process_gone(name, self.bus.now_ns)
         supervisor.turn(self.bus.now_ns)
         self._perform(supervisor)
 
+    def end_amid(self, name: str, actions: int) -> None:
+        """End the supervisor amid its next turn, when it has performed so many of its actions."""
+        self._dying[name] = actions
+
+    def is_dying(self, name: str) -> bool:
+        """Whether a process ends amid its next turn."""
+        return name in self._dying
+
     def start(self, name: str) -> None:
-        """Start a node's process again, with a new boot."""
+        """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""
         assert name not in self.processes, f"{name} is running"
-        self._enter_node(name, library_fingerprint())
+        if name == channels.SUPERVISOR:
+            self._boots += 1
+            history = fold(self.supervisor.deployment, self._journal)
+            boot = f"boot-{self._boots}"
+            self.supervisor = self.settings.supervisor(
+                self._run, library_fingerprint(), self.bus.now_ns, boot, history=history
+            )
+            self._enter_supervisor()
+        else:
+            self._enter_node(name, library_fingerprint())
         self._wake(self.processes[name])
 
     def _start_again(self, name: str, refused: Solver) -> None:

@@ -35,7 +35,8 @@ def decided_by(around: list[ast.AST], reading: ast.Call) -> list[str]:
     for node in around:
         tested = [node.test] if isinstance(node, ast.If | ast.While | ast.IfExp) else [node]
         makes_path = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div)
-        if isinstance(node, DECIDING) and not makes_path and any(reading is one for part in tested for one in ast.walk(part)):
+        has_it = any(reading is one for part in tested for one in ast.walk(part))
+        if isinstance(node, DECIDING) and has_it and not makes_path:
             guilty.append(type(node).__name__)
     return guilty
 
