@@ -25,6 +25,7 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Epoch, Request
 from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
+from foosim.rehearsal.hub_journal import Ending, HubJournal
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
@@ -35,6 +36,10 @@ from foosim.vhub.records import Closing
 OPERATOR: Final = "operator"
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
+
+
+HUB_BACK_NS: Final = 300_000_000
+"""After how long a vHub that ended is there again, as a launcher starts it."""
 
 
 class Stuck(AssertionError):
@@ -104,11 +109,11 @@ class System:
         """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
-        self.hub = rehearsal.hub("boot", fingerprint, 0)
         deployment = self.supervisor.deployment
         self._enter_supervisor()
-        self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
-        self.processes[channels.VHUB].took = self.hub.waits.took
+        self.hub_journal = HubJournal()
+        self.hub: HubCore
+        self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
         for name, player in sorted(deployment.players.items()):
@@ -118,6 +123,7 @@ class System:
             self._enter(name, core, loop.step, channels.CLIENT_READS)
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
         self._last_commit_ns = 0
+        self._hub_back_ns = HUB_BACK_NS
 
     def _enter(
         self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
@@ -130,6 +136,20 @@ class System:
         core.on_commit = self._frames.append
         self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
         self.processes[channels.SUPERVISOR].took = core.watch.took
+
+    def _enter_hub(self, fingerprint: bytes) -> None:
+        """Let a vHub in, which goes on from the journal of the one before."""
+        self._boots += 1
+        hub = self.hub = self.settings.hub(f"boot-{self._boots}", fingerprint, self.bus.now_ns)
+
+        def turn(now_ns: int) -> None:
+            build = hub.member.build
+            if build is not None and hub.state is None:
+                hub.begin(self.hub_journal.past(hub, build.run), now_ns)
+            hub.advance(now_ns)
+
+        self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
+        self.processes[channels.VHUB].took = hub.waits.took
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -210,6 +230,10 @@ class System:
         process.turn(self.bus.now_ns)
         self._perform(process)
 
+    def _turn(self, process: Process) -> None:
+        process.turn(self.bus.now_ns)
+        self._perform(process)
+
     def _core_deadline_ns(self, process: Process) -> int:
         core = process.core
         deadline: int = core.deadline_ns(self.bus.now_ns) if core is self.supervisor else core.deadline_ns()
@@ -241,6 +265,11 @@ class System:
             process.busy_until_ns = leaves_ns
             process.took(self.bus.now_ns, leaves_ns)
         for action in actions:
+            if self.hub_journal.ending and type(action) is Journal and process.core is self.hub:
+                if self.hub_journal.ending == "unsaid":
+                    self._keep(leaves_ns, process, action)
+                self._end_hub()
+                return
             if type(action) is Publish:
                 self._trace(leaves_ns, process, "publish", action.channel.name, action.payload)
                 self.bus.put(process.name, action.channel, action.name, action.payload, leaves_ns)
@@ -259,14 +288,18 @@ class System:
         settings = self.settings
         if isinstance(action, Journal):
             self._trace(now_ns, process, "journal", "", action.record)
-            if settings.keeps_journals and process.core is self.supervisor:
+            if process.core is self.hub:
+                self.hub_journal.append(action.record)
+            elif settings.keeps_journals:
                 self._journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
         elif isinstance(action, Keep):
+            self.hub_journal.captured_tick = action.closing.frame.tick
             if settings.on_closing is not None:
                 settings.on_closing(action.closing)
         elif isinstance(action, KeepEpoch):
+            self.hub_journal.captured_epoch = action.epoch.epoch
             if settings.on_epoch is not None:
                 settings.on_epoch(action.epoch)
         elif isinstance(action, Say) and settings.on_say is not None:
@@ -314,12 +347,10 @@ class System:
         if name == channels.SUPERVISOR:
             return
         self.solvers.pop(name).close()
-        supervisor = self.processes.get(channels.SUPERVISOR)
-        if supervisor is None:
+        if channels.SUPERVISOR not in self.processes:
             return
         self.supervisor.process_gone(name, self.bus.now_ns)
-        supervisor.turn(self.bus.now_ns)
-        self._perform(supervisor)
+        self._turn(self.processes[channels.SUPERVISOR])
 
     def end_amid(self, name: str, actions: int) -> None:
         """End the supervisor amid its next turn, when it has performed so many of its actions."""
@@ -352,6 +383,41 @@ class System:
         self.solvers.pop(name).close()
         self._enter_node(name, library_fingerprint())
         self.pause(name, self.settings.restart_ns)
+
+    def kill_hub(self, ending: Ending = "now", back_ns: int = HUB_BACK_NS) -> None:
+        """End the vHub's process, at once or at its next record; another one is started after a while."""
+        if channels.VHUB not in self.processes or self.hub_journal.ending or self.hub.ended is not None:
+            return
+        self._hub_back_ns = back_ns
+        if ending == "now":
+            self._end_hub()
+        else:
+            self.hub_journal.ending = ending
+
+    def _end_hub(self) -> None:
+        """What the vHub had not done yet is not done; the others see its connections close."""
+        self.hub_journal.ending = None
+        self.processes.pop(channels.VHUB)
+        self.hub.actions.clear()
+        self.after(self._hub_back_ns, self._start_hub)
+        now_ns = self.bus.now_ns
+        self.supervisor.process_gone(channels.VHUB, now_ns)
+        for loop in self.players.values():
+            loop.core.hub_gone(now_ns)
+        for name in (channels.SUPERVISOR, *self.players):
+            self._turn(self.processes[name])
+
+    def _start_hub(self) -> None:
+        self._enter_hub(library_fingerprint())
+        self._wake(self.processes[channels.VHUB])
+        for name, loop in self.players.items():
+            loop.core.hub_here(self.bus.now_ns)
+            self._wake(self.processes[name])
+
+    def after(self, for_ns: int, action: Callable[[], object]) -> None:
+        """Call `action` after some virtual time."""
+        self._boots += 1
+        heappush(self._timers, (self.bus.now_ns + for_ns, self._boots, action))
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""

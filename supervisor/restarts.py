@@ -29,9 +29,10 @@ class Restarts:
     def __init__(self) -> None:
         self._by_name: dict[str, _Restarts] = {}
 
-    def ended(self, name: str, now_s: float, is_away: bool = False) -> float | None:
+    def ended(self, name: str, now_s: float, at_once: bool = False, is_away: bool = False) -> float | None:
         """A process has ended: return after how many seconds it is started again, None when it is given up.
 
+        `at_once`: the run stands still without it, so the first two times it is not waited at all.
         `is_away`: because its machine could not be reached, which says nothing against the process.
         """
         known = self._by_name.setdefault(name, _Restarts())
@@ -43,7 +44,8 @@ class Restarts:
         if len(known.ended_s) >= len(WAITS_S):
             known.failed = True
             return None
-        wait_s = WAITS_S[len(known.ended_s)]
+        waits_s = (0.0, 0.0, *WAITS_S[:-2]) if at_once else WAITS_S
+        wait_s = waits_s[len(known.ended_s)]
         known.ended_s.append(now_s)
         known.due_s = now_s + wait_s
         return wait_s
