@@ -60,12 +60,12 @@ class Machine:
         run("ip", "-n", self.namespace, "addr", "add", f"{self.address}/24", "dev", "eth0")
         run("ip", "-n", self.namespace, "link", "set", "eth0", "up")
 
-    def processes(self) -> list[str]:
-        """Return the command lines of the processes on this machine."""
-        found = []
+    def processes(self) -> dict[int, str]:
+        """Return the processes on this machine, with their command lines."""
+        found = {}
         for pid in run("ip", "netns", "pids", self.namespace).split():
             with suppress(OSError):
-                found.append(Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode())
+                found[int(pid)] = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode()
         return found
 
     def link(self, state: str) -> None:
