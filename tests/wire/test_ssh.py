@@ -21,6 +21,7 @@ from foosim.protocol.hosts import Host
 from foosim.supervisor import remote as remote_module
 from foosim.supervisor.control import Control
 from foosim.supervisor.hosts import fetch_capture
+from foosim.supervisor.install import install
 from foosim.supervisor.launcher import Child, Launcher
 from foosim.supervisor.remote import CAPTURE, Remote
 from tests.wire import sshd
@@ -63,7 +64,8 @@ class There:
         self.bin = folder / "bin"
         self.bin.mkdir()
         self.port = free_port()
-        environment = {"XDG_STATE_HOME": str(self.state), "PATH": f"{self.bin}:/usr/bin:/bin"}
+        self.home = folder / "home"
+        environment = {"XDG_STATE_HOME": str(self.state), "PATH": f"{self.bin}:/usr/bin:/bin", "HOME": str(self.home)}
         self.sshd = Sshd(folder, "127.0.0.1", self.port, **environment)
         self.launchers: list[Launcher] = []
 
@@ -198,6 +200,22 @@ def test_a_run_whose_host_does_not_have_foosim_says_so_and_ends(there: There, ho
     code, out, err = house.end(house.up("--json", "--set", f"hosts={hosts}", "--set", "nodes.blue.host=there"))
     assert code == 1 and "there is no /nowhere/foosim-guard on host there" in last_json(out)["reason"], err
     assert processes_with(str(house.folder / "state")) == {}
+
+
+def test_units_are_written_onto_the_host(there: There) -> None:
+    """As an ordinary user has them, so that this machine's own systemd is not touched."""
+    log = there.folder / "systemctl.log"
+    systemctl = there.bin / "systemctl"
+    systemctl.write_text(f'#!/bin/sh\necho "$@" >>{log}\n')
+    systemctl.chmod(0o755)
+    units = {"foosim-red.service": "[Service]\nExecStart=a '$b' \"c\" \\d %%e\n"}
+    (path,) = install(there.remote(), units, is_users=True)
+    assert path == f"{there.home}/.config/systemd/user/foosim-red.service"
+    assert Path(path).read_text() == units["foosim-red.service"]
+    assert log.read_text() == "--user daemon-reload\n"
+    systemctl.write_text("#!/bin/sh\necho there is no bus >&2\nexit 1\n")
+    with pytest.raises(Failed, match="host there: there is no bus"):
+        install(there.remote(), units, is_users=True)
 
 
 SYSTEMCTL: Final = """#!{python}
