@@ -22,6 +22,7 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
+from foosim.protocol.notify import Notify
 from foosim.protocol.orphan import Orphan
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
@@ -42,6 +43,7 @@ class NodeProcess:
         self._is_present = False
         self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
         self._loop.connect(self._wire)
+        self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive

@@ -14,7 +14,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
 
 from foosim.protocol import limits, names, units
+from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.errors import BadValue
+from foosim.protocol.hosts import Host, Listen, Name, Placed
 from foosim.protocol.names import LineName, Team
 from foosim.protocol.references import LINK_RULES_MAX, SELECTORS_MAX
 from foosim.protocol.table import Part, Table
@@ -26,7 +28,6 @@ __all__ = [
     "deployment_schema_text", "parse_pace", "period_ticks",
 ]  # fmt: skip
 
-Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 Selector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
 ClassPath = Annotated[str, StringConstraints(pattern=names.CLASS_PATTERN, max_length=200)]
@@ -84,15 +85,15 @@ class CameraRobot(Part):
 Robot = Annotated[RodRobot | CameraRobot, Field(discriminator="model")]
 
 
-class NodeSpec(Part):
-    """A process that computes: the robots that it owns at the start, who starts it, whether the run needs it."""
+class NodeSpec(Placed):
+    """A process that computes: where, who starts it, whether the run needs it, the robots that it owns at the start."""
 
-    launch: Literal["local", "manual"] = "local"
+    launch: Literal["local", "manual", "systemd"] = "local"
     required: bool = False
     robots: list[RobotName] = Field(max_length=limits.ENTITIES_MAX)
 
 
-class Player(Part):
+class Player(Placed):
     """A controller that `up` starts: a class with `act(tick, samples) -> commands`."""
 
     class_: ClassPath = Field(alias="class")
@@ -100,6 +101,10 @@ class Player(Part):
     lockstep: bool = True
     robots: dict[RobotName, list[Name]] = Field(max_length=limits.ENTITIES_MAX)
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
+
+
+class VHubSpec(Placed):
+    """The process that judges every packet and writes the capture: where it runs."""
 
 
 class ClientSpec(Part):
@@ -204,7 +209,10 @@ class Deployment(Part):
     on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
     table: Table
     robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
+    listen: Listen = LOOPBACK
+    hosts: dict[Name, Host] = Field(default={}, max_length=limits.NODES_MAX)
     nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)
+    vhub: VHubSpec = Field(default_factory=VHubSpec)
     players: dict[Name, Player] = Field(default={}, max_length=limits.CLIENTS_MAX)
     clients: dict[Name, ClientSpec] = Field(default={}, max_length=limits.CLIENTS_MAX)
     network: Network = Field(default_factory=Network)

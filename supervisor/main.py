@@ -21,6 +21,7 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, journal_files, read_newest, remove_journal
 from foosim.protocol.loop import Loop, Wire
+from foosim.protocol.notify import Notify
 from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.supervisor.core import SupervisorCore
@@ -58,6 +59,7 @@ class SupervisorProcess:
         self._loop.connect(wire)
         self._journal = self._loop.journal = journal
         self._turned_tick = 0
+        self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.took = self.core.watch.took
         self._loop.lacking = lambda: self.core.lacking

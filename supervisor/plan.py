@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from foosim.protocol.addresses import LOOPBACK, Address, check_listen
+from foosim.protocol.addresses import Address, check_listen
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
@@ -26,7 +26,8 @@ class RunOptions:
     duration: str | None = None
     seed: int | None = None
     sets: tuple[str, ...] = ()
-    listen: str = LOOPBACK
+    listen: str | None = None
+    """Where to listen; None is where the deployment says."""
     insecure: bool = False
 
     @property
@@ -35,7 +36,8 @@ class RunOptions:
 
     def arguments(self) -> list[str]:
         """Return the options as arguments of `foosim-supervisor run`."""
-        given = [str(self.file), "--listen", self.listen]
+        given = [str(self.file)]
+        given += ["--listen", self.listen] if self.listen is not None else []
         given += ["--insecure"] if self.insecure else []
         given += ["--pace", self.pace] if self.pace is not None else []
         given += ["--for", self.duration] if self.duration is not None else []
@@ -88,7 +90,8 @@ def make_plan(options: RunOptions) -> Plan:
     name = str(options.file)
     text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
     deployment = load_deployment(text, name)
-    address = check_listen(options.listen, options.insecure, ports=2)
+    listen = deployment.listen if options.listen is None else options.listen
+    address = check_listen(listen, options.insecure, ports=2)
     pace = deployment.pace if options.pace is None else parse_pace(options.pace)
     ticks = 0
     if options.duration is not None:

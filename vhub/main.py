@@ -28,6 +28,7 @@ from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, read_journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
+from foosim.protocol.notify import Notify
 from foosim.protocol.orphan import Orphan
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
@@ -71,6 +72,7 @@ class HubProcess:
         self._loop = Loop(self.core, inbox, self._log, lambda now_ns: self.core.deadline_ns())
         self._loop.connect(self._wire)
         self._loop.connect(self._radio)
+        self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.took = self.core.waits.took
         self._loop.lacking = lambda: self.core.lacking
