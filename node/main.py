@@ -7,16 +7,19 @@ has the engines, `protocol.loop` is the loop.
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from foosim.node.core import NodeCore
 from foosim.node.solver import Solver
-from foosim.protocol import channels, limits
+from foosim.protocol import channels, identity, limits
 from foosim.protocol.actions import Say
+from foosim.protocol.admission import Admission
+from foosim.protocol.certificates import Credentials, load_credentials
 from foosim.protocol.channels import SUPERVISOR, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
@@ -24,6 +27,7 @@ from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
+from foosim.protocol.session_settings import Security
 
 CONNECT_S = 60.0
 
@@ -31,13 +35,16 @@ CONNECT_S = 60.0
 class NodeProcess:
     """One node on one session, until the run ends, the supervisor is gone, or `stop`."""
 
-    def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
+    def __init__(
+        self, name: str, session: Session, inbox: Inbox, world: str = "", credentials: Credentials | None = None
+    ) -> None:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
         self.stopped = False
         self._solver = Solver(self.core)
         self._wire = Wire(session, Plane.SIMULATION, inbox, name)
         self._inbox = inbox
         self._is_present = False
+        self._admission = Admission(credentials, SUPERVISOR, session.locator, time.monotonic_ns())
         self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
         self._loop.connect(self._wire)
         self._loop.turn = self._turn
@@ -67,6 +74,7 @@ class NodeProcess:
         """Compute ticks as far as the inputs allow; what a tick says first is said before it is solved."""
         core = self.core
         core.busy = self._loop.busy
+        self._admission.check(now_ns)
         if core.member.build is not None and not self._is_present:
             self._is_present = True
             self._wire.declare_alive()
@@ -84,20 +92,26 @@ class NodeProcess:
         return now_ns if self._solver.is_building else self.core.deadline_ns()
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        self._admission.heard(name, is_alive)
         if not is_alive and name == SUPERVISOR and self.core.ended is None:
             self.core.actions.append(Say("error", "lost the supervisor"))
             self.stop()
 
 
-def run_node(name: str, connect: str, world: str = "") -> int:
-    """Run a node until its run ends; return the exit code. Raises Refused when there is nobody to connect to."""
+def run_node(name: str, connect: str, world: str = "", pki: Path | None = None) -> int:
+    """Run a node until its run ends; return the exit code. Raises Refused when there is nobody to connect to.
+
+    `pki` is the folder with its certificate.
+    """
     if not is_name(name):
         raise BadValue("not a name for a node", name)
+    credentials = load_credentials(pki, identity.node(name))
+    security = None if credentials is None else Security(credentials)
     use_client_runtime()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    with Session.client(connect, CONNECT_S, give_up=stop.is_set) as session:
-        node = NodeProcess(name, session, inbox, world)
+    with Session.client(connect, CONNECT_S, give_up=stop.is_set, security=security) as session:
+        node = NodeProcess(name, session, inbox, world, credentials)
         stop.then(node.stop)
         return node.run()
 
@@ -110,6 +124,7 @@ def node(
     name: Annotated[str, typer.Option(help="Its name, as the deployment declares it.")],
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
     world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    pki: PkiOption = None,
     version: VersionOption = False,
 ) -> None:
     """Take part in a run as a node.
@@ -118,7 +133,7 @@ def node(
     0 when the run ended, with 1 when it lost the supervisor, and with 3 when the supervisor would not have it.
     """
     die_with_parent()
-    raise typer.Exit(run_node(name, connect, world))
+    raise typer.Exit(run_node(name, connect, world, pki))
 
 
 def main() -> None:

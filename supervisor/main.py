@@ -12,15 +12,20 @@ import time
 import msgspec
 
 from foosim.protocol import channels, limits, wall
+from foosim.protocol.access import access_to
 from foosim.protocol.actions import Say
+from foosim.protocol.addresses import parse_address
+from foosim.protocol.certificates import check_host, load_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.command import DONE, FAILED
+from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.process import Stop, die_with_parent, start_log
 from foosim.protocol.session import Session
+from foosim.protocol.session_settings import Security
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.run_folder import RunFolder, RunInfo
@@ -43,7 +48,9 @@ class SupervisorProcess:
             os.getpid(),
             wall.now_text(),
             session.locator,
+            pki="" if plan.options.pki is None else str(plan.options.pki.absolute()),
         )
+        self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
         self._loop = Loop(self.core, inbox, start_log(SUPERVISOR), self.core.deadline_ns)
         self._loop.connect(wire)
@@ -75,6 +82,9 @@ class SupervisorProcess:
 
     def _turn(self, now_ns: int) -> None:
         self.core.busy = self._loop.busy
+        reminder = self._exposure.due(now_ns)
+        if reminder:
+            self.core.say("warning", reminder)
         if self._is_told_to_end:
             self._is_told_to_end = False
             self.core.stop()
@@ -111,7 +121,14 @@ def serve(plan: Plan, folder: RunFolder) -> int:
     folder.hold()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    with Journal(folder.journals, SUPERVISOR) as journal, Session.router(str(plan.address)) as session:
+    credentials = load_credentials(plan.options.pki, SUPERVISOR)
+    access = access_to(Plane.SIMULATION, plan.deployment)
+    security = None if credentials is None else Security(credentials, access)
+    with (
+        Journal(folder.journals, SUPERVISOR) as journal,
+        Session.router(str(plan.address), security=security) as session,
+    ):
+        check_host(credentials, session.locator)
         supervisor = SupervisorProcess(plan, folder, session, inbox, journal)
         stop.then(supervisor.stop)
         code = supervisor.run()

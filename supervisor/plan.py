@@ -8,7 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from foosim.protocol import identity
 from foosim.protocol.addresses import LOOPBACK, Address, check_listen
+from foosim.protocol.certificates import load_credentials, operator_credentials
+from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
@@ -26,6 +29,7 @@ class RunOptions:
     sets: tuple[str, ...] = ()
     listen: str = LOOPBACK
     insecure: bool = False
+    pki: Path | None = None
 
     @property
     def all_sets(self) -> tuple[str, ...]:
@@ -35,12 +39,18 @@ class RunOptions:
         """Return the options as arguments of `foosim-supervisor run`."""
         given = [str(self.file), "--listen", self.listen]
         given += ["--insecure"] if self.insecure else []
+        given += self.pki_arguments()
         given += ["--pace", self.pace] if self.pace is not None else []
         given += ["--for", self.duration] if self.duration is not None else []
         given += ["--seed", str(self.seed)] if self.seed is not None else []
         for setting in self.sets:
             given += ["--set", setting]
         return given
+
+
+    def pki_arguments(self) -> list[str]:
+        """Return where the certificates are, as each process of the run is told it."""
+        return [] if self.pki is None else ["--pki", str(self.pki)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +76,21 @@ class Plan:
     address: Address
 
 
+def check_certificates(plan: Plan) -> None:
+    """Raise CertificateError unless everybody whom `up` starts, and the operator that it is, has a certificate."""
+    pki, deployment = plan.options.pki, plan.deployment
+    nodes = [identity.node(name) for name, node in deployment.nodes.items() if node.launch == "local"]
+    for who in (SUPERVISOR, VHUB, *nodes, *map(identity.client, deployment.players)):
+        load_credentials(pki, who)
+    operator_credentials(pki)
+
+
 def make_plan(options: RunOptions) -> Plan:
     """Check everything that was asked for before anything is started; raises Refused."""
     name = str(options.file)
     text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
     deployment = load_deployment(text, name)
-    address = check_listen(options.listen, options.insecure, ports=2)
+    address = check_listen(options.listen, options.insecure, ports=2, secured=options.pki is not None)
     pace = deployment.pace if options.pace is None else parse_pace(options.pace)
     ticks = 0
     if options.duration is not None:

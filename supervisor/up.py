@@ -17,9 +17,11 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from foosim.protocol import wall
+from foosim.protocol.certificates import operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Refused
+from foosim.protocol.exposure import Exposure
 from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.display import Display, recovery_text
 from foosim.supervisor.launcher import Child, Launcher, command_line
@@ -132,7 +134,7 @@ class Up:
             return False
         self._launch(VHUB, self._vhub_command(info))
         for name, node in sorted(self.plan.deployment.nodes.items()):
-            command = ["foosim-node", "--name", name, "--connect", info.simulation]
+            command = ["foosim-node", "--name", name, "--connect", info.simulation, *options.pki_arguments()]
             if node.launch == "local":
                 self._launch(name, command)
             else:
@@ -141,13 +143,15 @@ class Up:
         if info is None:
             return False
         for name in sorted(self.plan.deployment.players):
-            self._launch(name, ["foosim-player", "--name", name, "--connect", info.radio])
+            command = ["foosim-player", "--name", name, "--connect", info.radio, *options.pki_arguments()]
+            self._launch(name, command)
         return True
 
     def _vhub_command(self, info: RunInfo) -> list[str]:
         options = self.plan.options
         command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(self.plan.address.next_port())]
         command += ["--insecure"] if options.insecure else []
+        command += options.pki_arguments()
         command += ["--run-folder", str(self.folder.path)]
         return [*command, "--no-capture"] if self.capture is None else [*command, "--capture", str(self.capture)]
 
@@ -174,8 +178,12 @@ class Up:
         info = self.folder.info()
         assert info is not None
         next_s = time.monotonic()
-        with Control(info.simulation) as control:
+        exposure = Exposure(self.plan.address, time.monotonic_ns())
+        with Control(info.simulation, operator_credentials(self.plan.options.pki)) as control:
             while self._goes_on():
+                reminder = exposure.due(time.monotonic_ns())
+                if reminder:
+                    self.display.say(reminder)
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self.display.every_s
                     self._show(control)
