@@ -12,7 +12,7 @@ from typing import Final
 from foosim.protocol.certificates import Credentials
 from foosim.protocol.tls_probe import NotAuthorised
 
-ADMISSION_NS: Final = 15_000_000_000
+ADMISSION_NS: Final = 10_000_000_000
 
 
 class Admission:

@@ -114,8 +114,7 @@ def identities_in(folder: Path) -> list[str]:
 
 
 def operator_credentials(folder: Path | None) -> Credentials | None:
-    """Return those of the operator that FOOSIM_OPERATOR names, or of the only one in the folder. As `load_credentials`.
-    """
+    """Return those of the operator that FOOSIM_OPERATOR names, or of the only one there; as `load_credentials`."""
     if folder is None:
         return None
     name = os.environ.get(OPERATOR_VARIABLE)
@@ -186,7 +185,9 @@ def read_key(path: Path) -> serialization.PrivateFormat | object:
     try:
         return serialization.load_pem_private_key(_read(path), None)
     except (ValueError, TypeError) as error:
-        raise CertificateError(f"{path}: not a private key in PEM without a password, {show(str(error), 120)}") from None
+        raise CertificateError(
+            f"{path}: not a private key in PEM, without a password: {show(str(error), 80)}"
+        ) from None
 
 
 def check_certificate(path: Path, found: x509.Certificate, identity: str, ca: x509.Certificate, now: datetime) -> None:

@@ -69,9 +69,7 @@ def _radio(
 
 _SMALL: Final = limits.SMALL_MESSAGE_BYTES_MAX
 
-HELLO: Final = _simulation(
-    "hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL
-)
+HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation(
@@ -91,14 +89,10 @@ HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "s
 TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a change, and an answer", named=False)
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
-REQUEST: Final = _simulation(
-    "request", messages.Request, "operator", "supervisor", "a request", bytes_max=_SMALL
-)
+REQUEST: Final = _simulation("request", messages.Request, "operator", "supervisor", "a request", bytes_max=_SMALL)
 ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named one", "an answer")
 
-CLIENT_HELLO: Final = _radio(
-    "hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL
-)
+CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
 CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
 UP: Final = _radio("up", messages.Join | messages.Up | messages.Done, "client", "vhub", "the client's rate")

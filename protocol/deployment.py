@@ -22,8 +22,8 @@ from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse
 
 __all__ = [
     "AccessSpec", "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "Jitter", "LinkRule",
-    "Network", "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor", "deployment_schema",
-    "deployment_schema_text", "parse_pace", "period_ticks",
+    "Network", "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor",
+    "deployment_schema", "deployment_schema_text", "parse_pace", "period_ticks",
 ]  # fmt: skip
 
 Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]

@@ -29,17 +29,13 @@ def probe(address: Address, credentials: Credentials | None, is_last: bool) -> N
     try:
         with socket.create_connection((address.host.strip("[]"), address.port), PROBE_S) as link:
             _shake(link, address, credentials)
-    except NotAuthorised as refused:
-        if credentials is not None or is_last:
-            raise refused from None
     except OSError:
         return  # nobody there, or not yet; ssl's errors are among these
     else:
         if credentials is not None and is_last:
             raise NotAuthorised(
                 f"{credentials.identity}: not authorised, or not reachable: {address} speaks TLS, and lets nobody in "
-                "by this "
-                + ("user and password" if credentials.password else "certificate")
+                "by this " + ("user and password" if credentials.password else "certificate")
             )
 
 

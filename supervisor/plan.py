@@ -47,7 +47,6 @@ class RunOptions:
             given += ["--set", setting]
         return given
 
-
     def pki_arguments(self) -> list[str]:
         """Return where the certificates are, as each process of the run is told it."""
         return [] if self.pki is None else ["--pki", str(self.pki)]
