@@ -98,6 +98,23 @@ def test_nobody_subscribes_to_more_than_it_hears() -> None:
                     assert not Allowed(control, identity)("ingress", message, zenoh.KeyExpr(wide)), (identity, wide)
 
 
+def test_writers_are_told_that_readers_listen_as_those_declare_it() -> None:
+    made = deployment(["red", "blue"], ["hand"], ["admin"])
+    readers = {
+        "node.red": ["simulation/hello/*", "simulation/part/**", "simulation/samples/**", "simulation/want/*"],
+        "vhub": ["simulation/deliveries/**", "simulation/heartbeat/*", "simulation/want/*"],
+        "operator.admin": ["simulation/request/*"],
+        "client.hand": ["radio/hello/*", "radio/up/*"],
+    }
+    for identity, declared in readers.items():
+        plane = Plane.RADIO if identity.startswith("client.") else Plane.SIMULATION
+        passes = Allowed(access_control(access_to(plane, made)), identity)
+        for key in declared:
+            assert passes("egress", "declare_subscriber", zenoh.KeyExpr(f"foosim/{key}")), (identity, key)
+        assert not passes("egress", "declare_subscriber", zenoh.KeyExpr("foosim/simulation/build/blue"))
+        assert not passes("egress", "declare_subscriber", zenoh.KeyExpr("foosim/radio/down/other"))
+
+
 def test_clients_with_passwords_are_known_by_their_user_names() -> None:
     made = deployment(["red"], ["hand"], ["admin"], "password")
     radio = access_control(access_to(Plane.RADIO, made))
