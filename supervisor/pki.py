@@ -129,14 +129,17 @@ def issue_password(folder: Path, identity: str, password: str = "") -> str:
     return password
 
 
-def renew(folder: Path, identities: Iterable[str] = (), within_days: int | None = None) -> list[Path]:
+def renew(
+    folder: Path, identities: Iterable[str] = (), within_days: int | None = None, hosts: Sequence[str] = ()
+) -> list[Path]:
     """Issue certificates anew, for the same keys, names and lengths of time; by default all in the folder.
 
-    `within_days`: only those that end within so many days. A process takes the new one when it is started again.
-    Raises CertificateError.
+    `within_days`: only those that end within so many days. `hosts`: further ones, by which others reach the holder.
+    A process takes the new one when it is started again. Raises CertificateError, BadValue.
     """
     root, root_key = _authority(folder)
     now = wall.now_utc()
+    further = [_alternative(host) for host in hosts]
     made = []
     for identity in list(identities) or identities_in(folder):
         parse_identity(identity)
@@ -152,7 +155,8 @@ def renew(folder: Path, identities: Iterable[str] = (), within_days: int | None 
         alternatives = old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
         key = old.public_key()
         assert isinstance(key, ec.EllipticCurvePublicKey), "issued here"
-        certificate = _leaf(identity, key, list(alternatives), days, root, root_key)
+        names = list(dict.fromkeys([*alternatives, *further]))
+        certificate = _leaf(identity, key, names, days, root, root_key)
         fresh = path.with_name(f"{path.name}.new")
         fresh.unlink(missing_ok=True)
         _write(fresh, certificate.public_bytes(serialization.Encoding.PEM))

@@ -90,12 +90,16 @@ def renew(
     folder: Folder,
     identities: Identities = None,
     within: Annotated[int | None, typer.Option(help="Only what ends within so many days.")] = None,
+    host: Annotated[
+        list[str] | None, typer.Option(help="A further name or address by which others reach it; may be repeated.")
+    ] = None,
 ) -> None:
     """Issue certificates anew, by default all in the folder.
 
-    Key, names and length of time stay. A process takes the new one when it is started again.
+    Key and length of time stay, and so do names and addresses, to which --host adds. A process takes the new one when
+    it is started again.
     """
-    for path in pki.renew(folder, identities or (), within):
+    for path in pki.renew(folder, identities or (), within, host or ()):
         print(path)
 
 

@@ -194,6 +194,8 @@ def test_who_listens_has_a_certificate_for_that_host(folder: Path) -> None:
     check_host(None, "tcp/10.9.9.9:7400")
     with pytest.raises(CertificateError, match=r"not for 10\.0\.0\.2, where supervisor listens: .* --host 10\.0\.0\.2"):
         check_host(credentials, "tls/10.0.0.2:7400")
+    assert run("renew", folder, "supervisor", "--host", "10.0.0.2", "--host", "10.0.0.1")[0] == 0
+    check_host(load_credentials(folder, "supervisor"), "tls/10.0.0.2:7400")
 
 
 def test_an_operator_is_the_only_one_or_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
