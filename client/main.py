@@ -17,7 +17,7 @@ from foosim.client.player import PlayerLoop
 from foosim.protocol import channels, identity, limits
 from foosim.protocol.actions import Say
 from foosim.protocol.admission import Admission
-from foosim.protocol.certificates import Credentials, load_credentials
+from foosim.protocol.certificates import Credentials, load_credentials, warn_of_end
 from foosim.protocol.channels import VHUB, Plane
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
@@ -44,7 +44,9 @@ class PlayerProcess:
         self._is_present = False
         self._admission = Admission(credentials, VHUB, session.locator, time.monotonic_ns())
         self._wire = Wire(session, Plane.RADIO, inbox, name)
-        self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
+        log = start_log(name)
+        warn_of_end(credentials, log)
+        self._loop = Loop(self.core, inbox, log, self._deadline_ns)
         self._loop.connect(self._wire)
         self._loop.turn = self._turn
         self._loop.on_alive = self._on_alive

@@ -17,7 +17,7 @@ from foosim.node.solver import Solver
 from foosim.protocol import channels, identity, limits
 from foosim.protocol.actions import Say
 from foosim.protocol.admission import Admission
-from foosim.protocol.certificates import Credentials, load_credentials
+from foosim.protocol.certificates import Credentials, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
@@ -45,7 +45,9 @@ class NodeProcess:
         self._inbox = inbox
         self._is_present = False
         self._admission = Admission(credentials, SUPERVISOR, session.locator, time.monotonic_ns())
-        self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
+        log = start_log(name)
+        warn_of_end(credentials, log)
+        self._loop = Loop(self.core, inbox, log, self._deadline_ns)
         self._loop.connect(self._wire)
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking

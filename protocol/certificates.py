@@ -11,6 +11,7 @@ checked before anything is opened. Neighbours: `identity`, `tls_probe` (what onl
 
 from __future__ import annotations
 
+import logging
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -84,7 +85,9 @@ def load_credentials(folder: Path | None, identity: str, password: str = "") -> 
     certificate, key = certificate_path(folder, identity), key_path(folder, identity)
     role, name = parse_identity(identity)
     own_password = folder / f"{identity}{PASSWORD_SUFFIX}"
-    if role == "client" and not password and not certificate.exists() and own_password.exists():
+    if role == "client" and not password and own_password.exists():
+        if certificate.exists():
+            raise CertificateError(f"{folder} has a certificate and a password of {identity}: remove what is not used")
         password = read_password(own_password)
     if password:
         return Credentials(identity, folder / CA_FILE, user=name, password=password)
@@ -125,6 +128,13 @@ def operator_credentials(folder: Path | None) -> Credentials | None:
         there = f"several operators ({', '.join(known)})" if known else "no operator's certificate"
         raise CertificateError(f"{folder} has {there}: {OPERATOR_VARIABLE}=NAME in the environment says which it is")
     return load_credentials(folder, known[0])
+
+
+def warn_of_end(credentials: Credentials | None, log: logging.Logger) -> None:
+    """Log a warning when a certificate ends soon."""
+    warning = "" if credentials is None else credentials.ends_soon(wall.now_utc())
+    if warning:
+        log.warning(warning)
 
 
 @contextmanager

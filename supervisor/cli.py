@@ -78,9 +78,11 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     if no_capture and capture is not None:
         raise BadValue("--capture and --no-capture exclude each other", str(capture))
     plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki))
-    check_certificates(plan)
+    warnings = check_certificates(plan)
     path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
     display = Display(sys.stderr if json else sys.stdout)
+    for warning in warnings:
+        display.say(warning)
     try:
         outcome = Up(plan, path, display, run).run()
     except Killed as killed:

@@ -167,6 +167,8 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
             read_password(path)
         except CertificateError as error:
             return who, "problem", error.what, f"foosim-pki issue {folder} {who} --password"
+        if certificate_path(folder, who).exists():
+            return who, "problem", "has a password and a certificate, which this run does not take", "remove its .pem"
         return who, "fine", "has a password", ""
     path = certificate_path(folder, who)
     if not path.exists():

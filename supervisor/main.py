@@ -15,7 +15,7 @@ from foosim.protocol import channels, limits, wall
 from foosim.protocol.access import access_to
 from foosim.protocol.actions import Say
 from foosim.protocol.addresses import parse_address
-from foosim.protocol.certificates import check_host, load_credentials
+from foosim.protocol.certificates import check_host, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.exposure import Exposure
@@ -52,7 +52,8 @@ class SupervisorProcess:
         )
         self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
-        self._loop = Loop(self.core, inbox, start_log(SUPERVISOR), self.core.deadline_ns)
+        self.log = start_log(SUPERVISOR)
+        self._loop = Loop(self.core, inbox, self.log, self.core.deadline_ns)
         self._loop.connect(wire)
         self._journal = self._loop.journal = journal
         self._turned_tick = 0
@@ -130,6 +131,7 @@ def serve(plan: Plan, folder: RunFolder) -> int:
     ):
         check_host(credentials, session.locator)
         supervisor = SupervisorProcess(plan, folder, session, inbox, journal)
+        warn_of_end(credentials, supervisor.log)
         stop.then(supervisor.stop)
         code = supervisor.run()
     if code == DONE:

@@ -8,8 +8,8 @@ overwritten but by `renew`, and keys can be read by their owner only. Neighbours
 
 from __future__ import annotations
 
+import base64
 import os
-import secrets
 import socket
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -121,12 +121,21 @@ def issue_password(folder: Path, identity: str, password: str = "") -> str:
     role, _ = parse_identity(identity)
     if role != "client":
         raise BadValue("only clients have passwords (client.NAME)", identity)
-    password = password or secrets.token_urlsafe(24)
+    password = password or base64.urlsafe_b64encode(os.urandom(24)).decode()
     check_password("password", password)
     path = folder / f"{identity}{PASSWORD_SUFFIX}"
     _refuse_existing(path)
     _write(path, password.encode() + b"\n")
     return password
+
+
+def issue_passwords(folder: Path, identities: Sequence[str]) -> list[Path]:
+    """Give each client that has none a random password, and return where these are."""
+    paths = {identity: folder / f"{identity}{PASSWORD_SUFFIX}" for identity in identities}
+    made = [identity for identity, path in paths.items() if not path.exists()]
+    for identity in made:
+        issue_password(folder, identity)
+    return [paths[identity] for identity in made]
 
 
 def renew(

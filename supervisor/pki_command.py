@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from foosim.protocol import wall
+from foosim.protocol.certificates import CA_KEY_FILE, identities_in
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
@@ -44,7 +45,7 @@ def init(
     name: Annotated[str, typer.Option(help="What the root calls itself.")] = "foosim",
 ) -> None:
     """Make a folder with a root of its own."""
-    print(f"{pki.init(folder, name)} is the root; keep {folder / pki.CA_KEY_FILE} off the machines of a run")
+    print(f"{pki.init(folder, name)} is the root; keep {folder / CA_KEY_FILE} off the machines of a run")
 
 
 @app.command()
@@ -52,7 +53,7 @@ def issue(
     folder: Folder,
     identities: Identities = None,
     deployment: Annotated[
-        Path | None, typer.Option(help="Issue to everybody in this deployment file who has none yet.")
+        Path | None, typer.Option(help="Issue to everybody in this deployment file who has nothing yet.")
     ] = None,
     host: Annotated[
         list[str] | None, typer.Option(help="A name or address by which others reach it; may be repeated.")
@@ -77,8 +78,14 @@ def issue(
         return
     if deployment is not None:
         found = load_deployment(read_deployment_text(deployment), str(deployment))
-        there = pki.identities_in(folder)
-        wanted += [identity for identity in identities_of(found) if identity not in [*there, *wanted]]
+        there = identities_in(folder)
+        everybody = identities_of(found)
+        if found.access.radio == "password":
+            clients = [who for who in everybody if who.startswith("client.")]
+            everybody = [who for who in everybody if who not in clients]
+            for path in pki.issue_passwords(folder, clients):
+                print(path)
+        wanted += [identity for identity in everybody if identity not in [*there, *wanted]]
     elif not wanted:
         raise BadValue(f"nobody to issue to: name identities ({FORMS}) or a --deployment", "")
     for path in pki.issue(folder, wanted, host or (), days):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from foosim.protocol import identity
+from foosim.protocol import identity, wall
 from foosim.protocol.addresses import LOOPBACK, Address, check_listen
 from foosim.protocol.certificates import load_credentials, operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
@@ -75,13 +75,17 @@ class Plan:
     address: Address
 
 
-def check_certificates(plan: Plan) -> None:
-    """Raise CertificateError unless everybody whom `up` starts, and the operator that it is, has a certificate."""
+def check_certificates(plan: Plan) -> list[str]:
+    """Return which certificates end soon, of everybody whom `up` starts and of the operator that it is itself.
+
+    Raises CertificateError when somebody would not be let in.
+    """
     pki, deployment = plan.options.pki, plan.deployment
     nodes = [identity.node(name) for name, node in deployment.nodes.items() if node.launch == "local"]
-    for who in (SUPERVISOR, VHUB, *nodes, *map(identity.client, deployment.players)):
-        load_credentials(pki, who)
-    operator_credentials(pki)
+    everybody = (SUPERVISOR, VHUB, *nodes, *map(identity.client, deployment.players))
+    found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]
+    warnings = [credentials.ends_soon(wall.now_utc()) for credentials in found if credentials is not None]
+    return [warning for warning in warnings if warning]
 
 
 def make_plan(options: RunOptions) -> Plan:

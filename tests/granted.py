@@ -15,11 +15,11 @@ def may_put(identity: str, key: str) -> bool:
     role, _, name = identity.partition(".")
     match role:
         case "node":
-            says = ("hello", "ready", "part", "samples", "want", "heartbeat", "farewell")
-            return key in {f"{S}/{what}/{name}" for what in says}
+            of_node = ("hello", "ready", "part", "samples", "want", "heartbeat", "farewell")
+            return key in {f"{S}/{what}/{name}" for what in of_node}
         case "vhub":
-            says = ("hello", "ready", "want", "heartbeat", "farewell")
-            return key in {f"{S}/deliveries", *(f"{S}/{what}/vhub" for what in says)}
+            of_vhub = ("hello", "ready", "want", "heartbeat", "farewell")
+            return key in {f"{S}/deliveries", *(f"{S}/{what}/vhub" for what in of_vhub)}
         case "operator":
             return key.startswith(f"{S}/request/{name}.") and "/" not in key[len(f"{S}/request/") :]
         case "client":

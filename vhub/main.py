@@ -22,7 +22,7 @@ from foosim.protocol.access import access_to
 from foosim.protocol.actions import Say
 from foosim.protocol.addresses import LOOPBACK, Address, check_listen, parse_address
 from foosim.protocol.admission import Admission
-from foosim.protocol.certificates import Credentials, check_host, load_credentials, passwords_file
+from foosim.protocol.certificates import Credentials, check_host, load_credentials, passwords_file, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
@@ -79,6 +79,7 @@ class HubProcess:
         self._is_abandoned = False
         self._why_abandoned = "the vHub was told to end"
         self._log: logging.Logger = start_log(VHUB)
+        warn_of_end(credentials, self._log)
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
         self._loop = Loop(self.core, inbox, self._log, lambda now_ns: self.core.deadline_ns())
         self._loop.connect(self._wire)

@@ -115,6 +115,8 @@ def test_clients_with_passwords_need_one(folder: Path) -> None:
     finding = found(case, "client.player-red")
     assert finding.state == "problem" and finding.remedy.endswith("client.player-red --password")
     pki.issue_password(folder, "client.player-red")
+    assert "a password and a certificate" in found(case, "client.player-red").text
+    (folder / "client.player-red.pem").unlink()
     assert found(case, "client.player-red").state == "fine"
 
 

@@ -222,6 +222,11 @@ def test_passwords_are_kept_beside_certificates(folder: Path) -> None:
         assert path.read_text() == f"hand:{made}\nother:s3cret\n"
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert not path.exists()
+    pki.issue(folder, ["client.hand"])
+    with pytest.raises(
+        CertificateError, match=r"a certificate and a password of client\.hand: remove"
+    ):
+        load_credentials(folder, "client.hand")
     with pytest.raises(CertificateError, match="needs the root certificate"):
         load_credentials(None, "client.hand", "s3cret")
 
@@ -246,6 +251,16 @@ def test_what_cannot_be_done_is_said(folder: Path, arguments: list[str], code: i
     places = {"FOLDER": str(folder), "NOWHERE": str(folder.parent / "nowhere")}
     found, output = run(*(places.get(argument, argument) for argument in arguments), given="a b\n")
     assert found == code and said in output, output
+
+
+def test_where_clients_have_passwords_a_deployment_gets_these(folder: Path, tmp_path: Path) -> None:
+    file = tmp_path / "passwords.yaml"
+    file.write_text(f"{TABLE.read_text()}\naccess: {{radio: password, operators: [ann]}}\n")
+    assert run("issue", folder, "--deployment", file)[0] == 0
+    assert certificates.identities_in(folder) == ["node.blue", "node.red", "operator.ann", "supervisor", "vhub"]
+    before = (folder / "client.player-red.password").read_text()
+    assert run("issue", folder, "--deployment", file) == (0, ""), "everybody has something"
+    assert (folder / "client.player-red.password").read_text() == before != ""
 
 
 def test_without_the_roots_key_nothing_is_issued(folder: Path) -> None:

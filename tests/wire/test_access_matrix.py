@@ -5,9 +5,11 @@ to no rules. Those who must not are heard before those who may, over the same li
 last granted message has come, what was not granted and has not come by then was stopped.
 """
 
+import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
+from datetime import timedelta
 from pathlib import Path
 from typing import Any, Final
 
@@ -210,13 +212,17 @@ def test_without_rules_the_same_attempts_all_pass(folder: Path, deployment: Depl
         world = World(Plane.RADIO, folder, deployment, True, stack)
         world.subscribe_everywhere()
         put_all(world, world.expected(is_open=True))
-        world.router.kept.append(
-            world.router.session.declare_queryable("foosim/q", lambda query: query.reply("foosim/q", ""))
-        )
+
+        def answer(query: zenoh.Query) -> None:
+            query.reply("foosim/q", "answer")
+
+        world.router.kept.append(world.router.session.declare_queryable("foosim/q", answer))
         for member in world.members:
-            wait_for(
-                "an answer", lambda its=member: [reply for reply in its.session.get("foosim/q") if reply.ok is not None]
-            )
+
+            def answered(its: Member = member) -> bool:
+                return any(reply.ok is not None for reply in its.session.get("foosim/q"))
+
+            wait_for("an answer", answered)
 
 
 def test_nobody_is_present_as_another_and_all_see_the_router_only(world: World) -> None:
@@ -227,7 +233,8 @@ def test_nobody_is_present_as_another_and_all_see_the_router_only(world: World) 
             member.watch(key)
     for member in world.members:  # with sessions of their own: one hears its own tokens, whatever the rules
         double = world.join(member.identity)
-        for key in sorted(presences(world.plane), key=lambda key, who=member.identity: may_be_present(who, key)):
+        mine = {key for key in presences(world.plane) if may_be_present(member.identity, key)}
+        for key in sorted(presences(world.plane), key=mine.__contains__):
             double.kept.append(double.session.liveliness().declare_token(key))
     own = ALIVE[world.plane].replace("{name}", router.identity)
     router.kept.append(router.session.liveliness().declare_token(own))
@@ -276,10 +283,13 @@ def test_a_put_with_wildcards_reaches_no_handler(world: World, folder: Path) -> 
     )
 
 
-def test_who_has_no_certificate_of_this_root_is_told_so(folder: Path, deployment: Deployment, tmp_path: Path) -> None:
+def test_who_has_no_certificate_of_this_root_is_told_so(
+    folder: Path, deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     other = tmp_path / "other"
     pki.init(other, "somebody else's")
     pki.issue(other, ["node.red"])
+    shutil.copytree(folder, tmp_path / "late", ignore=shutil.ignore_patterns("node.red.*"))
     credentials, theirs = load_credentials(folder, "supervisor"), load_credentials(other, "node.red")
     ours = load_credentials(folder, "node.red")
     assert credentials is not None and theirs is not None and ours is not None
@@ -290,6 +300,11 @@ def test_who_has_no_certificate_of_this_root_is_told_so(folder: Path, deployment
         trusting = replace(theirs, ca=ours.ca)
         with pytest.raises(NotAuthorised, match=r"it does not accept .*node.red.pem \("):
             Session.client(router.locator, LONG_S, security=Security(trusting))
+        monkeypatch.setattr(pki, "SLACK", timedelta(days=2))
+        pki.issue(tmp_path / "late", ["node.red"], days=1)
+        late = replace(ours, certificate=tmp_path / "late" / "node.red.pem", key=tmp_path / "late" / "node.red.key")
+        with pytest.raises(NotAuthorised, match=r"it does not accept .*node.red.pem \(certificate expired\)"):
+            Session.client(router.locator, LONG_S, security=Security(late))
         nameless = replace(ours, certificate=None, key=None, user="red", password="guess")
         with pytest.raises(NotAuthorised, match=r"it does not accept who has no certificate \("):
             Session.client(router.locator, LONG_S, security=Security(nameless))
@@ -302,12 +317,12 @@ def test_passwords_let_clients_in_by_name(folder: Path, tmp_path: Path) -> None:
     content = yaml.safe_load(read_deployment_text(TABLE))
     content |= {"players": {}, "clients": {"hand": {}, "other": {}}, "access": {"radio": "password"}}
     deployment = load_deployment(yaml.safe_dump(content), "test")
-    secret = pki.issue_password(folder, "client.hand")
+    secret = pki.issue_password(tmp_path, "client.hand")
     server, ours = load_credentials(folder, "vhub"), load_credentials(folder, "client.hand", secret)
     with_certificate = load_credentials(folder, "client.hand")
     assert server is not None and ours is not None and with_certificate is not None
     access = access_to(Plane.RADIO, deployment)
-    with passwords_file(folder, ["hand", "other"]) as path:
+    with passwords_file(tmp_path, ["hand", "other"]) as path:
         router = Session.router("127.0.0.1", security=Security(server, access, str(path)))
     assert not path.exists()
     with router:
