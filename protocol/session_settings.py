@@ -57,7 +57,7 @@ def client_settings(
         "connect/endpoints": [str(address)],
         "connect/timeout_ms": max(1, int(1000 * timeout_s)),
         "connect/exit_on_failure": True,
-        "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2.0},
+        "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 2.0},
         "adminspace/enabled": False,
     }
     if security is None:
