@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any, Final
 
-from bench import barrier, distributed, echo, hub, machine, realtime, table_one_process
+from bench import barrier, certificates, distributed, echo, hub, machine, realtime, table_one_process
 from bench.runs import BenchError
 
 
@@ -55,6 +55,12 @@ BENCHES: Final = (
         "two nodes, vHub recording, supervisor, two lockstep players, as fast as it goes",
         with_default(distributed.distributed),
         distributed.lines,
+    ),
+    Bench(
+        "certificates",
+        "the same by turns plain and with mutual TLS",
+        with_default(certificates.certificates),
+        certificates.lines,
     ),
     Bench("realtime", "the same in real time", with_default(realtime.realtime), realtime.lines),
     Bench("hub", "packets through the vHub's core", with_default(hub.hub), hub.lines),

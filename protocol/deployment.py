@@ -23,12 +23,13 @@ from foosim.protocol.table import Part, Table
 from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks
 
 __all__ = [
-    "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "Jitter", "LinkRule", "Network",
-    "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor", "deployment_schema",
-    "deployment_schema_text", "parse_pace", "period_ticks",
+    "AccessSpec", "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "Jitter", "LinkRule",
+    "Network", "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor",
+    "deployment_schema", "deployment_schema_text", "parse_pace", "period_ticks",
 ]  # fmt: skip
 
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
+OperatorName = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.OPERATOR_LENGTH_MAX)]
 Selector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
 ClassPath = Annotated[str, StringConstraints(pattern=names.CLASS_PATTERN, max_length=200)]
 
@@ -173,6 +174,13 @@ class Capture(Part):
     flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = _default("100 ms", "flush")
 
 
+class AccessSpec(Part):
+    """Who may control the run, and how clients prove who they are: where the run has certificates."""
+
+    operators: list[OperatorName] = Field(default=["admin"], max_length=limits.OPERATORS_MAX)
+    radio: Literal["certificate", "password"] = "certificate"
+
+
 class Deadlines(Part):
     """How long the run waits for whom, in wall time."""
 
@@ -217,6 +225,7 @@ class Deployment(Part):
     clients: dict[Name, ClientSpec] = Field(default={}, max_length=limits.CLIENTS_MAX)
     network: Network = Field(default_factory=Network)
     capture: Capture = Field(default_factory=Capture)
+    access: AccessSpec = Field(default_factory=AccessSpec)
     deadlines: Deadlines = Field(default_factory=Deadlines)
 
     def endpoints(self) -> list[str]:

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from foosim.protocol.codec import encode_json
-from foosim.protocol.command import DONE, FAILED, INTERRUPTED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
@@ -20,7 +20,7 @@ from foosim.supervisor import control
 from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
 from foosim.supervisor.main import serve
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.plan import RunOptions, check_certificates, make_plan
 from foosim.supervisor.remote import Remote, unit_name
 from foosim.supervisor.run_folder import create_run, open_run, run_exists
 from foosim.supervisor.units import units_of
@@ -70,6 +70,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     engine: Engine = None,
     listen: Listen = None,
     insecure: Insecure = False,
+    pki: PkiOption = None,
     run: RunName = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
 ) -> None:
@@ -82,9 +83,12 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     """
     if no_capture and capture is not None:
         raise BadValue("--capture and --no-capture exclude each other", str(capture))
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki))
+    warnings = check_certificates(plan)
     path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
     display = Display(sys.stderr if json else sys.stdout)
+    for warning in warnings:
+        display.say(warning)
     try:
         outcome = Up(plan, path, display, run).run()
     except Killed as killed:
@@ -107,6 +111,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     engine: Engine = None,
     listen: Listen = None,
     insecure: Insecure = False,
+    pki: PkiOption = None,
     run: RunName = None,
 ) -> None:
     """Run a supervisor alone.
@@ -114,12 +119,12 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
     folder has the run file, logs and journals.
     """
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     raise typer.Exit(serve(plan, folder))
 
 
-def _options(
+def _options(  # noqa: PLR0913, PLR0917  # a command's options
     file: Path,
     pace: str | None,
     duration: str | None,
@@ -128,9 +133,10 @@ def _options(
     engine: str | None,
     listen: str | None,
     insecure: bool,
+    pki: Path | None,
 ) -> RunOptions:
     settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]
-    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure)
+    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, pki)
 
 
 @app.command()

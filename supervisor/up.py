@@ -12,15 +12,17 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from foosim.protocol import wall
-from foosim.protocol.addresses import Address, parse_address
+from foosim.protocol.addresses import parse_address
+from foosim.protocol.certificates import operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Failed, Refused
+from foosim.protocol.exposure import Exposure
 from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.display import Display, recovery_text
 from foosim.supervisor.hosts import check_hosts, fetch_capture
@@ -151,7 +153,7 @@ class Up:
             return False
         self._launch(VHUB, self._vhub_command(info))
         for name, node in sorted(self.plan.deployment.nodes.items()):
-            command = ["foosim-node", "--name", name, "--connect", info.simulation]
+            command = ["foosim-node", "--name", name, "--connect", info.simulation, *options.pki_arguments()]
             if node.launch != "manual":
                 self._launch(name, command)
             else:
@@ -160,18 +162,20 @@ class Up:
         if info is None:
             return False
         for name in sorted(self.plan.deployment.players):
-            self._launch(name, ["foosim-player", "--name", name, "--connect", info.radio])
+            command = ["foosim-player", "--name", name, "--connect", info.radio, *options.pki_arguments()]
+            self._launch(name, command)
         return True
 
     def _vhub_command(self, info: RunInfo) -> list[str]:
-        address, folder, capture = self.plan.address, self.folder.path, self.capture
-        listen = Address(address.host, parse_address(info.radio).port) if info.radio else address.next_port()
+        address, folder, capture, options = self.plan.address, self.folder.path, self.capture, self.plan.options
+        listen = replace(address, port=parse_address(info.radio).port) if info.radio else address.next_port()
         remote = self._launcher.remotes.get(VHUB)
         if remote is not None:  # where the guard has a folder for the run
-            listen = Address(remote.host.address, listen.port)
+            listen = replace(listen, host=remote.host.address)
             folder, capture = Path(), None if capture is None else Path(CAPTURE)
         command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(listen)]
-        command += ["--insecure"] if self.plan.options.insecure else []
+        command += ["--insecure"] if options.insecure else []
+        command += options.pki_arguments()
         command += ["--run-folder", str(folder)]
         return [*command, "--no-capture"] if capture is None else [*command, "--capture", str(capture)]
 
@@ -208,8 +212,12 @@ class Up:
         info = self.folder.info()
         assert info is not None
         next_s = time.monotonic()
-        with Control(info.simulation) as control:
+        exposure = Exposure(self.plan.address, time.monotonic_ns())
+        with Control(info.simulation, operator_credentials(self.plan.options.pki)) as control:
             while self._goes_on():
+                reminder = exposure.due(time.monotonic_ns())
+                if reminder:
+                    self.display.say(reminder)
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self.display.every_s
                     self._show(control)
