@@ -130,7 +130,7 @@ class SupervisorCore:
             Farewell: self.handshake.farewell,
         }
         text = settings.deployment_name, settings.deployment_text
-        self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.last_tick, clock, settings.start)
+        self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.ticks, clock, settings.start)
         self.take_over = TakeOver(self, history, now_ns) if history is not None and history.epoch is not None else None
         self.actions.append(Journal(encode(self.run_record) if history is None else self.head()))
 
@@ -216,16 +216,14 @@ class SupervisorCore:
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
         """Go on without the nodes among those who are lost, wait for the vHub; without any other the run ends."""
-        if channels.VHUB in lost:
-            self.absence.lose(lost[channels.VHUB], now_ns)
-            lost = {name: why for name, why in lost.items() if name != channels.VHUB}
         others = {name: why for name, why in lost.items() if name not in self.deployment.nodes}
+        if channels.VHUB in others:
+            self.absence.lose(others.pop(channels.VHUB), now_ns)
         if others:
             self.finish(_losses(others), failed=True)
-            return
-        for name, why in lost.items():
+        for name in sorted(lost.keys() & self.deployment.nodes.keys()):
             if self.end is None:
-                self.recovery.lose(name, why, now_ns)
+                self.recovery.lose(name, lost[name], now_ns)
 
     def hold(self) -> None:
         """No node is left: nothing is computed until one joins."""
