@@ -64,7 +64,7 @@ def _describe(found: CaptureInfo) -> str:
     lines = [
         f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
         *(f"  {key}: {value}" for key, value in sorted({**found.metadata, **found.end}.items())),
-        f"  {found.ticks} ticks of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
+        f"  {_span(found)} of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
         f"  digest of the last frame {found.digest}",
         f"  digest of all ticks {found.chain}",
         f"  nodes {', '.join(found.nodes) or 'not known'}",
@@ -76,6 +76,10 @@ def _describe(found: CaptureInfo) -> str:
         *(f"    {name}: {number}" for name, number in sorted(found.versions.items())),
     ]
     return "\n".join(lines)
+
+
+def _span(found: CaptureInfo) -> str:
+    return f"{found.ticks} ticks" if not found.first_tick else f"ticks {found.first_tick} to {found.ticks}"
 
 
 @app.command()
@@ -106,6 +110,7 @@ def verify(
 def _as_json(found: Verified) -> dict[str, Any]:
     return {
         "equal": found.equal,
+        "first_tick": found.first_tick,
         "ticks": found.ticks,
         "nodes": found.nodes,
         "chain": found.chain.hex(),
@@ -118,9 +123,10 @@ def _as_json(found: Verified) -> dict[str, Any]:
 def _verdict(found: Verified) -> str:
     on = f"on {found.nodes} node{'s' if found.nodes > 1 else ''}"
     if found.equal:
-        return f"equal: {found.ticks} ticks simulated again {on}, digest of all ticks {found.chain.hex()}"
+        count = found.ticks - found.first_tick
+        return f"equal: {count} ticks simulated again {on}, digest of all ticks {found.chain.hex()}"
     if found.missing_tick >= 0:
-        return f"tick {found.missing_tick} is missing; {found.ticks} ticks before it are equal {on}"
+        return f"tick {found.missing_tick} is missing; {found.ticks - found.first_tick} ticks before it are equal {on}"
     return f"differs at tick {found.tick} in {', '.join(found.entities)}; the ticks before it are equal {on}"
 
 

@@ -39,6 +39,10 @@ Sets = Annotated[
 Engine = Annotated[str | None, typer.Option("--engine", help="bullet or pure; short for --set engine=NAME.")]
 Listen = Annotated[str, typer.Option("--listen", help="HOST[:PORT]; the radio plane listens at PORT + 1.")]
 Insecure = Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")]
+From = Annotated[
+    str | None,
+    typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
+]
 RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
 
 
@@ -59,6 +63,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     pace: PaceOption = None,
     duration: For = None,
     seed: Seed = None,
+    branch: From = None,
     capture: Annotated[Path | None, typer.Option(help="By default captures/WORLD-TIME.mcap.")] = None,
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
     sets: Sets = None,
@@ -73,10 +78,14 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     Supervisor, vHub, nodes and players are processes of their own, each with a log; they end with this command. Ctrl-C
     ends the run in order and leaves a finished capture; a second one kills everything. Nodes that the deployment
     declares as `launch: manual` are waited for; their command line is printed.
+
+    With --from the world begins with the newest captured frame at or before that time (without a time: the last one),
+    and time goes on from there; --for counts from there, too. The deployment may differ from the captured one in
+    everything but its robots, their sensors, and the tick.
     """
     if no_capture and capture is not None:
         raise BadValue("--capture and --no-capture exclude each other", str(capture))
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, branch))
     path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
     display = Display(sys.stderr if json else sys.stdout)
     try:
@@ -97,6 +106,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     pace: PaceOption = None,
     duration: For = None,
     seed: Seed = None,
+    branch: From = None,
     sets: Sets = None,
     engine: Engine = None,
     listen: Listen = LOOPBACK,
@@ -108,12 +118,12 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
     folder has the run file, logs and journals.
     """
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, branch))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     raise typer.Exit(serve(plan, folder))
 
 
-def _options(
+def _options(  # noqa: PLR0913, PLR0917  # a command's options
     file: Path,
     pace: str | None,
     duration: str | None,
@@ -122,9 +132,10 @@ def _options(
     engine: str | None,
     listen: str,
     insecure: bool,
+    branch: str | None,
 ) -> RunOptions:
     settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]
-    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure)
+    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, branch)
 
 
 @app.command()

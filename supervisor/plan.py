@@ -15,6 +15,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Origin
 from foosim.protocol.start import Start
 from foosim.protocol.units import Pace, parse_ns, parse_pace
+from foosim.vhub.branching import Branch, read_branch
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,8 @@ class RunOptions:
     sets: tuple[str, ...] = ()
     listen: str = LOOPBACK
     insecure: bool = False
+    branch: str | None = None
+    """`CAPTURE@12.5s`: begin with that frame."""
 
     @property
     def all_sets(self) -> tuple[str, ...]:
@@ -40,6 +43,7 @@ class RunOptions:
         given += ["--pace", self.pace] if self.pace is not None else []
         given += ["--for", self.duration] if self.duration is not None else []
         given += ["--seed", str(self.seed)] if self.seed is not None else []
+        given += ["--from", self.branch] if self.branch is not None else []
         for setting in self.sets:
             given += ["--set", setting]
         return given
@@ -71,7 +75,10 @@ class RunSettings:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Options that were checked: the canonical text and what is in it, and when it ends (0 ticks: when asked to)."""
+    """Options that were checked: the canonical text and what is in it, and when it ends (0 ticks: when asked to).
+
+    `branch` is the captured frame that it begins with, None for frame 0.
+    """
 
     options: RunOptions
     text: str
@@ -79,6 +86,11 @@ class Plan:
     pace: Pace
     ticks: int
     address: Address
+    branch: Branch | None = None
+
+    @property
+    def start(self) -> Start | None:
+        return None if self.branch is None else self.branch.start
 
 
 def make_plan(options: RunOptions) -> Plan:
@@ -93,4 +105,5 @@ def make_plan(options: RunOptions) -> Plan:
         ticks = -(-parse_ns(options.duration) // deployment.tick_ns)
         if ticks == 0:
             raise BadValue("a run has at least one tick", options.duration)
-    return Plan(options, text, deployment, pace, ticks, address)
+    branch = None if options.branch is None else read_branch(options.branch, deployment)
+    return Plan(options, text, deployment, pace, ticks, address, branch)

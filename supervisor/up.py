@@ -127,6 +127,8 @@ class Up:
         supervisor = ["foosim-supervisor", "run", *options.arguments(), "--run", folder.name]
         self._launch(SUPERVISOR, supervisor)
         display.say(f"run {folder.name}, logs in {folder.logs}")
+        if self.plan.branch is not None:
+            display.say(self.plan.branch.text)
         info = self._await(folder.info)
         if info is None:
             return False
