@@ -120,7 +120,7 @@ class _Completion:
             for last in fold(self._deployment, chain([self._head], self._records)):
                 file.write(last[1])
                 if file.mcap.chunk_bytes > CHUNK_BYTES:
-                    file.mcap.end_chunk()
+                    file.end_chunk()
         except (Malformed, JournalError) as error:
             self.problem = f"its journal cannot be used to its end: {error}"
         if last is None or file.done.in_flight or last[1].frame.tick < file.done.tick:
