@@ -183,6 +183,8 @@ class Deadlines(Part):
     lockstep_fast_ns: Deadline = _default("10 s", "lockstep_fast")
     lockstep_realtime_ns: Deadline = _default("1 s", "lockstep_realtime")
     start_ns: Deadline = _default("60 s", "start")
+    vhub_back_ns: Deadline = _default("30 s", "vhub_back")
+    client_back_ns: Deadline = _default("2 s", "client_back")
 
 
 def _int_only(value: object) -> object:

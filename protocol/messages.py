@@ -346,17 +346,24 @@ class Subscription(Item, frozen=True):
 
 
 class ClientHello(Message, frozen=True, tag="clienthello"):
-    """A client asks to be let in. `received` is the last downlink number it has."""
+    """A client asks to be let in. `received` is the last downlink number it has.
+
+    `again`: it had been let in before, has lost the vHub, and goes on with its own numbers.
+    """
 
     name: Name
     boot: Name
     version: Counter
     world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     received: Counter
+    again: bool = False
 
 
 class ClientWelcome(Message, frozen=True):
-    """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1."""
+    """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1.
+
+    Everything up to `sequence` is recorded, nothing behind it is: who comes back sends that again.
+    """
 
     name: Name
     boot: Name
@@ -365,6 +372,7 @@ class ClientWelcome(Message, frozen=True):
     downlink: Counter
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
+    run: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
 
 
 class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
@@ -398,7 +406,7 @@ class Join(Message, frozen=True):
 
 
 class Up(Message, frozen=True):
-    """Packets of a free-running client."""
+    """Packets of a free-running client, numbered one after the other; the vHub takes none behind a gap."""
 
     name: Name
     boot: Name
@@ -443,3 +451,12 @@ class Down(Message, frozen=True):
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     ended: bool
+
+
+class Heard(Message, frozen=True):
+    """The vHub has recorded what a free-running client sent up to the number `acknowledged`.
+
+    Downlinks say the same; this is for a client that gets none.
+    """
+
+    acknowledged: Counter

@@ -40,6 +40,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.start import first_chain, first_frame
+from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.pacing import Pacer
@@ -71,6 +72,7 @@ class SupervisorCore:
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.requests = Requests(self)
         self.recovery = Recovery(self)
+        self.absence = Absence(self)
         self.handshake = Handshake(self)
         self.frame: Frame = first_frame(self.deployment, settings.start)
         self.chain = first_chain(settings.origin)
@@ -139,7 +141,7 @@ class SupervisorCore:
 
     def wake(self, now_ns: int) -> None:
         """Look for who is silent or overdue, and for the end of an ended run."""
-        if self.end is None:
+        if self.end is None and not self.absence.is_over(now_ns):
             lost = self.watch.lost(self, now_ns)
             if lost and self.epoch == 0:
                 self.finish(_losses(lost), failed=True)
@@ -150,7 +152,7 @@ class SupervisorCore:
             if now_ns >= self._prepare_ns:
                 self.requests.prepare()
                 self._prepare_ns = now_ns + PREPARE_NS
-        elif not self.finished:
+        elif self.end is not None and not self.finished:
             hub = self.roster.by_name.get(channels.VHUB)
             self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
             if hub is not None and hub.gone_ns and now_ns > hub.gone_ns + GONE_NS:
@@ -189,7 +191,10 @@ class SupervisorCore:
             self._lose({name: "its connection closed"}, now_ns)
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
-        """Go on without the nodes among those who are lost; without any other the run ends."""
+        """Go on without the nodes among those who are lost, wait for the vHub; without any other the run ends."""
+        if channels.VHUB in lost:
+            self.absence.lose(lost[channels.VHUB], now_ns)
+            lost = {name: why for name, why in lost.items() if name != channels.VHUB}
         others = {name: why for name, why in lost.items() if name not in self.deployment.nodes}
         if others:
             self.finish(_losses(others), failed=True)
@@ -339,6 +344,7 @@ class SupervisorCore:
         self.frame = frame
         self.chain = chain_next(self.chain, frame.digest)
         self.recovery.committed(self.committed_ns, now_ns)
+        self.absence.committed(self.committed_ns, now_ns)
         self.committed_ns = now_ns
         self._patience.progress(self.deployment.tick_ns, now_ns)
         self._say_commit(edits)

@@ -66,7 +66,9 @@ class Handshake:
             return
         if core.epoch == 0:
             core.start_if_ready(now_ns)
-        elif process.name in (*core.members, channels.VHUB):
+        elif process.name == channels.VHUB:
+            core.absence.ready(now_ns)
+        elif process.name in core.members:
             if ready.layout == core.frame.layout.digest:
                 core.say_epoch()
         elif ready.layout == core.frame.layout.digest:
@@ -83,7 +85,9 @@ class Handshake:
             core.count_repeat()
             return
         process.heard_ns = now_ns
-        if process.lost:
+        if process.lost and process.name == channels.VHUB:
+            core.absence.hear(now_ns)
+        elif process.lost:
             core.recovery.hear(process, now_ns)
         if not heartbeat.report:
             core.watch.told(heartbeat)

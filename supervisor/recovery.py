@@ -105,6 +105,8 @@ class Recovery:
     def committed(self, before_ns: int, now_ns: int) -> None:
         """A frame is committed, the one before it was at `before_ns`: the world goes on again."""
         for entry in reversed(self.recovered):
+            if entry.what == "vhub":
+                continue
             if entry.outage_ns >= 0:
                 return
             entry.outage_ns = max(0, now_ns - before_ns)

@@ -26,6 +26,7 @@ from foosim.protocol.messages import Epoch
 from foosim.vhub import capture_file
 from foosim.vhub.capture_file import CaptureFile, Described, Item, Line
 from foosim.vhub.records import Closing
+from foosim.vhub.resume import Captured
 
 GATHER_S: Final = 0.02
 """How long the writer lets closings gather: it wakes once for several, instead of taking the interpreter at each."""
@@ -96,6 +97,8 @@ class CaptureWriter:
         self._changed = threading.Condition()
         """Guards the queue, the error and the ends; notified when any of them changes in a way that is waited for."""
         self._file = CaptureFile(path, Described(deployment, deployment_name, deployment_text, metadata), journal_tick)
+        self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
+        """How far the file was that is gone on with."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
         self._syncer = _Syncer(self._file)
         self._thread.start()

@@ -25,6 +25,12 @@ class Commits:
         self._frames: dict[int, Committed] = {}
         self._early: dict[int, tuple[bytes, Commit]] = {}
 
+    def start(self, layout: Layout | None, tick: int, last: Committed | None = None) -> None:
+        """Begin with the frame of a tick and the layout before it; `last` is the frame before, where that is known."""
+        self.layout, self.next_tick = layout, tick
+        if last is not None:
+            self._frames[tick - 1] = last
+
     def take(self, commit: Commit, payload: bytes) -> list[int]:
         """Take a commit; return the ticks whose frames are there by it, none for a repeat or one that came early.
 

@@ -54,9 +54,7 @@ def disturbed(
             system.at_tick(tick, partial(fault, system))
 
     pace = chosen.pop("pace", None)
-    return rehearse(
-        TABLE.read_text(), TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare
-    )
+    return rehearse(TABLE.read_text(), TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare)
 
 
 def told(run: Rehearsed) -> list[tuple[str, str]]:
