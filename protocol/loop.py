@@ -16,6 +16,7 @@ from typing import Any, Final, Protocol
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
 from foosim.protocol.inbox import Inbox
+from foosim.protocol.journal import JournalError
 from foosim.protocol.session import Publisher, Session
 
 BUSY_WINDOW_NS: Final = 1_000_000_000
@@ -118,6 +119,10 @@ class Loop:
         self.on_alive: Callable[[Plane, str, bool], None] = lambda plane, name, is_alive: None
         """Somebody has come or gone."""
         self.on_say: Callable[[Say], None] = lambda say: None
+        self.on_unwritten: Callable[[JournalError], None] | None = None
+        """Told once that a record could not be written; what is decided from then on is in no journal."""
+        self.holds_back: Callable[[Publish], bool] | None = None
+        """Says which messages are not to be said."""
         self.took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
         """Told how long a turn took, with all that was performed: when it began, when the loop slept again."""
         self.busy = 0.0
@@ -179,10 +184,10 @@ class Loop:
         for action in actions:
             kind = type(action)
             if kind is Publish:
-                self._wires[action.channel.plane].put(action.channel, action.name, action.payload)
+                if self.holds_back is None or not self.holds_back(action):
+                    self._wires[action.channel.plane].put(action.channel, action.name, action.payload)
             elif kind is Journal:
-                if self.journal is not None:
-                    self.journal.append(action.record)
+                self._append(action.record)
             elif kind is Say:
                 self._log.log(_LEVELS[action.level], action.text)
                 self.on_say(action)
@@ -190,6 +195,18 @@ class Loop:
                 assert self.other is not None, action
                 self.other(action)
         actions.clear()
+
+    def _append(self, record: bytes) -> None:
+        """Write a record; a journal that fails is not written any more, and who knows what follows is told."""
+        if self.journal is None:
+            return
+        try:
+            self.journal.append(record)
+        except JournalError as error:
+            if self.on_unwritten is None:
+                raise
+            self.journal = None
+            self.on_unwritten(error)
 
     def _measure(self, now_ns: int, slept_ns: int) -> None:
         self._slept_ns += slept_ns

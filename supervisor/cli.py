@@ -19,6 +19,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
 from foosim.supervisor import control
 from foosim.supervisor.display import Display, render_text
+from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.supervisor.run_folder import create_run, open_run, run_exists
@@ -88,6 +89,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, branch))
     path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
     display = Display(sys.stderr if json else sys.stdout)
+    recover_leftovers(display.say)
     try:
         outcome = Up(plan, path, display, run).run()
     except Killed as killed:
@@ -119,6 +121,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     folder has the run file, logs and journals.
     """
     plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, branch))
+    recover_leftovers(lambda line: print(line, file=sys.stderr))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     raise typer.Exit(serve(plan, folder))
 

@@ -17,11 +17,12 @@ from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, remove_journal
+from foosim.protocol.journal import Journal, JournalError, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.process import Stop, die_with_parent, start_log
 from foosim.protocol.session import Session
 from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.journal_room import JournalRoom
 from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.run_folder import RunFolder, RunInfo
 from foosim.supervisor.status import result
@@ -50,6 +51,8 @@ class SupervisorProcess:
         self._journal = self._loop.journal = journal
         self._turned_tick = 0
         self._loop.turn = self._turn
+        self._loop.on_unwritten = self._on_unwritten
+        self._room = JournalRoom(folder.journals, plan.deployment.capture.reserve_bytes)
         self._loop.took = self.core.watch.took
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
@@ -78,17 +81,26 @@ class SupervisorProcess:
         if self._is_told_to_end:
             self._is_told_to_end = False
             self.core.stop()
-        if not self.core.actions:
-            self._turn_journal()
+        if not self.core.actions and self._loop.journal is not None:
+            self._turn_journal(now_ns)
         self.core.advance(now_ns)
         self._note_radio()
 
-    def _turn_journal(self) -> None:
+    def _turn_journal(self, now_ns: int) -> None:
         """Begin a new file when one is full; the one before it stays until the next turn, when this one is synced."""
         tick = self.core.frame.tick
-        if self._journal.rotate_if_full(self.core.head, tick):
-            self._journal.forget_before(self._turned_tick)
-            self._turned_tick = tick
+        self._room.look(now_ns, self.core)
+        try:
+            if self._journal.rotate_if_full(self.core.head, tick):
+                self._journal.forget_before(self._turned_tick)
+                self._turned_tick = tick
+        except JournalError as error:
+            self._loop.journal = None
+            self._on_unwritten(error)
+
+    def _on_unwritten(self, error: JournalError) -> None:
+        """The journal has failed: the run ends. What is committed by then is said, so that the capture has it."""
+        self.core.finish(f"lost the journal: {error}", failed=True)
 
     def _note_radio(self) -> None:
         """Write into the run file where clients find the vHub, when it tells."""

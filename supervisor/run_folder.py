@@ -27,6 +27,9 @@ RUN_FILE: Final = "run.json"
 RESULT_FILE: Final = "result.json"
 LOCK_FILE: Final = "lock"
 HOLD_TRIES: Final = 50
+SPARE_FILE: Final = "spare"
+SPARE_BYTES: Final = 64 * 1024
+"""Kept on the disk while the run lives, so that its result can be written when the disk is full."""
 
 
 class NoRun(Failed):
@@ -75,6 +78,7 @@ class RunFolder:
                 time.sleep(0.01)
                 continue
             self._lock = lock
+            (self.path / SPARE_FILE).write_bytes(bytes(SPARE_BYTES))
             return
         os.close(lock)
         raise NoRun(f"run {self.name} has a supervisor already")
@@ -111,7 +115,8 @@ class RunFolder:
             return None
 
     def write_result(self, result: dict[str, Any]) -> None:
-        """Write how the run ended."""
+        """Write how the run ended, on a disk that is full, too."""
+        (self.path / SPARE_FILE).unlink(missing_ok=True)
         _replace(self.path / RESULT_FILE, msgspec.json.format(msgspec.json.encode(result)))
 
     def result(self) -> dict[str, Any] | None:
@@ -183,6 +188,11 @@ def _newest_first(parent: Path) -> list[RunFolder]:
 def live_runs() -> list[RunFolder]:
     """Return the live runs of this user, the newest first."""
     return [folder for folder in _newest_first(runs_folder()) if folder.is_live()]
+
+
+def ended_runs() -> list[RunFolder]:
+    """Return the runs of this user that are over, the newest first."""
+    return [folder for folder in _newest_first(runs_folder()) if not folder.is_live()]
 
 
 def run_exists(name: str) -> bool:

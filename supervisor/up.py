@@ -22,7 +22,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Refused
 from foosim.supervisor.control import Control, NoAnswer
-from foosim.supervisor.display import Display, recovery_text
+from foosim.supervisor.display import Display, recording_text, recovery_text
 from foosim.supervisor.launcher import Child, Launcher, command_line
 from foosim.supervisor.plan import Plan
 from foosim.supervisor.restarts import Restarts
@@ -326,7 +326,10 @@ class Up:
             return []
         hub = self._launcher.children.get(VHUB)
         finished = hub is not None and hub.exit_code in (DONE, FAILED)
-        return [f"capture {self.capture}" if finished else f"capture {self.capture} (unfinished)"]
+        result = self.folder.result()
+        wrong = "" if result is None else recording_text(result)
+        lines = [f"capture {self.capture}" if finished else f"capture {self.capture} (unfinished)"]
+        return [*lines, wrong] if wrong else lines
 
     @contextmanager
     def _signals(self) -> Iterator[None]:

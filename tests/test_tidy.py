@@ -45,6 +45,7 @@ SHELLS = {
     "client/main.py",
     "node/main.py",
     "protocol/deployment_file.py",
+    "protocol/disk.py",
     "protocol/inbox.py",
     "protocol/journal.py",
     "protocol/loop.py",
@@ -59,7 +60,9 @@ SHELLS = {
     "supervisor/cli.py",
     "supervisor/control.py",
     "supervisor/display.py",
+    "supervisor/journal_room.py",
     "supervisor/launcher.py",
+    "supervisor/leftovers.py",
     "supervisor/main.py",
     "supervisor/plan.py",
     "supervisor/run_folder.py",
@@ -70,6 +73,7 @@ SHELLS = {
     "vhub/capture_recovery.py",
     "vhub/capture_writer.py",
     "vhub/main.py",
+    "vhub/room_watch.py",
 }
 # What a core does not import: clocks, sockets, files, threads, dice.
 IMPURE = {

@@ -157,19 +157,22 @@ class CaptureFile:
 
     # --- writing -----------------------------------------------------------------------------------------------------
 
-    def write(self, item: Item) -> None:
-        """Write the rows of a closing, an epoch or a line; of what the file has already, none."""
+    def write(self, item: Item) -> bool:
+        """Write the rows of a closing, an epoch or a line; False, and none, when the file has them already."""
         if isinstance(item, Line):
             self._write_view(LOG, item.tick, self._view.log_line(item.level, item.text, item.tick))
         elif isinstance(item, Epoch):
-            if item.epoch > self.done.epoch:
-                topic, log_ns, publish_ns, sequence, row = epoch_entry(item, self._plan)
-                self.mcap.add_message(self._channels[topic], log_ns, publish_ns, sequence, self._encode(row))
-                self.done.epoch = item.epoch
+            if item.epoch <= self.done.epoch:
+                return False
+            topic, log_ns, publish_ns, sequence, row = epoch_entry(item, self._plan)
+            self.mcap.add_message(self._channels[topic], log_ns, publish_ns, sequence, self._encode(row))
+            self.done.epoch = item.epoch
         elif item.frame.tick <= self.done.tick and (self._known is None or item.frame.tick > self._known.tick):
             self._pass(item.frame)
+            return False
         else:
             self._write_closing(item)
+        return True
 
     def _write_closing(self, closing: Closing) -> None:
         add, encode, channels, done = self.mcap.add_message, self._encode, self._channels, self.done

@@ -86,8 +86,9 @@ class CaptureWriter:
         self._flush_ns = deployment.capture.flush_ns
         self.state = CaptureState()
         self.stops_world = deployment.capture.on_full == "stop_world"
-        self._offered = self._written = self._refused = self._pending = 0
-        """Rows by what became of them; pending ones are in the chunk that is being collected."""
+        self._offered = self._written = self._refused = self._pending = self._passed = 0
+        """Rows by what became of them; pending ones are in the chunk that is being collected, passed
+        ones were in the file that is gone on with."""
         self._error: BaseException | None = None
         self._queue: deque[Item] = deque()
         self._queued_rows = self._waits = 0
@@ -129,7 +130,7 @@ class CaptureWriter:
 
     def statistics(self) -> CaptureStatistics:
         mcap = self._file.mcap
-        counts = self._offered, self._written, self._refused, self._queued_rows, self._waits
+        counts = self._offered - self._passed, self._written, self._refused, self._queued_rows, self._waits
         return CaptureStatistics(mcap.messages, mcap.offset, *counts, self._file.done.tick, self.synced_tick)
 
     def _put(self, item: Item) -> None:
@@ -271,8 +272,10 @@ class CaptureWriter:
         if self.state.level is Level.OUT:
             self._refused += _rows_in(item)
             return
-        self._file.write(item)
-        self._pending += _rows_in(item)
+        if self._file.write(item):
+            self._pending += _rows_in(item)
+        else:
+            self._passed += _rows_in(item)
 
 
 class _Syncer:
