@@ -41,7 +41,7 @@ class RoomWatch:
 
     def _look_at(self, capture: CaptureWriter) -> list[tuple[str, str]]:
         state = capture.state
-        if state is self._told:
+        if state == self._told:
             return []
         before, self._told = self._told, state
         if state.level is Level.LOW:
