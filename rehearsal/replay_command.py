@@ -16,6 +16,7 @@ from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_ap
 from foosim.protocol.errors import BadValue, Refused
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_reader import CaptureInfo, capture_info
+from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.rows import CaptureError
 
 app = new_app()
@@ -128,6 +129,24 @@ def _verdict(found: Verified) -> str:
     if found.missing_tick >= 0:
         return f"tick {found.missing_tick} is missing; {found.ticks - found.first_tick} ticks before it are equal {on}"
     return f"differs at tick {found.tick} in {', '.join(found.entities)}; the ticks before it are equal {on}"
+
+
+@app.command()
+def recover(
+    capture: Capture,
+    journals: Annotated[
+        Path | None, typer.Option(help="The folder of its vHub's journal, e.g. RUN/journals.", show_default=False)
+    ] = None,
+) -> None:
+    """Make a capture valid that its writer left unfinished; what a journal has is added.
+
+    It is changed in place: cut behind the last whole chunk, completed, and ended. Bytes that are damaged and not just
+    cut are only given up when the journal has what they held. A start of `foosim-supervisor` does this by itself with
+    what runs of this user left.
+    """
+    with _read():
+        found = recover_capture(capture, journals)
+    typer.echo(f"capture {capture} is finished already" if found is None else str(found))
 
 
 def main() -> None:
