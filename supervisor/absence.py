@@ -30,6 +30,8 @@ class Absence:
         self._gap_ns = 0
         """The longest time between two commits since it is gone."""
         self._entry: Recovered | None = None
+        self._tick = -1
+        """Where it stood when it was lost for not going on; -1 when it was lost for anything else."""
 
     def lose(self, reason: str, now_ns: int) -> None:
         """The vHub is gone."""
@@ -39,6 +41,8 @@ class Absence:
             core.roster.lose(process)
         if self.is_away:
             return
+        told = None if process is None else process.heartbeat
+        self._tick = told.tick if told is not None and "overdue" in reason else -1
         self.is_away, self._since_ns, self._gap_ns = True, now_ns, 0
         if core.epoch == 0:
             core.say("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
@@ -49,10 +53,12 @@ class Absence:
         core.say("warning", f"lost the vHub: {reason}; the run waits for it at tick {core.frame.tick}")
 
     def hear(self, now_ns: int) -> None:
-        """The vHub that is lost is heard of: it is back, unless that was said before it went."""
+        """The vHub that is lost is heard of: it is back, unless that was said before it went, or it still stands."""
         core = self._core
         process = core.roster.by_name[channels.VHUB]
-        if core.end is None and now_ns > max(self._since_ns, process.gone_ns) + SAID_NS:
+        told = process.heartbeat
+        goes_on = self._tick < 0 or (told is not None and told.tick > self._tick)
+        if core.end is None and goes_on and now_ns > max(self._since_ns, process.gone_ns) + SAID_NS:
             process.lost = False
             self.ready(now_ns)
 

@@ -18,7 +18,7 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.messages import Deliveries, Epoch, Go
 from foosim.rehearsal import hub_journal
 from foosim.rehearsal.bus import Traced, Weather
-from foosim.rehearsal.hub_journal import Ending
+from foosim.rehearsal.hub_journal import ENDINGS, Ending
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.core import HubCore
@@ -30,7 +30,6 @@ TICKS: Final = 240
 MS: Final = 1_000_000
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms")
-ENDINGS: Final[tuple[Ending, ...]] = ("now", "torn", "unsaid")
 Fault = tuple[int, Callable[[System], object]]
 
 
