@@ -97,12 +97,6 @@ def first_frame(deployment: Deployment, start: Start | None) -> Frame:
     return frame
 
 
-def added_to(deployment: Deployment, layout: Layout) -> list[AddedEntity]:
-    """Return the entities of a layout beside the deployment's."""
-    base = build_layout(deployment)
-    return [AddedEntity(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
-
-
 def first_chain(origin: Origin | None) -> bytes:
     """Return the chain over the frames up to the one that a run begins with."""
     return CHAIN_START if origin is None else origin.chain

@@ -141,8 +141,8 @@ def recover(
     """Make a capture valid that its writer left unfinished; what a journal has is added.
 
     It is changed in place: cut behind the last whole chunk, completed, and ended. Bytes that are damaged and not just
-    cut are only given up when the journal has what they held. A start of `foosim-supervisor` does this by itself with
-    what runs of this user left.
+    cut are only given up when the journal has what they held. `foosim-supervisor up` does this by itself with what
+    earlier ones of the same user left.
     """
     with _read():
         found = recover_capture(capture, journals)

@@ -48,7 +48,8 @@ class Replica:
             self._bus.subscribe(node, channels.NODE_READS)
         for node in self._nodes:
             origin = None if start is None else start.origin
-            build = Build(node, "boot", SOURCE, name, text, "fast", self._added(self.frame.layout), origin)
+            added = self._added(self.frame.layout)
+            build = Build(node, "boot", "first", SOURCE, name, text, "fast", added, origin)
             self._say(channels.BUILD, node, encode(build))
         self._settle()
         owners = sorted(deployment.owners().items())

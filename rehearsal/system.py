@@ -7,9 +7,9 @@ the virtual clock (`slow_ns`), may have its engines rebuilt, may be asked someth
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from heapq import heappop, heappush
 from typing import Any, Final
 
 from foosim.client.core import ClientCore
@@ -28,6 +28,7 @@ from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
 from foosim.rehearsal.hub_journal import Ending, HubJournal
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.records import fold
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
@@ -72,6 +73,8 @@ class Settings:
     supervisor: type[SupervisorCore] = SupervisorCore
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
+    keeps_journals: bool = False
+    """Whether the supervisor's journal is kept, so that it can be started again."""
     restart_ns: int = 0
     """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
     observer: Observer | None = None
@@ -96,15 +99,20 @@ class System:
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
         self._timers: list[tuple[int, int, Callable[[], object]]] = []
+        self._frames: list[Frame] = []
+        """Committed in the present turn of the supervisor."""
+        self._dying: dict[str, int] = {}
+        """Processes that end amid their next actions: how many of these they still perform."""
         self._boots = 0
+        self._run = settings
+        self._journal: list[bytes] = []
+        """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
-        self.supervisor.on_commit = self._committed
-        deployment = self.supervisor.deployment
-        self._enter(channels.SUPERVISOR, self.supervisor, self.supervisor.advance, channels.SUPERVISOR_READS)
-        self.processes[channels.SUPERVISOR].took = self.supervisor.watch.took
         self.hub_journal = HubJournal()
         self.hub: HubCore
+        deployment = self.supervisor.deployment
+        self._enter_supervisor()
         self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
@@ -137,6 +145,12 @@ class System:
         self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
         self.processes[channels.VHUB].took = hub.waits.took
 
+    def _enter_supervisor(self) -> None:
+        core = self.supervisor
+        core.on_commit = self._frames.append
+        self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
+        self.processes[channels.SUPERVISOR].took = core.watch.took
+
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
         core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.bus.now_ns)
@@ -168,8 +182,7 @@ class System:
                 continue
             deadline_ns = self._deadline_ns()
             if self._timers and self._timers[0][0] <= min(deadline_ns, arrival_ns or deadline_ns):
-                bus.now_ns, _, action = heapq.heappop(self._timers)
-                action()
+                self._go_off()
                 continue
             if arrival_ns is not None and arrival_ns <= deadline_ns:
                 bus.now_ns = arrival_ns
@@ -242,6 +255,10 @@ class System:
         actions = process.core.actions
         if not actions:
             return
+        left = self._dying.pop(process.name, None)
+        if left is not None:
+            del actions[left:]
+            self.processes.pop(process.name)
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
@@ -259,6 +276,8 @@ class System:
             else:
                 self._keep(leaves_ns, process, action)
         actions.clear()
+        if process.core is self.supervisor and self._frames:
+            self._tell_commits(was_cut=left is not None)
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             farewell = self.hub.farewell()
             self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
@@ -271,6 +290,8 @@ class System:
             self._trace(now_ns, process, "journal", "", action.record)
             if process.core is self.hub:
                 self.hub_journal.append(action.record)
+            if settings.keeps_journals and process.core is self.supervisor:
+                self._journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
         elif isinstance(action, Keep):
@@ -288,11 +309,17 @@ class System:
         if self.settings.observer is not None:
             self.settings.observer(Traced(now_ns, process.name, what, channel, payload))
 
-    def _committed(self, frame: Frame) -> None:
-        self._last_commit_ns = self.bus.now_ns
-        if self.settings.on_commit is not None:
-            self.settings.on_commit(frame)
-        self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
+    def _tell_commits(self, was_cut: bool) -> None:
+        """Tell of the frames that were committed; what a supervisor that ended had not written never was."""
+        frames = self._frames.copy()
+        self._frames.clear()
+        written = fold(self.supervisor.deployment, self._journal).frame.tick if was_cut else frames[-1].tick
+        for frame in frames:
+            if frame.tick <= written:
+                self._last_commit_ns = self.bus.now_ns
+                if self.settings.on_commit is not None:
+                    self.settings.on_commit(frame)
+                self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
 
     def _where(self) -> str:
         nodes = {name: process.core.waiting_for for name, process in self.processes.items() if name in self.solvers}
@@ -304,17 +331,45 @@ class System:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
 
+    def later(self, after_ns: int, action: Callable[[], object]) -> None:
+        """Call `action` when some virtual time has passed."""
+        self._boots += 1
+        heappush(self._timers, (self.bus.now_ns + after_ns, self._boots, action))
+
+    def _go_off(self) -> None:
+        due_ns, _, action = heappop(self._timers)
+        self.bus.now_ns = max(self.bus.now_ns, due_ns)
+        self._next.append(action)
+
     def kill(self, name: str) -> None:
-        """End a node's process at once: what is on its way to it is lost, the supervisor sees the connection close."""
+        """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
         self.processes.pop(name)
+        if name == channels.SUPERVISOR:
+            return
         self.solvers.pop(name).close()
-        self.supervisor.process_gone(name, self.bus.now_ns)
-        self._turn(self.processes[channels.SUPERVISOR])
+        self._supervisor_sees_gone(name)
+
+    def end_amid(self, name: str, actions: int) -> None:
+        """End the supervisor amid its next turn, when it has performed so many of its actions."""
+        self._dying[name] = actions
+
+    def is_dying(self, name: str) -> bool:
+        """Whether a process ends amid its next turn."""
+        return name in self._dying
 
     def start(self, name: str) -> None:
-        """Start a node's process again, with a new boot."""
+        """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""
         assert name not in self.processes, f"{name} is running"
-        self._enter_node(name, library_fingerprint())
+        if name == channels.SUPERVISOR:
+            self._boots += 1
+            history = fold(self.supervisor.deployment, self._journal)
+            boot = f"boot-{self._boots}"
+            self.supervisor = self.settings.supervisor(
+                self._run, library_fingerprint(), self.bus.now_ns, boot, history=history
+            )
+            self._enter_supervisor()
+        else:
+            self._enter_node(name, library_fingerprint())
         self._wake(self.processes[name])
 
     def _start_again(self, name: str, refused: Solver) -> None:
@@ -341,13 +396,16 @@ class System:
         self.hub_journal.ending = None
         self.processes.pop(channels.VHUB)
         self.hub.actions.clear()
-        self.after(self._hub_back_ns, self._start_hub)
-        now_ns = self.bus.now_ns
-        self.supervisor.process_gone(channels.VHUB, now_ns)
-        for loop in self.players.values():
-            loop.core.hub_gone(now_ns)
-        for name in (channels.SUPERVISOR, *self.players):
+        self.later(self._hub_back_ns, self._start_hub)
+        self._supervisor_sees_gone(channels.VHUB)
+        for name, loop in self.players.items():
+            loop.core.hub_gone(self.bus.now_ns)
             self._turn(self.processes[name])
+
+    def _supervisor_sees_gone(self, name: str) -> None:
+        if channels.SUPERVISOR in self.processes:
+            self.supervisor.process_gone(name, self.bus.now_ns)
+            self._turn(self.processes[channels.SUPERVISOR])
 
     def _start_hub(self) -> None:
         self._enter_hub(library_fingerprint())
@@ -355,11 +413,6 @@ class System:
         for name, loop in self.players.items():
             loop.core.hub_here(self.bus.now_ns)
             self._wake(self.processes[name])
-
-    def after(self, for_ns: int, action: Callable[[], object]) -> None:
-        """Call `action` after some virtual time."""
-        self._boots += 1
-        heapq.heappush(self._timers, (self.bus.now_ns + for_ns, self._boots, action))
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import Frame, chain_next
-from foosim.protocol.start import Start, added_to, first_chain, start_with
+from foosim.protocol.layout import added_entities
+from foosim.protocol.start import Start, first_chain, start_with
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.vhub.capture_reader import CaptureData, CapturedTick, open_capture, origin_of
@@ -63,7 +64,7 @@ def start_of(capture: CaptureData) -> Start | None:
     first = capture.frame_blocks[0].frame(0) if capture.frame_blocks and len(capture.frame_blocks[0]) else None
     if first is None or first.digest != origin.digest:
         raise CaptureError(f"{capture.path}: it does not have frame {origin.tick}, with which its run began")
-    return start_with(first, origin.source, origin.chain, added_to(capture.deployment, first.layout))
+    return start_with(first, origin.source, origin.chain, added_entities(capture.deployment, first.layout))
 
 
 def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1, start: Start | None = None) -> Verified:

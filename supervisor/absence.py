@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
-from foosim.supervisor.recovery import Recovered
+from foosim.supervisor.account import Recovered
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -27,6 +27,7 @@ class Absence:
         self.is_away = False
         self._core = core
         self._since_ns = 0
+        self._reason = ""
         self._gap_ns = 0
         """The longest time between two commits since it is gone."""
         self._entry: Recovered | None = None
@@ -44,12 +45,10 @@ class Absence:
         told = None if process is None else process.heartbeat
         self._tick = told.tick if told is not None and "overdue" in reason else -1
         self.is_away, self._since_ns, self._gap_ns = True, now_ns, 0
-        if core.epoch == 0:
+        if not core.is_open:
             core.say("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
             return
-        if self._entry is None:  # else it went again before anything was committed
-            self._entry = Recovered("vhub", channels.VHUB, reason, core.frame.tick, core.epoch)
-            core.recovery.recovered.append(self._entry)
+        self._reason = reason
         core.say("warning", f"lost the vHub: {reason}; the run waits for it at tick {core.frame.tick}")
 
     def hear(self, now_ns: int) -> None:
@@ -69,23 +68,29 @@ class Absence:
         core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))
         if self.is_away:
             self.is_away = False
+            self._note()
             core.watch.begun(now_ns)
             core.say("info", f"the vHub is back after {(now_ns - self._since_ns) / 1e9:.2f} s")
 
     def committed(self, before_ns: int, now_ns: int) -> None:
         """A frame is committed, the one before it was at `before_ns`."""
-        entry = self._entry
-        if entry is not None:
+        if self.is_away:  # what was on its way when it went, or the first that it made possible
             self._gap_ns = max(self._gap_ns, now_ns - before_ns)
-            if not self.is_away:
-                entry.outage_ns, self._entry = self._gap_ns, None
+        elif self._entry is not None:
+            self._entry.outage_ns, self._entry = max(self._gap_ns, now_ns - before_ns), None
 
     def is_over(self, now_ns: int) -> bool:
         """Whether the vHub was away for longer than a run waits; then the run is over, which is said."""
         core = self._core
-        if not self.is_away or core.epoch == 0 or now_ns < self._since_ns + core.deployment.deadlines.vhub_back_ns:
+        if not self.is_away or not core.is_open or now_ns < self._since_ns + core.deployment.deadlines.vhub_back_ns:
             return False
         wait_s = core.deployment.deadlines.vhub_back_ns / 1e9
-        reason = "" if self._entry is None else f"{self._entry.reason}; "
-        core.finish(f"lost vhub: {reason}it did not come back within {wait_s:g} s", failed=True)
+        self._note()
+        core.finish(f"lost vhub: {self._reason}; it did not come back within {wait_s:g} s", failed=True)
         return True
+
+    def _note(self) -> None:
+        """Put it into the account, when it is over: the world stood still until now."""
+        core = self._core
+        if core.is_open:
+            self._entry = core.recovery.note("vhub", channels.VHUB, self._reason, core.epoch)

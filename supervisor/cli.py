@@ -121,7 +121,6 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     folder has the run file, logs and journals.
     """
     plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, branch))
-    recover_leftovers(lambda line: print(line, file=sys.stderr))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     raise typer.Exit(serve(plan, folder))
 

@@ -60,8 +60,14 @@ def ball_text(status: dict[str, Any]) -> str:
 
 def recovery_text(entry: dict[str, Any]) -> str:
     """`tick 812: lost node blue (its connection closed), went on after 3.1 ms, epoch 2`; or who came (back)."""
-    name = "the vHub" if entry["what"] == "vhub" else f"node {entry['name']}"
-    what = f"{name} takes part" if entry["what"] == "join" else f"lost {name} ({entry['reason']})"
+    name = entry["name"]
+    texts = {
+        "node": f"lost node {name} ({entry['reason']})",
+        "join": f"node {name} takes part",
+        "vhub": f"lost the vHub ({entry['reason']})",
+        "supervisor": "the supervisor was started again",
+    }
+    what = texts[entry["what"]]
     after = "" if entry["outage_ms"] is None else f", went on after {entry['outage_ms']:.1f} ms"
     return f"tick {entry['tick']}: {what}{after}, epoch {entry['epoch']}"
 

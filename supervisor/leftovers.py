@@ -13,17 +13,17 @@ from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import decode_any
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.journal import JournalError, journal_files, read_records, remove_journal
-from foosim.supervisor.run_folder import RunFolder, ended_runs
+from foosim.supervisor.run_folder import RunFolder, left_runs
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.records import HeadRecord, HubRecord
 
 
 def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> None:
-    """Recover the captures of this user's runs that are over, one line for each; the run `but` is left as it is.
+    """Recover the captures of runs of this user whose launcher is gone, a line each; the run `but` is left as it is.
 
     A vHub's journal goes when its capture is whole. What cannot be recovered stays, and is said.
     """
-    for folder in ended_runs():
+    for folder in left_runs():
         path = captured_at(folder)
         if path is None or folder.name == but or not path.is_file():
             continue

@@ -26,6 +26,7 @@ KEPT_RUNS: Final = 20
 RUN_FILE: Final = "run.json"
 RESULT_FILE: Final = "result.json"
 LOCK_FILE: Final = "lock"
+LAUNCHER_FILE: Final = "launcher"
 HOLD_TRIES: Final = 50
 SPARE_FILE: Final = "spare"
 SPARE_BYTES: Final = 64 * 1024
@@ -55,6 +56,7 @@ class RunFolder:
         self.path = path
         self.name = path.name
         self._lock: int | None = None
+        self._launcher: int | None = None
 
     @property
     def logs(self) -> Path:
@@ -83,6 +85,15 @@ class RunFolder:
         os.close(lock)
         raise NoRun(f"run {self.name} has a supervisor already")
 
+    def hold_launcher(self) -> None:
+        """Lock the folder as the launcher of its run, until this process ends: somebody looks after the run."""
+        self._launcher = os.open(self.path / LAUNCHER_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        fcntl.flock(self._launcher, fcntl.LOCK_EX)
+
+    def is_left(self) -> bool:
+        """Whether the run had a launcher, which is gone, and has no supervisor: nobody starts its processes again."""
+        return (self.path / LAUNCHER_FILE).exists() and not self._is_locked(LAUNCHER_FILE) and not self.is_live()
+
     def release(self) -> None:
         """Give the lock back: the run is over."""
         if self._lock is not None:
@@ -91,8 +102,11 @@ class RunFolder:
 
     def is_live(self) -> bool:
         """Whether a supervisor holds the folder."""
+        return self._is_locked(LOCK_FILE)
+
+    def _is_locked(self, name: str) -> bool:
         try:
-            lock = os.open(self.path / LOCK_FILE, os.O_RDONLY | os.O_CLOEXEC)
+            lock = os.open(self.path / name, os.O_RDONLY | os.O_CLOEXEC)
         except FileNotFoundError:
             return False
         try:
@@ -190,9 +204,9 @@ def live_runs() -> list[RunFolder]:
     return [folder for folder in _newest_first(runs_folder()) if folder.is_live()]
 
 
-def ended_runs() -> list[RunFolder]:
-    """Return the runs of this user that are over, the newest first."""
-    return [folder for folder in _newest_first(runs_folder()) if not folder.is_live()]
+def left_runs() -> list[RunFolder]:
+    """Return the runs of this user that nobody looks after any more, the newest first."""
+    return [folder for folder in _newest_first(runs_folder()) if folder.is_left()]
 
 
 def run_exists(name: str) -> bool:

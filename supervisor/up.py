@@ -38,6 +38,8 @@ LEAVE_S: Final = 1.0
 """How long the others may take to end when the supervisor has: it waited for the vHub's capture."""
 STALLED_S: Final = 1.0
 """How long a node that is lost may take to come back by itself before its process is killed."""
+STALLED_TRIES: Final = 5
+"""How many questions a supervisor may leave unanswered for a second each before its process is killed."""
 LOST_S: Final = 3.0
 """How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
 STATUS_S: Final = 1.0
@@ -92,6 +94,7 @@ class Up:
         self.capture = capture
         self.display = display
         self.folder: RunFolder = create_run(plan.deployment.world, run)
+        self.folder.hold_launcher()
         self._launcher = Launcher()
         self._interrupts = 0
         self._ending_s = 0.0
@@ -105,6 +108,8 @@ class Up:
         """Processes that are lost though their processes live: which process, since when."""
         self._stopped: set[str] = set()
         """Nodes that somebody stopped."""
+        self._unanswered = 0
+        """Questions to the supervisor since its last answer."""
         self._told = 0
         """How many of the run's recoveries were shown."""
 
@@ -187,10 +192,13 @@ class Up:
                 time.sleep(WATCH_S)
 
     def _show(self, control: Control) -> None:
+        supervisor = self._launcher.children[SUPERVISOR]
         try:
-            status = control.status(STATUS_S)
+            status = control.status(STATUS_S, lambda: supervisor.exit_code is not None)
         except NoAnswer:
+            self._end_stalled_supervisor(supervisor)
             return
+        self._unanswered = 0
         now_s = time.monotonic()
         self._tell_recoveries(status["recoveries"])
         if not self._has_ended:
@@ -227,6 +235,26 @@ class Up:
                 self.display.say(f"{child.name} does not answer any more: it is killed")
                 child.process.kill()
 
+    def _end_stalled_supervisor(self, supervisor: Child) -> None:
+        """Kill a supervisor that hangs: a new one goes on with the run."""
+        if supervisor.exit_code is not None or self._has_ended or self._ending_s:
+            return
+        self._unanswered += 1
+        if self._unanswered >= STALLED_TRIES:
+            self._unanswered = 0
+            self.display.say("the supervisor does not answer any more: it is killed")
+            supervisor.process.kill()
+
+    def _comes_back(self, supervisor: Child, now_s: float) -> bool:
+        """Start a supervisor again that ended before the run did; False when the run is over, or it is given up."""
+        over = self._ending_s or self._has_ended or self.folder.info() is None or self.folder.result() is not None
+        if over or supervisor.exit_code in (DONE, REFUSED):
+            return False
+        if not self._restarts.is_known(SUPERVISOR):
+            self._restart_later(supervisor, now_s)
+        self._start_due(now_s)
+        return SUPERVISOR not in self._restarts.failed
+
     def _restart_ended(self, now_s: float, knows: bool = False) -> None:
         """Start nodes and the vHub again that ended while the run goes on; who ends again and again is given up.
 
@@ -234,22 +262,28 @@ class Up:
         """
         for child in self._launcher.ended():
             name = child.name
-            if not self._comes_back(name) or name in self._stopped or child.exit_code == DONE:
+            if not self._is_replaced(name) or name in self._stopped or child.exit_code == DONE:
                 continue
             if self._restarts.is_known(name):
                 continue
             if child.exit_code == REFUSED and not knows:
                 continue  # it may have been stopped since the last status
-            wait_s = self._restarts.ended(name, now_s, at_once=name == VHUB)
-            after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s" if wait_s else "starts again"
-            self.display.say(f"{name} {child.ending}, {after}; its log is {child.log}")
+            self._restart_later(child, now_s)
+        self._start_due(now_s)
+
+    def _restart_later(self, child: Child, now_s: float) -> None:
+        wait_s = self._restarts.ended(child.name, now_s, at_once=child.name == VHUB)
+        after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s" if wait_s else "starts again"
+        self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
+
+    def _start_due(self, now_s: float) -> None:
         for name in self._restarts.due(now_s):
             child = self._launcher.children[name]
             command = self._vhub_again() if name == VHUB else child.command
             self._launcher.start(name, command, child.log)
 
-    def _comes_back(self, name: str) -> bool:
-        """Whether the run waits for this process when it ends, and another one takes its place."""
+    def _is_replaced(self, name: str) -> bool:
+        """Whether another process takes the place of this one when it ends, and the run goes on."""
         return name == VHUB or name in self.plan.deployment.nodes
 
     def _vhub_again(self) -> list[str]:
@@ -266,6 +300,8 @@ class Up:
         supervisor = self._launcher.children[SUPERVISOR]
         now_s = time.monotonic()
         if supervisor.exit_code is not None:
+            if self._comes_back(supervisor, now_s):
+                return True
             if supervisor.exit_code == FAILED:  # it may have noticed a loss, and ended, since we looked last
                 self._look_for_lost(now_s)
             return False
@@ -286,7 +322,7 @@ class Up:
 
     def _ends_run(self, child: Child) -> bool:
         """Whether the run cannot go on without this child, which has ended."""
-        return child.exit_code != 0 and not (self._has_begun and self._comes_back(child.name))
+        return child.exit_code != 0 and not (self._has_begun and self._is_replaced(child.name))
 
     def _look_for_lost(self, now_s: float) -> None:
         """Note the first child that ended as none should; one that was killed before those that ended because of it."""

@@ -1,16 +1,19 @@
 """The commits that the vHub has: frames in order, and what came before its turn.
 
 A layout is what the commits before say, so they are read in order; one that comes early waits for those before it.
-Neighbours: `core` closes the ticks of these frames.
+What is committed last is what a supervisor that takes over may have lost. Neighbours: `core` closes the ticks of these
+frames.
 """
 
 from __future__ import annotations
 
 from foosim.protocol import limits
+from foosim.protocol.channels import VHUB
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
-from foosim.protocol.layout import Layout
-from foosim.protocol.messages import Commit
+from foosim.protocol.frame import Frame, chain_next, frame_from_bytes, layout_after
+from foosim.protocol.layout import Layout, added_entities
+from foosim.protocol.messages import Commit, Standing
 
 Committed = tuple[bytes, Commit, Frame]
 """A commit as it came, read, and its frame."""
@@ -22,14 +25,20 @@ class Commits:
     def __init__(self) -> None:
         self.layout: Layout | None = None
         self.next_tick = 0
+        self._chains: dict[int, bytes] = {}
         self._frames: dict[int, Committed] = {}
         self._early: dict[int, tuple[bytes, Commit]] = {}
 
-    def start(self, layout: Layout | None, tick: int, last: Committed | None = None) -> None:
-        """Begin with the frame of a tick and the layout before it; `last` is the frame before, where that is known."""
+    def start(self, layout: Layout | None, tick: int, chain: bytes, last: Committed | None = None) -> None:
+        """Begin with the frame of a tick, and what was before: the layout, the chain, and the last frame if any."""
         self.layout, self.next_tick = layout, tick
+        self._chains[tick - 1] = chain
         if last is not None:
             self._frames[tick - 1] = last
+
+    def chain_at(self, tick: int) -> bytes:
+        """Return the chain over the digests of the frames up to a tick's, without the one that a run begins with."""
+        return self._chains[tick]
 
     def take(self, commit: Commit, payload: bytes) -> list[int]:
         """Take a commit; return the ticks whose frames are there by it, none for a repeat or one that came early.
@@ -55,9 +64,17 @@ class Commits:
     def __contains__(self, tick: int) -> bool:
         return tick in self._frames
 
+    def standing(self, deployment: Deployment, epoch: int) -> Standing:
+        """Return how far the world has come here."""
+        assert self.layout is not None
+        last = self._frames.get(self.next_tick - 1)
+        added = added_entities(deployment, self.layout)
+        return Standing(VHUB, epoch, b"" if last is None else last[0], self._chains[self.next_tick - 1], added)
+
     def forget(self, tick: int) -> None:
         """Nobody asks for this tick any more."""
         self._frames.pop(tick, None)
+        self._chains.pop(tick, None)
 
     def _read(self, commit: Commit, payload: bytes) -> int:
         assert self.layout is not None
@@ -65,6 +82,8 @@ class Commits:
         frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
         if frame.digest != commit.digest:
             raise Malformed(f"commit {commit.tick} whose frame has another digest")
+        chain, begins = self._chains[commit.tick - 1], commit.tick - 1 not in self._frames
+        self._chains[commit.tick] = chain if begins else chain_next(chain, commit.digest)
         self.layout = layout
         self.next_tick += 1
         self._frames[commit.tick] = payload, commit, frame

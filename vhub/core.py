@@ -20,7 +20,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
+from foosim.protocol.layout import added_entities
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
     DONE_OF,
@@ -37,17 +37,19 @@ from foosim.protocol.messages import (
     Farewell,
     Heartbeat,
     Join,
+    Recall,
     Samples,
     Tempo,
     Up,
     Want,
 )
 from foosim.protocol.patience import Patience
+from foosim.protocol.start import first_chain
 from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
-from foosim.vhub.keeping import Keep, KeepEpoch, Keeping
-from foosim.vhub.packet import IN_FLIGHT, Flight
+from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closing
+from foosim.vhub.packet import Flight
 from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
 from foosim.vhub.report import HubStatistics, report, statistics
@@ -103,6 +105,7 @@ class HubCore:
             Samples: self._on_samples,
             Epoch: self._on_epoch,
             Want: self._on_want,
+            Recall: self._on_recall,
             Build: self._on_build,
             Tempo: self._on_tempo,
             End: self._on_end,
@@ -243,23 +246,9 @@ class HubCore:
         released = state.close_world(frame, packets, closing.fates)
         due = state.due_members(tick)
         for name in due:
-            self._go(name, tick, released.pop(name, []), now_ns)
+            self.door.go(name, tick, released.pop(name, []), now_ns)
         self._world = _World(frame, closing, raw, [name for name in due if name in self.sessions.by_name], released)
         return True
-
-    def _go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
-        assert self.state is not None and self.deployment is not None and self.releases is not None
-        member = self.state.members[name]
-        member.downlink += 1
-        session = self.sessions.by_name.get(name)
-        if session is None:
-            return
-        for flight in flights:
-            flight.released_wall_ns = now_ns
-        self.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
-        deadlines = self.deployment.deadlines
-        allowed_ns = deadlines.lockstep_realtime_ns if self.releases.factor else deadlines.lockstep_fast_ns
-        session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns))
 
     def _close_clients(self, now_ns: int) -> bool:
         """Phase two, when all Dones are there: judge what clients sent, write, speak."""
@@ -313,10 +302,9 @@ class HubCore:
         commit, _, frame = self._commits.get(self.state.closed) or (b"", None, None)
         layout = self._commits.layout if frame is None else frame.layout
         assert layout is not None
-        base = build_layout(self.state.deployment)
-        added = [(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
-        snapshot, run = self.state.snapshot(), self.member.build.run
-        return encode(HeadRecord(run, snapshot, added, commit, self._epoch_payload, self.capture_file))
+        added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
+        where = commit, self._epoch_payload, self.capture_file, self._commits.chain_at(self.state.closed)
+        return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added, *where))
 
     def _release(self, now_ns: int) -> None:
         """Say what is released to free-running clients by now; closings of which nothing waits go to the capture."""
@@ -333,23 +321,27 @@ class HubCore:
     # --- messages ----------------------------------------------------------------------------------------------------
 
     def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
-        if self.member.take_build(build):
-            self.deployment = self.member.deployment
-        else:
+        if not self.member.take_build(build):
             self.repeated += 1
+            return
+        self.deployment = self.member.deployment
+        if self.state is not None:  # of a supervisor that has recalled us
+            self.member.is_ready = False
+            self.ready_if_complete()
 
     def begin(self, past: Past | None, now_ns: int) -> None:
         """Take part, once there is a build: from the start, or from where the vHub before ended, as its journal says.
 
         The shell calls it, since only the shell can read the journal.
         """
-        deployment = self.deployment
-        assert deployment is not None and self.state is None, "begin once, after the build"
+        deployment, build = self.deployment, self.member.build
+        assert deployment is not None and build is not None and self.state is None, "begin once, after the build"
         self.releases = Releases(deployment.tick_ns)
         self.sessions.downlinks.kept_ns = deployment.deadlines.client_back_ns
+        self.member.standing = self._standing
         if past is None:
             self.state = HubState(deployment, self.member.first_tick)
-            self._commits.start(self.member.layout, self.member.first_tick)
+            self._commits.start(self.member.layout, self.member.first_tick, first_chain(build.origin))
         else:
             self._go_on(past, now_ns)
         self.actions.append(Journal(self.head()))
@@ -359,7 +351,7 @@ class HubCore:
         """Be the vHub that was there before: say its last deliveries again, and ask for what comes after."""
         assert self.deployment is not None
         state = self.state = past.state
-        self._commits.start(past.layout, state.closed + 1, past.committed)
+        self._commits.start(past.layout, state.closed + 1, past.chain, past.committed)
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
         self.door.go_on(past.inputs, now_ns)
@@ -367,6 +359,14 @@ class HubCore:
         if past.epoch is not None:
             self._take_epoch(past.epoch)
         self._patience.progress(self.deployment.tick_ns, now_ns)
+
+    def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
+        self.repeated += not self.member.recall(recall)
+
+    def _standing(self) -> Publish:
+        """Say how far the world has come here: a supervisor that was started again may have lost more."""
+        assert self.deployment is not None
+        return Publish(channels.STANDING, channels.VHUB, encode(self._commits.standing(self.deployment, self._epoch)))
 
     def ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined, or had joined the one before it."""
@@ -384,10 +384,9 @@ class HubCore:
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if self.state is None:
             return
-        if epoch.epoch == self._epoch:
-            self.member.entered()  # of a hub that goes on: the supervisor has heard of it
         if epoch.epoch <= self._epoch:
             self.repeated += 1
+            self.member.repeated(epoch.epoch == self._epoch)
             return
         self.member.check_epoch(epoch)
         first = self._epoch == 0
@@ -478,15 +477,8 @@ class HubCore:
         self._release(now_ns)
         committed = last or self._commits.get(self.state.closed + 1) or self._commits.get(self.state.closed)
         if committed is not None:
-            _, commit, frame = committed
-            flights = self.state.in_flight()
-            for flight in flights:
-                flight.cause = IN_FLIGHT
-            delivered = self.state.deliveries.get(frame.tick - 1, [])
-            final = Closing(frame, commit.digest, commit.edits, delivered, wall_ns=now_ns)
-            final = final if self._world is None else self._world.closing  # a tick that is half closed has fates
-            final.fates += flights
-            self.actions.append(Keep(final))
+            half = None if self._world is None else self._world.closing  # a tick that is half closed has fates
+            self.actions.append(Keep(last_closing(self.state, committed, half, now_ns)))
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1

@@ -16,7 +16,7 @@ import msgspec
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit, Delivered, Edit, Epoch, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
@@ -37,6 +37,8 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     epoch: bytes = b""
     capture: str = ""
     """Where the capture is; empty when there is none."""
+    chain: bytes = CHAIN_START
+    """Over the frames up to that of the last closed tick."""
 
 
 class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", forbid_unknown_fields=True):
@@ -149,6 +151,7 @@ class Fold:
         self.layout = build_layout(deployment, head.added)
         self.commit = head.commit
         self.epoch = head.epoch
+        self.chain = head.chain
         self.inputs: InputsRecord | None = None
         """Who joins and leaves at the tick behind the last closed one, where that was written."""
 
@@ -184,6 +187,8 @@ class Fold:
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
+        if self.commit:  # the frame that a run begins with is not in its chain, or is already
+            self.chain = chain_next(self.chain, commit.digest)
         self.commit, self.inputs = record.commit, None
         return Folded(state, closing, record, released)
 

@@ -136,7 +136,7 @@ class Driver:
                     self._done(action.name, message.tick)
 
     def start(self) -> None:
-        build = Build("vhub", "boot", "run-1", NAME, self.run.text, "fast", [])
+        build = Build("vhub", "boot", "first", "run-1", NAME, self.run.text, "fast", [])
         self.say(channels.BUILD, "vhub", encode(build))
         self.core.begin(None, self._now_ns)
         self._perform()
