@@ -105,7 +105,7 @@ def player(
     """Play in a run: load the class that the deployment names and let it act.
 
     The process ends with the run; it exits with 0 when the run ended, with 1 when the player failed or the vHub was
-    lost, and with 3 when the vHub would not have it.
+    gone for longer than a run waits for it, and with 3 when the vHub would not have it.
     """
     die_with_parent()
     raise typer.Exit(run_player(name, connect, world))

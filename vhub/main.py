@@ -277,6 +277,9 @@ def vhub(
 ) -> None:
     """Take part in a run as its virtual hub.
 
+    Started again with the same run folder, and listening where clients know it, it goes on from its journal and its
+    capture.
+
     It exits with 0 when the run ended and the capture is finished, with 1 when the supervisor was lost for longer than
     the deployment's `deadlines.orphan`, and with 3 when the supervisor would not have it.
     """
