@@ -216,8 +216,9 @@ def _least_value(kind: inspect.Type) -> object:
         return "x" * (kind.min_length or 0)
     if isinstance(kind, inspect.BytesType):
         return bytes(kind.min_length or 0)
-    none: dict[type[inspect.Type], object] = {inspect.FloatType: 0.0, inspect.BoolType: False, inspect.ListType: []}
-    return {**none, inspect.UnionType: None}[type(kind)]
+    if isinstance(kind, inspect.UnionType):
+        return None
+    return {inspect.FloatType: 0.0, inspect.BoolType: False, inspect.ListType: []}[type(kind)]
 
 
 def delivered(payload: bytes) -> Delivered:
