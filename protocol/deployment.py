@@ -37,6 +37,7 @@ Rate = Annotated[Fraction, Quantity(units.RATE, "1 mHz", "10 kHz")]
 LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
 AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
 Delay = Annotated[int, Quantity(units.TIME, "0 s", "60 s")]
+Size = Annotated[int, Quantity(units.SIZE, "64 KiB", "1000 TiB")]
 Spread = Annotated[int, Quantity(units.TIME, "1 ns", "60 s")]
 Deadline = Annotated[int, Quantity(units.TIME, "1 ms", "24 h")]
 Probability = Annotated[float, Quantity(units.PROBABILITY, "0 %", "100 %")]
@@ -172,6 +173,11 @@ class Capture(Part):
     frames_every: Annotated[int, Quantity(units.TICKS, "1 tick", "1000000 ticks")] = _default("10 ticks")
     poses_hz: Rate = _default("50 Hz", "poses")
     flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = _default("100 ms", "flush")
+    on_full: Literal["stop_world", "continue_unlogged"] = "stop_world"
+    """What follows when the disk has less than the reserve left, or the capture has reached `max_bytes`."""
+    reserve_bytes: Size = _default("64 MiB", "reserve")
+    """Kept free on the disks of capture and journals, so that what has to be written in the end still fits."""
+    bytes_max: Size | None = Field(default=None, alias="max_bytes")
 
 
 class AccessSpec(Part):

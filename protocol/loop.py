@@ -16,6 +16,7 @@ from typing import Any, Final, Protocol
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
 from foosim.protocol.inbox import Inbox
+from foosim.protocol.journal import JournalError
 from foosim.protocol.notify import Notify
 from foosim.protocol.session import Publisher, Session
 
@@ -121,6 +122,10 @@ class Loop:
         self.notify = Notify({})
         """Tells a service manager that the loop goes round; of itself it knows of none."""
         self.on_say: Callable[[Say], None] = lambda say: None
+        self.on_unwritten: Callable[[JournalError], None] | None = None
+        """Told once that a record could not be written; what is decided from then on is in no journal."""
+        self.holds_back: Callable[[Publish], bool] | None = None
+        """Says which messages are not to be said."""
         self.took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
         """Told how long a turn took, with all that was performed: when it began, when the loop slept again."""
         self.busy = 0.0
@@ -185,10 +190,10 @@ class Loop:
         for action in actions:
             kind = type(action)
             if kind is Publish:
-                self._wires[action.channel.plane].put(action.channel, action.name, action.payload)
+                if self.holds_back is None or not self.holds_back(action):
+                    self._wires[action.channel.plane].put(action.channel, action.name, action.payload)
             elif kind is Journal:
-                if self.journal is not None:
-                    self.journal.append(action.record)
+                self._append(action.record)
             elif kind is Say:
                 self._log.log(_LEVELS[action.level], action.text)
                 self.on_say(action)
@@ -196,6 +201,18 @@ class Loop:
                 assert self.other is not None, action
                 self.other(action)
         actions.clear()
+
+    def _append(self, record: bytes) -> None:
+        """Write a record; a journal that fails is not written any more, and who knows what follows is told."""
+        if self.journal is None:
+            return
+        try:
+            self.journal.append(record)
+        except JournalError as error:
+            if self.on_unwritten is None:
+                raise
+            self.journal = None
+            self.on_unwritten(error)
 
     def _measure(self, now_ns: int, slept_ns: int) -> None:
         self._slept_ns += slept_ns

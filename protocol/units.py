@@ -62,6 +62,8 @@ def _sizes(**units: str) -> dict[str, Fraction]:
 
 TIME: Final = Dimension("time", _sizes(ns="1", us="1e3", ms="1e6", s="1e9", min="60e9", h="3600e9"), "int")
 TICKS: Final = Dimension("number of ticks", _sizes(ticks="1", tick="1"), "int")
+_BINARY: Final = _sizes(KiB="1024", MiB="1048576", GiB="1073741824", TiB="1099511627776")
+SIZE: Final = Dimension("size", _sizes(B="1", kB="1e3", MB="1e6", GB="1e9", TB="1e12") | _BINARY, "int")
 RATE: Final = Dimension("rate", _sizes(Hz="1", kHz="1e3", mHz="1e-3"), "fraction")
 LENGTH: Final = Dimension("length", _sizes(m="1", cm="1e-2", mm="1e-3", um="1e-6"))
 MASS: Final = Dimension("mass", _sizes(kg="1", g="1e-3", mg="1e-6"))

@@ -14,6 +14,7 @@ from typing import Any
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.disk import Level
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Epoch
@@ -25,6 +26,7 @@ from foosim.supervisor.status import result
 from foosim.vhub.capture_file import origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.records import Closing
+from foosim.vhub.rows import CaptureError
 
 
 @dataclass(slots=True)
@@ -97,6 +99,8 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
         system.close()
         if writer is not None:
             writer.finish()
+    if writer is not None:
+        _check_room(writer, Level.OUT)
     wall_ns = time.perf_counter_ns() - begun_ns
     rehearsed.json = result(system.supervisor)
     simulated = rehearsed.json["ticks"] - rehearsed.json["first_tick"]
@@ -104,6 +108,12 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     rehearsed.json["capture"] = None if capture is None else str(capture)
     rehearsed.answers = system.answers
     return rehearsed
+
+
+def _check_room(writer: CaptureWriter, worst: Level) -> None:
+    """Raise CaptureError when the capture is at its end and the deployment does not want to go on without one."""
+    if writer.stops_world and writer.state.level >= worst:
+        raise CaptureError(f"the rehearsal ends, its capture is full: {writer.state.text}")
 
 
 def _open_capture(path: Path, text: str, name: str, settings: Settings, run: RunSettings) -> CaptureWriter:
@@ -118,6 +128,7 @@ def _open_capture(path: Path, text: str, name: str, settings: Settings, run: Run
         nonlocal tick
         tick = closing.frame.tick
         writer.keep(closing)
+        _check_room(writer, Level.FULL)
         if on_closing is not None:
             on_closing(closing)
 

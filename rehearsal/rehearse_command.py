@@ -32,6 +32,10 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
     swarm: Annotated[bool, typer.Option("--swarm", help="Fly the random faults of --seed: see below.")] = False,
     seeds: Annotated[int, typer.Option(help="With --swarm: how many seeds, from --seed (or 1) on.", min=1)] = 1,
+    branch: Annotated[
+        str | None,
+        typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
+    ] = None,
     capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
     version: VersionOption = False,
@@ -54,7 +58,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     settings = (*(sets or []), *([f"engine={engine}"] if engine is not None else []))
-    plan = make_plan(RunOptions(file, "fast", duration, seed, settings, LOOPBACK))
+    plan = make_plan(RunOptions(file, "fast", duration, seed, settings, LOOPBACK, branch=branch))
     free = sorted(name for name, player in plan.deployment.players.items() if not player.lockstep)
     if free:
         raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))
@@ -64,11 +68,14 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
             typer.echo(f"{process}: {level}: {text}", err=True)
 
     settled = Settings(on_say=show)
-    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settled, capture=capture).json
+    if plan.branch is not None and not json:
+        typer.echo(plan.branch.text)
+    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settled, capture=capture, start=plan.start).json
     if json:
         typer.echo(encode_json(result).decode())
     else:
-        score, seconds = result["score"], result["ticks"] * result["tick_ns"] / 1e9
+        score = result["score"]
+        seconds = (result["ticks"] - result["first_tick"]) * result["tick_ns"] / 1e9
         typer.echo(f"{seconds:.2f} s simulated at {result['rtf']}x, red {score['red']} : {score['blue']} blue")
         packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
         typer.echo(f"{result['handovers']} hand-overs of the ball, packets {packets}")

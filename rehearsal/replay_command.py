@@ -16,6 +16,7 @@ from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_ap
 from foosim.protocol.errors import BadValue, Refused
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_reader import CaptureInfo, capture_info
+from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.rows import CaptureError
 
 app = new_app()
@@ -64,7 +65,7 @@ def _describe(found: CaptureInfo) -> str:
     lines = [
         f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
         *(f"  {key}: {value}" for key, value in sorted({**found.metadata, **found.end}.items())),
-        f"  {found.ticks} ticks of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
+        f"  {_span(found)} of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
         f"  digest of the last frame {found.digest}",
         f"  digest of all ticks {found.chain}",
         f"  nodes {', '.join(found.nodes) or 'not known'}",
@@ -76,6 +77,10 @@ def _describe(found: CaptureInfo) -> str:
         *(f"    {name}: {number}" for name, number in sorted(found.versions.items())),
     ]
     return "\n".join(lines)
+
+
+def _span(found: CaptureInfo) -> str:
+    return f"{found.ticks} ticks" if not found.first_tick else f"ticks {found.first_tick} to {found.ticks}"
 
 
 @app.command()
@@ -106,6 +111,7 @@ def verify(
 def _as_json(found: Verified) -> dict[str, Any]:
     return {
         "equal": found.equal,
+        "first_tick": found.first_tick,
         "ticks": found.ticks,
         "nodes": found.nodes,
         "chain": found.chain.hex(),
@@ -118,10 +124,29 @@ def _as_json(found: Verified) -> dict[str, Any]:
 def _verdict(found: Verified) -> str:
     on = f"on {found.nodes} node{'s' if found.nodes > 1 else ''}"
     if found.equal:
-        return f"equal: {found.ticks} ticks simulated again {on}, digest of all ticks {found.chain.hex()}"
+        count = found.ticks - found.first_tick
+        return f"equal: {count} ticks simulated again {on}, digest of all ticks {found.chain.hex()}"
     if found.missing_tick >= 0:
-        return f"tick {found.missing_tick} is missing; {found.ticks} ticks before it are equal {on}"
+        return f"tick {found.missing_tick} is missing; {found.ticks - found.first_tick} ticks before it are equal {on}"
     return f"differs at tick {found.tick} in {', '.join(found.entities)}; the ticks before it are equal {on}"
+
+
+@app.command()
+def recover(
+    capture: Capture,
+    journals: Annotated[
+        Path | None, typer.Option(help="The folder of its vHub's journal, e.g. RUN/journals.", show_default=False)
+    ] = None,
+) -> None:
+    """Make a capture valid that its writer left unfinished; what a journal has is added.
+
+    It is changed in place: cut behind the last whole chunk, completed, and ended. Bytes that are damaged and not just
+    cut are only given up when the journal has what they held. `foosim-supervisor up` does this by itself with what
+    earlier ones of the same user left.
+    """
+    with _read():
+        found = recover_capture(capture, journals)
+    typer.echo(f"capture {capture} is finished already" if found is None else str(found))
 
 
 def main() -> None:

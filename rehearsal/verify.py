@@ -22,7 +22,10 @@ from foosim.vhub.rows import CaptureError
 
 @dataclass(frozen=True, slots=True)
 class Verified:
-    """What a verification found. `tick` is the first that differs, -1 if none does; `entities` are those that do."""
+    """What a verification found. `tick` is the first that differs, -1 if none does; `entities` are those that do.
+
+    `first_tick` is that of the frame that the run began with, `ticks` that of the last one that was compared.
+    """
 
     ticks: int
     nodes: int
@@ -35,6 +38,7 @@ class Verified:
     """This machine's digest of the fixed small run of an engine, in hex."""
     other_arithmetic: tuple[str, ...] = ()
     """Those that the capture has and that are others."""
+    first_tick: int = 0
 
     @property
     def equal(self) -> bool:
@@ -68,7 +72,9 @@ def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1, 
     replica = Replica(text, name, load_deployment(text, name), start=start)
     chain = first_chain(None if start is None else start.origin)
     try:
-        return replace(_compare(replica, ticks, nodes, chain), arithmetic=replica.arithmetic.hex())
+        first = replica.frame.tick
+        found = _compare(replica, ticks, nodes, chain)
+        return replace(found, arithmetic=replica.arithmetic.hex(), first_tick=first)
     finally:
         replica.close()
 

@@ -19,6 +19,7 @@ from foosim.protocol.messages import Answer
 from foosim.supervisor import control
 from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
+from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
 from foosim.supervisor.plan import RunOptions, check_certificates, make_plan
 from foosim.supervisor.remote import Remote, unit_name
@@ -44,6 +45,10 @@ Listen = Annotated[
     typer.Option("--listen", help="HOST[:PORT], by default as deployed; the radio plane listens at PORT + 1."),
 ]
 Insecure = Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")]
+From = Annotated[
+    str | None,
+    typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
+]
 RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
 
 
@@ -64,6 +69,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     pace: PaceOption = None,
     duration: For = None,
     seed: Seed = None,
+    branch: From = None,
     capture: Annotated[Path | None, typer.Option(help="By default captures/WORLD-TIME.mcap.")] = None,
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
     sets: Sets = None,
@@ -80,15 +86,20 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     ends the run in order and leaves a finished capture; a second one kills everything. What the deployment places on
     another host is started there through ssh. Nodes that it declares as `launch: manual` are waited for; their command
     line is printed.
+
+    With --from the world begins with the newest captured frame at or before that time (without a time: the last one),
+    and time goes on from there; --for counts from there, too. The deployment may differ from the captured one in
+    everything but its robots, their sensors, and the tick.
     """
     if no_capture and capture is not None:
         raise BadValue("--capture and --no-capture exclude each other", str(capture))
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch))
     warnings = check_certificates(plan)
     path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
     display = Display(sys.stderr if json else sys.stdout)
     for warning in warnings:
         display.say(warning)
+    recover_leftovers(display.say)
     try:
         outcome = Up(plan, path, display, run).run()
     except Killed as killed:
@@ -107,6 +118,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     pace: PaceOption = None,
     duration: For = None,
     seed: Seed = None,
+    branch: From = None,
     sets: Sets = None,
     engine: Engine = None,
     listen: Listen = None,
@@ -119,7 +131,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
     folder has the run file, logs and journals.
     """
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     raise typer.Exit(serve(plan, folder))
 
@@ -134,9 +146,10 @@ def _options(  # noqa: PLR0913, PLR0917  # a command's options
     listen: str | None,
     insecure: bool,
     pki: Path | None,
+    branch: str | None,
 ) -> RunOptions:
     settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]
-    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, pki)
+    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, pki, branch)
 
 
 @app.command()

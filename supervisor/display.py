@@ -72,6 +72,15 @@ def recovery_text(entry: dict[str, Any]) -> str:
     return f"tick {entry['tick']}: {what}{after}, epoch {entry['epoch']}"
 
 
+def recording_text(status: dict[str, Any]) -> str:
+    """Return what is wrong with the capture: `capture ended: ... (812 rows are not in it)`; empty when nothing is."""
+    recording = status["recording"]
+    if not recording["problem"]:
+        return ""
+    refused = f" ({recording['refused']} rows are not in it)" if recording["refused"] else ""
+    return f"capture {recording['state']}: {recording['problem']}{refused}"
+
+
 def plain_line(status: dict[str, Any]) -> str:
     """Return one line for a log or a pipe."""
     packets = status["packets"]
@@ -84,6 +93,7 @@ def plain_line(status: dict[str, Any]) -> str:
         score_text(status),
         ball_text(status),
         f"packets {packets['offered']} offered, {packets['delivered']} delivered, {packets['dropped']} dropped",
+        recording_text(status),
         "load " + " ".join(f"{name} {process['busy']:.0%}" for name, process in status["processes"].items()),
     ]
     return " | ".join(part for part in parts if part)
@@ -112,7 +122,9 @@ def _head(status: dict[str, Any]) -> Text:
     lag = lag_text(status)
     waiting = f"waiting for {status['waiting_for']}" if status["state"] in ("starting", "paused") else ""
     third = " · ".join(part for part in (lag, waiting if status["waiting_for"] else "") if part)
-    return Text("\n".join([*lines, third] if third else lines))
+    head = Text("\n".join([*lines, third] if third else lines))
+    wrong = recording_text(status)
+    return head.append(f"\n{wrong}", style="bold red") if wrong else head
 
 
 def _processes(status: dict[str, Any]) -> Table:

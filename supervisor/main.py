@@ -23,13 +23,14 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, journal_files, read_newest, remove_journal
+from foosim.protocol.journal import Journal, JournalError, journal_files, read_newest, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.notify import Notify
 from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.journal_room import JournalRoom
 from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.records import History, fold
 from foosim.supervisor.run_folder import RESULT_FILE, RunFolder, RunInfo
@@ -42,7 +43,7 @@ class SupervisorProcess:
     def __init__(
         self, plan: Plan, folder: RunFolder, session: Session, inbox: Inbox, journal: Journal, history: History | None
     ) -> None:
-        settings = RunSettings(folder.name, str(plan.options.file), plan.text, plan.pace, plan.ticks)
+        settings = RunSettings(folder.name, str(plan.options.file), plan.text, plan.pace, plan.ticks, plan.start)
         start = time.monotonic_ns(), new_boot(), clock_name()
         self.core = SupervisorCore(settings, library_fingerprint(), *start, history)
         self._folder = folder
@@ -69,6 +70,8 @@ class SupervisorProcess:
         self._turned_tick = 0
         self._loop.notify = Notify()
         self._loop.turn = self._turn
+        self._loop.on_unwritten = self._on_unwritten
+        self._room = JournalRoom(folder.journals, plan.deployment.capture.reserve_bytes)
         self._loop.took = self.core.watch.took
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
@@ -100,17 +103,26 @@ class SupervisorProcess:
         if self._is_told_to_end:
             self._is_told_to_end = False
             self.core.stop()
-        if not self.core.actions:
-            self._turn_journal()
+        if not self.core.actions and self._loop.journal is not None:
+            self._turn_journal(now_ns)
         self.core.advance(now_ns)
         self._note_radio()
 
-    def _turn_journal(self) -> None:
+    def _turn_journal(self, now_ns: int) -> None:
         """Begin a new file when one is full; the one before it stays until the next turn, when this one is synced."""
         tick = self.core.frame.tick
-        if self._journal.rotate_if_full(self.core.head, tick):
-            self._journal.forget_before(self._turned_tick)
-            self._turned_tick = tick
+        self._room.look(now_ns, self.core)
+        try:
+            if self._journal.rotate_if_full(self.core.head, tick):
+                self._journal.forget_before(self._turned_tick)
+                self._turned_tick = tick
+        except JournalError as error:
+            self._loop.journal = None
+            self._on_unwritten(error)
+
+    def _on_unwritten(self, error: JournalError) -> None:
+        """The journal has failed: the run ends. What is committed by then is said, so that the capture has it."""
+        self.core.finish(f"lost the journal: {error}", failed=True)
 
     def _note_radio(self) -> None:
         """Write into the run file where clients find the vHub, when it tells."""

@@ -18,6 +18,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Origin
 from foosim.protocol.start import Start
 from foosim.protocol.units import Pace, parse_ns, parse_pace
+from foosim.vhub.branching import Branch, read_branch
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,8 @@ class RunOptions:
     """Where to listen; None is where the deployment says."""
     insecure: bool = False
     pki: Path | None = None
+    branch: str | None = None
+    """`CAPTURE@12.5s`: begin with that frame."""
 
     @property
     def all_sets(self) -> tuple[str, ...]:
@@ -47,6 +50,7 @@ class RunOptions:
         given += ["--pace", self.pace] if self.pace is not None else []
         given += ["--for", self.duration] if self.duration is not None else []
         given += ["--seed", str(self.seed)] if self.seed is not None else []
+        given += ["--from", self.branch] if self.branch is not None else []
         for setting in self.sets:
             given += ["--set", setting]
         return given
@@ -84,7 +88,10 @@ class RunSettings:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Options that were checked: the canonical text and what is in it, and when it ends (0 ticks: when asked to)."""
+    """Options that were checked: the canonical text and what is in it, and when it ends (0 ticks: when asked to).
+
+    `branch` is the captured frame that it begins with, None for frame 0.
+    """
 
     options: RunOptions
     text: str
@@ -92,6 +99,11 @@ class Plan:
     pace: Pace
     ticks: int
     address: Address
+    branch: Branch | None = None
+
+    @property
+    def start(self) -> Start | None:
+        return None if self.branch is None else self.branch.start
 
 
 def check_certificates(plan: Plan) -> list[str]:
@@ -120,4 +132,5 @@ def make_plan(options: RunOptions) -> Plan:
         ticks = -(-parse_ns(options.duration) // deployment.tick_ns)
         if ticks == 0:
             raise BadValue("a run has at least one tick", options.duration)
-    return Plan(options, text, deployment, pace, ticks, address)
+    branch = None if options.branch is None else read_branch(options.branch, deployment)
+    return Plan(options, text, deployment, pace, ticks, address, branch)

@@ -26,7 +26,11 @@ KEPT_RUNS: Final = 20
 RUN_FILE: Final = "run.json"
 RESULT_FILE: Final = "result.json"
 LOCK_FILE: Final = "lock"
+LAUNCHER_FILE: Final = "launcher"
 HOLD_TRIES: Final = 50
+SPARE_FILE: Final = "spare"
+SPARE_BYTES: Final = 64 * 1024
+"""Kept on the disk while the run lives, so that its result can be written when the disk is full."""
 
 
 class NoRun(Failed):
@@ -53,6 +57,7 @@ class RunFolder:
         self.path = path
         self.name = path.name
         self._lock: int | None = None
+        self._launcher: int | None = None
 
     @property
     def logs(self) -> Path:
@@ -76,9 +81,19 @@ class RunFolder:
                 time.sleep(0.01)
                 continue
             self._lock = lock
+            (self.path / SPARE_FILE).write_bytes(bytes(SPARE_BYTES))
             return
         os.close(lock)
         raise NoRun(f"run {self.name} has a supervisor already")
+
+    def hold_launcher(self) -> None:
+        """Lock the folder as the launcher of its run, until this process ends: somebody looks after the run."""
+        self._launcher = os.open(self.path / LAUNCHER_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        fcntl.flock(self._launcher, fcntl.LOCK_EX)
+
+    def is_left(self) -> bool:
+        """Whether the run had a launcher, which is gone, and has no supervisor: nobody starts its processes again."""
+        return (self.path / LAUNCHER_FILE).exists() and not self._is_locked(LAUNCHER_FILE) and not self.is_live()
 
     def release(self) -> None:
         """Give the lock back: the run is over."""
@@ -88,8 +103,11 @@ class RunFolder:
 
     def is_live(self) -> bool:
         """Whether a supervisor holds the folder."""
+        return self._is_locked(LOCK_FILE)
+
+    def _is_locked(self, name: str) -> bool:
         try:
-            lock = os.open(self.path / LOCK_FILE, os.O_RDONLY | os.O_CLOEXEC)
+            lock = os.open(self.path / name, os.O_RDONLY | os.O_CLOEXEC)
         except FileNotFoundError:
             return False
         try:
@@ -112,7 +130,8 @@ class RunFolder:
             return None
 
     def write_result(self, result: dict[str, Any]) -> None:
-        """Write how the run ended."""
+        """Write how the run ended, on a disk that is full, too."""
+        (self.path / SPARE_FILE).unlink(missing_ok=True)
         _replace(self.path / RESULT_FILE, msgspec.json.format(msgspec.json.encode(result)))
 
     def result(self) -> dict[str, Any] | None:
@@ -184,6 +203,11 @@ def _newest_first(parent: Path) -> list[RunFolder]:
 def live_runs() -> list[RunFolder]:
     """Return the live runs of this user, the newest first."""
     return [folder for folder in _newest_first(runs_folder()) if folder.is_live()]
+
+
+def left_runs() -> list[RunFolder]:
+    """Return the runs of this user that nobody looks after any more, the newest first."""
+    return [folder for folder in _newest_first(runs_folder()) if folder.is_left()]
 
 
 def run_exists(name: str) -> bool:

@@ -28,6 +28,7 @@ class SupervisorStatistics:
     diverged: int
 
 
+NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0}
 NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
 
 
@@ -54,6 +55,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         else {"p50": lags.quantile_ms(0.5), "p99": lags.quantile_ms(0.99), "max": lags.max_ns / 1e6},
         "digest": {"frame": frame.digest.hex(), "chain": core.chain.hex()},
         "packets": report.get("packets", NO_PACKETS),
+        "recording": report.get("recording") or NOT_RECORDED,
         "from": None if origin is None else {"capture": origin.source, "tick": origin.tick},
         "nodes": {
             name: {

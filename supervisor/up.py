@@ -24,7 +24,7 @@ from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Failed, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.supervisor.control import Control, NoAnswer
-from foosim.supervisor.display import Display, recovery_text
+from foosim.supervisor.display import Display, recording_text, recovery_text
 from foosim.supervisor.hosts import check_hosts, fetch_capture
 from foosim.supervisor.launcher import Child, Launcher, command_line
 from foosim.supervisor.plan import Plan
@@ -105,6 +105,7 @@ class Up:
         remotes = remotes_of(plan.deployment)
         check_hosts(plan.deployment, plan.address, remotes)
         self.folder: RunFolder = create_run(plan.deployment.world, run)
+        self.folder.hold_launcher()
         units = [name for name, node in plan.deployment.nodes.items() if node.launch == "systemd"]
         self._launcher = Launcher(self.folder.name, remotes, units)
         self._not_home = ""
@@ -148,6 +149,8 @@ class Up:
         supervisor = ["foosim-supervisor", "run", *options.arguments(), "--run", folder.name]
         self._launch(SUPERVISOR, supervisor)
         display.say(f"run {folder.name}, logs in {folder.logs}")
+        if self.plan.branch is not None:
+            display.say(self.plan.branch.text)
         info = self._await(folder.info)
         if info is None:
             return False
@@ -398,7 +401,10 @@ class Up:
             return [self._not_home] if self._not_home else []
         hub = self._launcher.children.get(VHUB)
         finished = hub is not None and hub.exit_code in (DONE, FAILED)
-        return [f"capture {self.capture}" if finished else f"capture {self.capture} (unfinished)"]
+        result = self.folder.result()
+        wrong = "" if result is None else recording_text(result)
+        lines = [f"capture {self.capture}" if finished else f"capture {self.capture} (unfinished)"]
+        return [*lines, wrong] if wrong else lines
 
     @contextmanager
     def _signals(self) -> Iterator[None]:

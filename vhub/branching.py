@@ -11,14 +11,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import BadValue, Malformed
-from foosim.protocol.frame import chain_next, frame_from_bytes
+from foosim.protocol.errors import BadValue, Malformed, Refused
+from foosim.protocol.frame import Frame, chain_next, frame_from_bytes
 from foosim.protocol.layout import BALL, WORLD, Layout
 from foosim.protocol.messages import AddedEntity, Outbox
 from foosim.protocol.start import Start, first_chain, start_with
 from foosim.protocol.units import format_ns, parse_ns
 from foosim.vhub.capture_reader import Scan, deployment_of, layout_of, origin_of
 from foosim.vhub.rows import FRAME, LAYOUT, TICK, CaptureError, FrameRow, LayoutRow, TickRow
+
+
+class BadBranch(Refused):
+    """A capture to begin with that cannot be read is bad input."""
+
+    exit_code = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +49,30 @@ def parse_branch(text: str) -> tuple[Path, int | None]:
 def read_branch(text: str, deployment: Deployment) -> Branch:
     """Return the start that `CAPTURE@TIME` means, for a run of `deployment`.
 
-    Raises CaptureError for a file that is no capture, BadValue for a time that it does not have and for a deployment
-    that does not fit it.
+    Raises BadBranch for a file that is no capture, BadValue for a time that it does not have and for a deployment that
+    does not fit it.
     """
     path, at_ns = parse_branch(text)
-    found = _find(path, at_ns)
-    captured, row = found.deployment, found.frame
+    try:
+        found = _find(path, at_ns)
+        layout, frame = _frame_of(path, found)
+    except CaptureError as error:
+        raise BadBranch(f"--from: {error}") from None
+    captured = found.deployment
     if deployment.tick_ns != captured.tick_ns:
         have, want = format_ns(captured.tick_ns), format_ns(deployment.tick_ns)
         raise BadValue(f"--from: the capture has ticks of {have}, the deployment of {want}", str(path))
-    layout = layout_of(path, captured, found.layout)
     added = [AddedEntity(entity.name, entity.model) for entity in found.layout.added]
     differing = _differences(layout, deployment, added)
     if differing:
         raise BadValue(f"--from: the deployment does not fit the capture: {'; '.join(differing)}", str(path))
+    at = f"frame {frame.tick} of {path}, at {frame.tick * captured.tick_ns / 1e9:g} s"
+    return Branch(start_with(frame, path.name, found.chain, added), f"the run begins with {at}")
+
+
+def _frame_of(path: Path, found: _Found) -> tuple[Layout, Frame]:
+    row = found.frame
+    layout = layout_of(path, found.deployment, found.layout)
     outboxes = [Outbox(outbox.index, outbox.packets) for outbox in row.outboxes]
     try:
         frame = frame_from_bytes(row.tick, layout, row.values, outboxes)
@@ -64,8 +80,7 @@ def read_branch(text: str, deployment: Deployment) -> Branch:
         raise CaptureError(f"{path}: frame {row.tick}: {error}") from None
     if frame.digest != found.digest:
         raise CaptureError(f"{path}: frame {row.tick} is not the one whose digest the capture has")
-    at = f"frame {row.tick} of {path}, at {row.tick * captured.tick_ns / 1e9:g} s"
-    return Branch(start_with(frame, path.name, found.chain, added), f"the run begins with {at}")
+    return layout, frame
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -19,6 +19,7 @@ import msgspec
 
 from foosim.protocol.codec import decode_json, encode_json
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.disk import Room, megabytes, room_on_disk
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch, Origin
@@ -131,6 +132,8 @@ class CaptureFile:
         self._plan = plan_of(described.deployment)
         self._view = View(described.deployment)
         self._encode = msgspec.json.Encoder().encode
+        self._reserve = described.deployment.capture.reserve_bytes
+        self._bytes_max = described.deployment.capture.bytes_max
         self._known: Frame | None = None
         """The frame of the last closing, written or not."""
         self._file = self._open(journal_tick is not None)
@@ -144,6 +147,7 @@ class CaptureFile:
                 self._channels = {channel.topic: channel.id for channel in found.book.channels}
                 if found.to_index:
                     self.mcap.index_last_chunk(found.to_index)
+            self._saved = replace(self.done)
         except OSError as error:
             os.close(self._file)
             raise self.disk_error(error) from None
@@ -153,19 +157,22 @@ class CaptureFile:
 
     # --- writing -----------------------------------------------------------------------------------------------------
 
-    def write(self, item: Item) -> None:
-        """Write the rows of a closing, an epoch or a line; of what the file has already, none."""
+    def write(self, item: Item) -> bool:
+        """Write the rows of a closing, an epoch or a line; False, and none, when the file has them already."""
         if isinstance(item, Line):
             self._write_view(LOG, item.tick, self._view.log_line(item.level, item.text, item.tick))
         elif isinstance(item, Epoch):
-            if item.epoch > self.done.epoch:
-                topic, log_ns, publish_ns, sequence, row = epoch_entry(item, self._plan)
-                self.mcap.add_message(self._channels[topic], log_ns, publish_ns, sequence, self._encode(row))
-                self.done.epoch = item.epoch
+            if item.epoch <= self.done.epoch:
+                return False
+            topic, log_ns, publish_ns, sequence, row = epoch_entry(item, self._plan)
+            self.mcap.add_message(self._channels[topic], log_ns, publish_ns, sequence, self._encode(row))
+            self.done.epoch = item.epoch
         elif item.frame.tick <= self.done.tick and (self._known is None or item.frame.tick > self._known.tick):
             self._pass(item.frame)
+            return False
         else:
             self._write_closing(item)
+        return True
 
     def _write_closing(self, closing: Closing) -> None:
         add, encode, channels, done = self.mcap.add_message, self._encode, self._channels, self.done
@@ -199,15 +206,47 @@ class CaptureFile:
         at_ns = tick * self._plan.tick_ns
         self.mcap.add_message(self._channels[topic], at_ns, at_ns, tick & 0xFFFF_FFFF, data)
 
+    def end_chunk(self) -> None:
+        """Write what is collected; who is killed from now on does not lose it."""
+        self.mcap.end_chunk()
+        self._saved = replace(self.done)
+
+    def room(self) -> Room:
+        """Return how much can still be written, on the disk and of what the capture may be, whichever is less."""
+        last = self.mcap.summary_bytes
+        on_disk = room_on_disk(self._file, self._reserve)
+        rooms = [replace(on_disk, left=on_disk.left - last)]
+        if self._bytes_max is not None:
+            left = self._bytes_max - self.mcap.offset - last
+            where = f"of the {megabytes(self._bytes_max)} that it may have"
+            rooms.append(Room(left, min(self._reserve, self._bytes_max // 8), where))
+        return min(rooms, key=lambda room: room.left / room.reserve)
+
+    def give_up(self) -> None:
+        """Drop what is collected and cut off what a disk took of it: the file is whole, without an end."""
+        self.mcap.drop_chunk()
+        self.done = replace(self._saved)
+        os.ftruncate(self._file, self.mcap.offset)
+        os.lseek(self._file, self.mcap.offset, os.SEEK_SET)
+
     def finish(self, metadata: Mapping[str, str]) -> None:
-        """Write the last frame, how it ended, and the summary; the file is on the disk then."""
+        """Write the last frame, how it ended, and the summary; the file is on the disk then.
+
+        When the disk refuses the end, the file stays whole, without one.
+        """
         frame = self._known
         if frame is not None and self.done.frame < frame.tick == self.done.tick:
             self._write_view(FRAME, frame.tick, self._encode(frame_row(frame)))
-        self.mcap.end_chunk()
-        self.mcap.add_metadata(END_METADATA, metadata)
-        self.mcap.finish()
-        self.sync()
+        self.end_chunk()
+        whole = self.mcap.mark()
+        try:
+            self.mcap.add_metadata(END_METADATA, metadata)
+            self.mcap.finish()
+            self.sync()
+        except OSError:
+            self.mcap.rewind(whole)
+            self.give_up()
+            raise
 
     def sync(self) -> None:
         """Bring to the disk what was written."""

@@ -9,7 +9,7 @@ begin with `wall_` are 0 in completed rows, lines of the log that were not flush
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -23,6 +23,7 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.journal import JournalError, journal_files, lock_journal, read_journal
+from foosim.protocol.messages import Epoch
 from foosim.vhub.capture_file import CHUNK_BYTES, CaptureFile, Described, Line
 from foosim.vhub.capture_reader import About, deployment_of, read_about
 from foosim.vhub.packet import IN_FLIGHT
@@ -117,10 +118,10 @@ class _Completion:
             return
         last: tuple[HubState, Closing] | None = None
         try:
-            for last in fold(self._deployment, chain([self._head], self._records)):
+            for last in fold(self._deployment, self._told_of(file)):
                 file.write(last[1])
                 if file.mcap.chunk_bytes > CHUNK_BYTES:
-                    file.mcap.end_chunk()
+                    file.end_chunk()
         except (Malformed, JournalError) as error:
             self.problem = f"its journal cannot be used to its end: {error}"
         if last is None or file.done.in_flight or last[1].frame.tick < file.done.tick:
@@ -130,3 +131,11 @@ class _Completion:
         for flight in flights:
             flight.cause = IN_FLIGHT
         file.write(Closing(closing.frame, closing.digest, [], [], fates=flights))
+
+    def _told_of(self, file: CaptureFile) -> Iterator[bytes]:
+        """Yield the records, and write the epochs among them that the file lacks."""
+        for raw in chain([self._head], self._records):
+            record = decode_any(HubRecord, raw)
+            if isinstance(record, Epoch):
+                file.write(record)
+            yield raw

@@ -1,9 +1,11 @@
-"""The writer of a capture: a thread that turns closings into rows behind the journal, and never loses one.
+"""The writer of a capture: a thread that turns closings into rows behind the journal, and never loses one silently.
 
 `keep` hands a closing over and returns; when the writer lags by more than the queue holds, `keep` waits, which slows
-the run, and says so once. What is written is flushed at least every `capture.flush`, synced each second, and readable
-when the process is killed. A disk error ends the writing: it is said once, and raised to the owner by whatever it
-calls next. Neighbours: `capture_file` (what is written, and how), `capture_reader`.
+the run, and says so once. What is written is flushed at least every `capture.flush`, synced each second by a thread of
+its own, and readable when the process is killed. When the room gets little (`protocol.disk`) or the disk refuses,
+`state` says so; the owner ends the run, or goes on without a capture, as the deployment wants it. A writer that has
+given up has an end in its file and counts what it refuses: offered = written + refused. Neighbours: `capture_file`
+(what is written, and how), `capture_reader`.
 """
 
 from __future__ import annotations
@@ -14,10 +16,12 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Final
 
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.disk import Level
 from foosim.protocol.messages import Epoch
 from foosim.vhub import capture_file
 from foosim.vhub.capture_file import CaptureFile, Described, Item, Line
@@ -33,14 +37,29 @@ SYNC_NS: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class CaptureStatistics:
-    """How far a capture is: what is written, what waits, and how often the run had to wait for it."""
+    """How far a capture is: what is written, what waits, and how often the run had to wait for it.
+
+    `offered` counts what was handed over: ticks, packets, epochs and lines of the log. All of it is in the file
+    (`written`), or not (`refused`), or on its way.
+    """
 
     rows: int
     bytes: int
+    offered: int
+    written: int
+    refused: int
     queued_rows: int
     waits: int
     written_tick: int
     synced_tick: int
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureState:
+    """How a capture does. At FULL it is to be ended while the rest still fits; at OUT it has its end, and refuses."""
+
+    level: Level = Level.FINE
+    text: str = ""
 
 
 class CaptureWriter:
@@ -65,21 +84,24 @@ class CaptureWriter:
         self.path = path
         self._say = say or (lambda level, text: None)
         self._flush_ns = deployment.capture.flush_ns
-        self._synced_tick = -1
+        self.state = CaptureState()
+        self.stops_world = deployment.capture.on_full == "stop_world"
+        self._offered = self._written = self._refused = self._pending = self._passed = 0
+        """Rows by what became of them; pending ones are in the chunk that is being collected, passed
+        ones were in the file that is gone on with."""
         self._error: BaseException | None = None
-        self._error_said = False
         self._queue: deque[Item] = deque()
         self._queued_rows = self._waits = 0
         self._ending: Mapping[str, str] | None = None
         self._idle = False
         """Whether the thread waits to be told of the next row."""
-        self._is_unsynced = True
         self._changed = threading.Condition()
         """Guards the queue, the error and the ends; notified when any of them changes in a way that is waited for."""
         self._file = CaptureFile(path, Described(deployment, deployment_name, deployment_text, metadata), journal_tick)
         self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
         """How far the file was that is gone on with."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
+        self._syncer = _Syncer(self._file)
         self._thread.start()
 
     # --- what the owner calls ----------------------------------------------------------------------------------------
@@ -104,13 +126,12 @@ class CaptureWriter:
     @property
     def synced_tick(self) -> int:
         """The last tick whose rows no power failure takes away; the journal is done with those before."""
-        return self._synced_tick
+        return self._syncer.tick
 
     def statistics(self) -> CaptureStatistics:
         mcap = self._file.mcap
-        return CaptureStatistics(
-            mcap.messages, mcap.offset, self._queued_rows, self._waits, self._file.done.tick, self._synced_tick
-        )
+        counts = self._offered - self._passed, self._written, self._refused, self._queued_rows, self._waits
+        return CaptureStatistics(mcap.messages, mcap.offset, *counts, self._file.done.tick, self.synced_tick)
 
     def _put(self, item: Item) -> None:
         rows = _rows_in(item)
@@ -126,6 +147,7 @@ class CaptureWriter:
                 self._changed.wait()
             self._queue.append(item)
             self._queued_rows += rows
+            self._offered += rows
             if self._idle:
                 self._idle = False
                 self._changed.notify_all()
@@ -136,49 +158,89 @@ class CaptureWriter:
         return self._queued_rows > 0 and self._queued_rows + rows > limits.CAPTURE_QUEUE_ROWS_MAX
 
     def _raise_error(self) -> None:
-        if self._error is None:
-            return
-        if not self._error_said:
-            self._error_said = True
-            self._say("error", f"the capture has ended: {self._error}")
-        raise self._error
+        if self._error is not None:
+            raise self._error
 
     # --- the thread --------------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
             self._write_all()
-        except OSError as error:
-            self._fail(self._file.disk_error(error))
         except BaseException as error:  # noqa: BLE001  # raised again by what the owner calls next
-            self._fail(error)
+            with self._changed:
+                self._error = error
+                self._changed.notify_all()
         finally:
+            self._syncer.end()
             self._file.close()
-
-    def _fail(self, error: BaseException) -> None:
-        with self._changed:
-            self._error = error
-            self._changed.notify_all()
 
     def _write_all(self) -> None:
         interval_ns = self._flush_ns * 3 // 4  # sooner than asked, by what gathering and a batch take
         flush_at_ns = sync_at_ns = time.monotonic_ns()
         ending = False
         while not ending:
-            until_ns = flush_at_ns if self._file.mcap.chunk_bytes else sync_at_ns if self._is_unsynced else None
+            until_ns = flush_at_ns if self._pending else sync_at_ns if self._syncer.lags else None
             items, ending = self._take(until_ns)
             for item in items:
                 self._write_item(item)
             now_ns = time.monotonic_ns()
             if now_ns >= flush_at_ns or self._file.mcap.chunk_bytes > capture_file.CHUNK_BYTES:
-                self._file.mcap.end_chunk()
+                self._flush()
                 flush_at_ns = now_ns + interval_ns
-            if now_ns >= sync_at_ns and self._is_unsynced and not self._file.mcap.chunk_bytes:
-                self._sync()
+            if now_ns >= sync_at_ns and self._syncer.lags and not self._pending:
+                self._syncer.ask()
                 sync_at_ns = now_ns + SYNC_NS
         assert self._ending is not None
-        self._file.finish(self._ending)
-        self._synced_tick = self._file.done.tick
+        if self.state.level < Level.OUT:
+            self._finish(self._ending)
+
+    def _flush(self) -> None:
+        """Write what is collected, and look how much room is left."""
+        if self.state.level is Level.OUT:
+            return
+        try:
+            if self._syncer.error is not None:
+                raise self._syncer.error
+            self._file.end_chunk()
+            self._note_written()
+            room = self._file.room()
+        except OSError as error:
+            self._give_up(str(self._file.disk_error(error)))
+            return
+        if room.level is Level.OUT or (room.level is Level.FULL and not self.stops_world):
+            self._give_up(f"{self.path}: {room}")
+        elif room.level > self.state.level:
+            self.state = CaptureState(room.level, f"{self.path}: {room}")
+
+    def _note_written(self) -> None:
+        self._written += self._pending
+        self._pending = 0
+        self._syncer.written(self._file.done.tick)
+
+    def _give_up(self, text: str) -> None:
+        """End the file in order, as far as the disk takes it; what comes from now on is refused."""
+        self._file.give_up()
+        self._refused += self._pending
+        self._pending = 0
+        self._file.write(Line("error", f"not captured from here on: {text}", max(0, self._file.done.tick)))
+        try:
+            self._file.finish({"reason": f"not captured further: {text}", "last_tick": str(self._file.done.tick)})
+        except OSError as error:
+            self._file.give_up()
+            text = f"{text}; its end could not be written, {error.strerror}"
+        self.state = CaptureState(Level.OUT, text)
+
+    def _finish(self, ending: Mapping[str, str]) -> None:
+        try:
+            self._syncer.end()
+            if self._syncer.error is not None:
+                raise self._syncer.error
+            self._file.end_chunk()
+            self._note_written()
+            self._file.finish(ending)
+            self._syncer.tick = self._file.done.tick
+        except OSError as error:
+            self._give_up(str(self._file.disk_error(error)))
 
     def _take(self, until_ns: int | None) -> tuple[list[Item], bool]:
         """Take a batch of what has gathered, after a wait for anything, or until something is to be flushed.
@@ -207,13 +269,52 @@ class CaptureWriter:
             return items, self._ending is not None and not self._queue
 
     def _write_item(self, item: Item) -> None:
-        self._is_unsynced = True
-        self._file.write(item)
+        if self.state.level is Level.OUT:
+            self._refused += _rows_in(item)
+            return
+        if self._file.write(item):
+            self._pending += _rows_in(item)
+        else:
+            self._passed += _rows_in(item)
 
-    def _sync(self) -> None:
-        self._file.sync()
-        self._is_unsynced = False
-        self._synced_tick = self._file.done.tick
+
+class _Syncer:
+    """Brings a file to the disk in a thread of its own, so that a slow disk holds up no flush."""
+
+    def __init__(self, file: CaptureFile) -> None:
+        self.tick = -1
+        """The last tick that is on the disk."""
+        self.lags = False
+        """Whether something was written since it was asked last."""
+        self.error: OSError | None = None
+        self._file = file
+        self._written = -1
+        self._asked: SimpleQueue[int | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name="capture-sync", daemon=True)
+        self._thread.start()
+
+    def written(self, tick: int) -> None:
+        """Note that everything up to a tick is written."""
+        self._written = tick
+        self.lags = True
+
+    def ask(self) -> None:
+        """Have what is written brought to the disk; return at once."""
+        self.lags = False
+        self._asked.put(self._written)
+
+    def end(self) -> None:
+        """Wait for what was asked, and end; a second call does nothing."""
+        self._asked.put(None)
+        self._thread.join()
+
+    def _run(self) -> None:
+        while (tick := self._asked.get()) is not None:
+            try:
+                self._file.sync()
+                self.tick = tick
+            except OSError as error:
+                self.error = error
 
 
 def _rows_in(item: Item) -> int:

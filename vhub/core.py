@@ -85,7 +85,8 @@ class HubCore:
         self.releases: Releases | None = None
         self.ended: End | None = None
         self.finished = False
-        self.lost = self.failure = self.capture = self.radio_address = ""
+        self.lost = self.failure = self.capture = self.capture_file = self.radio_address = ""
+        self.recording: dict[str, Any] = {}
         self.busy = 0.0
         self._epoch = self._epoch_tick = 0
         self._epoch_payload = b""
@@ -302,7 +303,7 @@ class HubCore:
         layout = self._commits.layout if frame is None else frame.layout
         assert layout is not None
         added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
-        where = commit, self._epoch_payload, self.capture, self._commits.chain_at(self.state.closed)
+        where = commit, self._epoch_payload, self.capture_file, self._commits.chain_at(self.state.closed)
         return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added, *where))
 
     def _release(self, now_ns: int) -> None:
@@ -449,7 +450,7 @@ class HubCore:
         self._patience.asked(now_ns)
 
     def lose(self, name: str, why: str) -> None:
-        """A client is lost that the run cannot do without."""
+        """What the run cannot do without is lost: a client, the capture, room for the journal."""
         if not self.lost:
             self.lost = f"{name}: {why}"
             self.actions.append(Say("error", f"lost {self.lost}"))
@@ -457,8 +458,7 @@ class HubCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = 0 if self.state is None else self.state.closed + 1
-        told = report(self.state, self.capture, self.radio_address)
-        return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, told)
+        return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, report(self))
 
     # --- the end -----------------------------------------------------------------------------------------------------
 
@@ -486,5 +486,4 @@ class HubCore:
 
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""
-        told = report(self.state, self.capture, self.radio_address)
-        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, told)))
+        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, report(self))))

@@ -27,11 +27,12 @@ from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.disk import Level
 from foosim.protocol.errors import BadValue
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, read_journal, remove_journal
+from foosim.protocol.journal import Journal, JournalError, read_journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
 from foosim.protocol.notify import Notify
@@ -45,9 +46,11 @@ from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
 from foosim.vhub.resume import Captured, first_tick_of, recall, was_captured
+from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
 FORGET_EVERY_NS = 1_000_000_000
+LOOK_EVERY_NS = 50_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +82,8 @@ class HubProcess:
         self._inbox = inbox
         self._journal: Journal | None = None
         self._capture: CaptureWriter | None = None
-        self._forget_ns = 0
+        self._room: RoomWatch | None = None
+        self._forget_ns = self._look_ns = 0
         self._is_abandoned = False
         self._orphan = Orphan()
         self._why_abandoned = "the vHub was told to end"
@@ -95,6 +99,7 @@ class HubProcess:
         self._loop.other = self._keep
         self._loop.on_alive = self._on_alive
         self._loop.on_say = self._on_say
+        self._loop.on_unwritten = self._on_unwritten
         self._wire.read(channels.VHUB_READS, channels.VHUB_WAITS)
         self._wire.watch_alive(SUPERVISOR)
 
@@ -144,9 +149,33 @@ class HubProcess:
         reminder = "" if self._exposure is None else self._exposure.due(now_ns)
         if reminder:
             core.actions.append(Say("warning", reminder))
-        if now_ns >= self._forget_ns and self._journal is not None and core.state is not None:
+        if now_ns >= self._look_ns and self._room is not None:
+            self._look_ns = now_ns + LOOK_EVERY_NS
+            self._look_at_room(self._room, now_ns)
+        if now_ns >= self._forget_ns and self._loop.journal is not None and core.state is not None:
             self._forget_ns = now_ns + FORGET_EVERY_NS
-            self._turn_journal(self._journal, core.state.closed)
+            try:
+                self._turn_journal(core.state.closed)
+            except JournalError as error:
+                self._loop.journal = None
+                self._on_unwritten(error)
+
+    def _look_at_room(self, room: RoomWatch, now_ns: int) -> None:
+        """Say what gets little, and end the run while what is left to be written still fits."""
+        core = self.core
+        core.actions += [Say(level, text) for level, text in room.look(now_ns)]
+        core.recording = room.recording
+        if room.ends is not None and not core.lost:
+            core.lose(*room.ends)
+
+    def _on_unwritten(self, error: JournalError) -> None:
+        """The journal has failed: nothing is said any more that would have to be in it, and the run ends.
+
+        What is committed still goes to the capture.
+        """
+        core = self.core
+        self._loop.holds_back = lambda said: said.channel is not channels.HEARTBEAT and not core.finished
+        core.lose("the journal", str(error))
 
     def _begin(self, build: Build, now_ns: int) -> None:
         """Be present, since the supervisor has let us in; open journal and capture, go on from them, and listen.
@@ -160,6 +189,8 @@ class HubProcess:
         self._journal = self._loop.journal = Journal(folder, VHUB)
         records = list(read_journal(folder, VHUB))
         captured = self._open_capture(build, deployment, records)
+        self._room = RoomWatch(self._capture, folder, deployment.capture.reserve_bytes)
+        core.recording = self._room.recording
         past = recall(deployment, build.run, records, captured, deployment.deadlines.client_back_ns)
         if self._capture is not None and past is not None and past.known is not None:
             self._capture.keep(Closing(past.known, past.known.digest, [], []))  # which it has: it goes on from there
@@ -182,7 +213,7 @@ class HubProcess:
         }
         described = build.deployment_name, build.deployment, metadata, self._say, first_tick_of(records)
         self._capture = CaptureWriter(path, deployment, *described)
-        self.core.capture = str(path)
+        self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         return self._capture.begun_with
 
     def _listen(self, deployment: Deployment) -> None:
@@ -196,13 +227,17 @@ class HubProcess:
         radio.watch_alive()
         radio.declare_alive()
 
-    def _turn_journal(self, journal: Journal, closed: int) -> None:
+    def _turn_journal(self, closed: int) -> None:
         """Between ticks, begin a new file when one is full; what the capture has on the disk may go."""
+        journal = self._journal
+        assert journal is not None
         if self.core.is_between_ticks and not self.core.actions:
             journal.rotate_if_full(self.core.head, closed)
         assert self.core.deployment is not None
         kept = closed - self.core.deployment.deadlines.client_back_ns // self.core.deployment.tick_ns
-        journal.forget_before(kept if self._capture is None else min(kept, self._capture.synced_tick))
+        if self._capture is not None and self._capture.state.level < Level.OUT:
+            kept = min(kept, self._capture.synced_tick)
+        journal.forget_before(kept)
 
     def _keep(self, action: Keep | KeepEpoch) -> None:
         if self._capture is not None:
@@ -234,8 +269,14 @@ class HubProcess:
             end = self.core.ended
             reason = "not ended in order" if end is None else end.reason
             self._capture.finish({"reason": reason, "ended": wall.now_text()})
+        if self._room is not None:
+            self.core.recording = self._room.recording
         if self._journal is not None:
-            self._journal.close()
+            try:
+                self._journal.close()
+            except JournalError as error:
+                self._log.error(str(error))
+                return
             if self.core.finished and self.core.ended is not None and not self.core.ended.failed:
                 remove_journal(self._journal.folder, VHUB)
 

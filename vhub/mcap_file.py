@@ -170,6 +170,7 @@ class McapWriter:
         )
         indexes, offsets = self._message_indexes(offset + len(head) + len(data))
         self._put(head + data + indexes)
+        self._count()
         self._book.chunks.append(
             records.ChunkIndex(
                 chunk_start_offset=offset,
@@ -187,12 +188,38 @@ class McapWriter:
         self._book.end_ns = max(self._book.end_ns, last_ns)
         self._chunk.clear()
 
+    def drop_chunk(self) -> int:
+        """Forget what is collected; return how many messages it had."""
+        dropped = sum(len(entries) // 2 for entries in self._index.values())
+        self._chunk.clear()
+        for entries in self._index.values():
+            del entries[:]
+        return dropped
+
+    def mark(self) -> tuple[int, int]:
+        """Return where the file is between two records, for `rewind`."""
+        return self._book.offset, len(self._book.metadata)
+
+    def rewind(self, mark: tuple[int, int]) -> None:
+        """Forget metadata and the end that were written behind a mark; the caller cuts them off."""
+        self._book.offset, count = mark
+        del self._book.metadata[count:]
+
+    @property
+    def summary_bytes(self) -> int:
+        """How large the end of the file becomes, at most."""
+        book = self._book
+        declared = sum(len(schema.data) + 256 for schema in book.schemas)
+        described = 256 * (len(book.attachments) + len(book.metadata) + 4)
+        return declared + described + len(book.chunks) * (96 + 10 * len(book.channels))
+
     def index_last_chunk(self, entries: Mapping[int, array[int]]) -> None:
         """Write the indexes of the last chunk, behind which the file was cut: (time, place) of the messages."""
         for channel, pairs in entries.items():
             self._index[channel].extend(pairs)
         indexes, offsets = self._message_indexes(self._book.offset)
         self._put(indexes)
+        self._count()
         last = self._book.chunks[-1]
         last.message_index_offsets, last.message_index_length = offsets, len(indexes)
 
@@ -206,9 +233,13 @@ class McapWriter:
                 content = entries.tobytes()
                 parts.append(_INDEX.pack(Opcode.MESSAGE_INDEX, 6 + len(content), channel, len(content)) + content)
                 offset += len(parts[-1])
-                self._book.counts[channel] += len(entries) // 2
-                del entries[:]
         return b"".join(parts), offsets
+
+    def _count(self) -> None:
+        """Note that what is collected is written."""
+        for channel, entries in self._index.items():
+            self._book.counts[channel] += len(entries) // 2
+            del entries[:]
 
     def finish(self) -> None:
         """Write the last chunk and the summary, which makes the file whole."""

@@ -6,9 +6,13 @@ Neighbours: `core` sends it, `supervisor.status` shows it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from foosim.protocol.codec import encode_json
 from foosim.vhub.state import HubState
+
+if TYPE_CHECKING:
+    from foosim.vhub.core import HubCore
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +37,12 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
     return HubStatistics(state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated)
 
 
-def report(state: HubState | None, capture: str, radio_address: str) -> bytes:
-    """Return the account so far, and where the radio plane and the capture are.
+def report(core: HubCore) -> bytes:
+    """Return the account so far, where the radio plane and the capture are, and how the capture does.
 
     `links` are [from, to, offered, delivered, dropped, mean delay in ns].
     """
+    state = core.state
     if state is None:
         return encode_json({})
     packets = state.packets
@@ -56,7 +61,8 @@ def report(state: HubState | None, capture: str, radio_address: str) -> bytes:
                 for pair, s in sorted((pair, link.state) for pair, link in state.links.items())
             ],
             "clients": sorted(state.members),
-            "capture": capture,
-            "radio_address": radio_address,
+            "capture": core.capture,
+            "recording": core.recording,
+            "radio_address": core.radio_address,
         }
     )

@@ -11,6 +11,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
 from foosim.protocol.inbox import Inbox
+from foosim.protocol.journal import JournalError
 from foosim.protocol.loop import Loop, channel_of
 
 LATER_NS: Final = 2**62
@@ -152,3 +153,34 @@ def test_a_key_gives_its_channel_and_name_back(channel: Channel) -> None:
 )
 def test_any_other_key_gives_nothing(key: str) -> None:
     assert channel_of(key) is None
+
+
+class FullDisk:
+    """A journal that takes no more."""
+
+    def append(self, record: bytes) -> None:
+        raise JournalError(f"no room for {record.decode()}")
+
+
+def test_what_follows_a_record_that_cannot_be_written_is_decided_by_the_process() -> None:
+    """Told once, in its place among the actions: it may hold back what would have to be written first."""
+    core, inbox = Script(), Inbox(10)
+    loop, recorder = make(core, inbox)
+    loop.journal = FullDisk()
+    word = Publish(channels.DELIVERIES, channels.VHUB, b"unwritten")
+    with pytest.raises(JournalError, match="no room for one"):
+        core.actions = [Journal(b"one"), word]
+        loop.perform()
+    assert recorder.did == [], "nothing is spoken that was not written"
+    told: list[str] = []
+
+    def unwritten(error: JournalError) -> None:
+        told.append(str(error))
+        loop.holds_back = lambda said: said.channel is channels.DELIVERIES
+        core.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, b"ends"))
+
+    loop.on_unwritten = unwritten
+    core.actions = [Journal(b"one"), word, Journal(b"two")]
+    loop.perform()
+    assert told == ["no room for one"] and core.actions == []
+    assert recorder.did == [("put", channels.HEARTBEAT.key_for(channels.VHUB), "ends")]

@@ -36,6 +36,7 @@ def running() -> dict[str, Any]:
         "lag_ms": {"p50": 0.31, "p99": 1.62, "max": 7.4},
         "late": {"lag_ms": 0.7, "waited_for": "player-blue", "tick": 6170},
         "ball": {"position": [0.123, -0.045, 0.0175], "solver": "red"},
+        "recording": {"state": "on", "problem": "", "offered": 9000, "written": 8990, "refused": 0},
         "packets": {"offered": 22510, "delivered": 22390, "dropped": 113, "in_flight": 7, "refused": 0},
         "nodes": {
             "blue": {"owned": ["blue.attack", "blue.goal"], "solved_ticks": 6001},
@@ -181,3 +182,11 @@ def test_a_low_window_shows_fewer_links_and_keeps_the_row_for_all(running: dict[
     assert len(lines) == height
     assert "player-39 " in captured.get()
     assert lines[-1].startswith("all") and "22510" in lines[-1] and " more" in lines[-1]
+
+
+def test_a_capture_that_is_full_is_shown_wherever_a_run_is_looked_at(running: dict[str, Any]) -> None:
+    assert "capture" not in plain_line(running) and "capture" not in render_text(running)
+    problem = {"state": "ended", "problem": "run.mcap: 0.1 MB left on its disk", "refused": 812}
+    running["recording"] = {**running["recording"], **problem}
+    text = "capture ended: run.mcap: 0.1 MB left on its disk (812 rows are not in it)"
+    assert f" | {text} | load" in plain_line(running) and text in render_text(running)

@@ -1,0 +1,208 @@
+"""Captures whose disk gets full, or refuses, or that reach what they may have: nothing is lost silently."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from mcap.reader import make_reader
+
+from foosim.protocol import disk, limits
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.disk import Level, Room
+from foosim.vhub import capture_file, capture_writer
+from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.capture_recovery import recover_capture
+from foosim.vhub.capture_writer import CaptureWriter
+
+if TYPE_CHECKING:
+    from tests.vhub.conftest import HubRun
+
+KIB = 1024
+
+
+class Disk:
+    """A disk that has some room, and refuses what is more with an error; a part of that is written."""
+
+    def __init__(self, room: int, monkeypatch: pytest.MonkeyPatch, number: int = errno.ENOSPC) -> None:
+        self.room = room
+        self.looks: Callable[[int], int] = lambda free: free
+        """What a look at the disk finds: others may take what is left behind it."""
+        self._number = number
+        self._write = capture_file.write_all
+        monkeypatch.setattr(capture_file, "write_all", self.write)
+        monkeypatch.setattr(disk, "free_bytes", lambda place: self.looks(max(0, self.room)))
+
+    def write(self, file: int, content: bytes) -> None:
+        if len(content) > self.room:
+            self._write(file, content[: self.room])
+            raise OSError(self._number, os.strerror(self._number))
+        self.room -= len(content)
+        self._write(file, content)
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chunk for each batch of a few closings: a full disk is met between two of them."""
+    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
+    monkeypatch.setattr(capture_writer, "BATCH_ROWS", 20)
+    monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 60)
+
+
+def new_writer(path: Path, run: HubRun, *sets: str) -> CaptureWriter:
+    if not sets:
+        return CaptureWriter(path, run.deployment, "table.yaml", run.text, {"run": "run-1"})
+    text = apply_sets(run.text, "table.yaml", sets)
+    return CaptureWriter(path, load_deployment(text, "table.yaml"), "table.yaml", text, {"run": "run-1"})
+
+
+def feed(writer: CaptureWriter, run: HubRun) -> list[Level]:
+    """Hand over the whole run; return the states that were seen on the way."""
+    seen = [writer.state.level]
+    for closing in run.closings:
+        writer.keep(closing)
+        if writer.state.level != seen[-1]:
+            seen.append(writer.state.level)
+    writer.finish({"reason": "enough"})
+    if writer.state.level != seen[-1]:
+        seen.append(writer.state.level)
+    return seen
+
+
+def assert_accounted(writer: CaptureWriter, run: HubRun) -> None:
+    """Every tick and packet is in the file, or counted as refused."""
+    found = writer.statistics()
+    offered = sum(1 + len(closing.fates) for closing in run.closings)
+    assert found.offered == offered == found.written + found.refused and found.queued_rows == 0
+    capture = open_capture(writer.path)
+    assert len(capture.ticks) + len(capture.packets) == found.written
+
+
+def assert_valid(path: Path) -> None:
+    """Other people's reader finds an end, and every message by its indexes."""
+    with path.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None and summary.statistics is not None
+        assert len(list(reader.iter_messages())) == summary.statistics.message_count
+
+
+def test_at_the_reserve_a_run_that_is_to_end_is_captured_to_its_end(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Disk(450 * KIB, monkeypatch)
+    writer = new_writer(tmp_path / "run.mcap", hub_run, "capture.reserve=384 KiB")
+    seen = feed(writer, hub_run)
+    assert seen == [Level.FINE, Level.LOW, Level.FULL][-len(seen) :] and seen[-1] is Level.FULL, seen
+    assert writer.stops_world and "left on its disk, the reserve is 0.4 MB" in writer.state.text
+    assert writer.statistics().refused == 0
+    assert_accounted(writer, hub_run)
+    assert_valid(writer.path)
+    assert open_capture(writer.path).about.end == {"reason": "enough"}
+
+
+def test_a_run_that_goes_on_without_its_capture_has_a_valid_one_up_to_there(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Disk(300 * KIB, monkeypatch)
+    writer = new_writer(tmp_path / "run.mcap", hub_run, "capture.reserve=200 KiB", "capture.on_full=continue_unlogged")
+    seen = feed(writer, hub_run)
+    assert seen[-1] is Level.OUT and not writer.stops_world
+    assert_accounted(writer, hub_run)
+    assert_valid(writer.path)
+    capture = open_capture(writer.path)
+    assert capture.finished and 0 < len(capture.ticks) < 65
+    assert capture.about.end["reason"] == f"not captured further: {writer.state.text}"
+    assert capture.about.end["last_tick"] == str(capture.ticks[-1])
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
+def test_a_disk_that_refuses_leaves_what_is_whole(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    """Others take the room that a look has found: the write itself fails, in the midst of a chunk or of the end."""
+    outcomes = set()
+    taken = Disk(0, monkeypatch, number)
+    taken.looks = lambda free: 1 << 40
+    for room in [*range(40_000, 112_000, 8_765), 150_000]:
+        taken.room = room
+        writer = new_writer(tmp_path / f"{room}.mcap", hub_run)
+        feed(writer, hub_run)
+        assert_accounted(writer, hub_run)
+        capture = open_capture(writer.path)
+        assert capture.about.unfinished_bytes == 0, "nothing that is cut stays"
+        refused = writer.statistics().refused
+        outcomes.add((writer.state.level, capture.finished, refused > 0))
+        if writer.state.level is not Level.FINE:
+            assert f"cannot be written, {os.strerror(number)}" in writer.state.text
+        taken.room = 1 << 30
+        if not capture.finished:
+            assert recover_capture(writer.path) is not None
+        assert_valid(writer.path)
+    assert (Level.FINE, True, False) in outcomes and (Level.OUT, False, True) in outcomes, outcomes
+    assert (Level.OUT, False, False) in outcomes, "a disk that took all rows and refused the end"
+
+
+def test_the_quota_is_kept(hub_run: HubRun, tmp_path: Path) -> None:
+    """With room for less than the run, and whatever the disk has."""
+    for quota, on_full in ((100, "continue_unlogged"), (100, "stop_world"), (400, "stop_world")):
+        path = tmp_path / f"{quota}-{on_full}.mcap"
+        writer = new_writer(path, hub_run, f"capture.max_bytes={quota} KiB", f"capture.on_full={on_full}")
+        seen = feed(writer, hub_run)
+        assert_accounted(writer, hub_run)
+        assert_valid(path)
+        assert path.stat().st_size <= quota * KIB
+        assert seen[-1] is (Level.FINE if quota == 400 else Level.OUT)
+        if quota == 100:
+            assert "of the 0.1 MB that it may have" in writer.state.text
+
+
+def test_levels_of_room() -> None:
+    levels = [Room(left, 100, "").level for left in (200, 199, 100, 99, 25, 24, 0, -5)]
+    assert levels == [Level.FINE, Level.LOW, Level.LOW, Level.FULL, Level.FULL, Level.OUT, Level.OUT, Level.OUT]
+    assert str(Room(-5, 64_000_000, "on its disk")) == "0.0 MB left on its disk, the reserve is 64.0 MB"
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
+    """Mounts file systems of so many KiB."""
+    if os.geteuid() != 0:
+        pytest.skip("mounting a file system takes root")
+    mounted: list[Path] = []
+
+    def mount(kib: int) -> Path:
+        place = tmp_path / f"disk-{kib}"
+        place.mkdir()
+        command = ["mount", "-t", "tmpfs", "-o", f"size={kib}k", "foosim-test", str(place)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            pytest.skip(f"no tmpfs can be mounted here: {done.stderr.strip()}")
+        mounted.append(place)
+        return place
+
+    yield mount
+    for place in mounted:
+        subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def test_on_a_disk_that_is_really_full(hub_run: HubRun, small_disk: Callable[[int], Path]) -> None:
+    reserves: Sequence[tuple[int, int]] = ((256, 96), (72, 0))
+    for size, reserve in reserves:
+        place = small_disk(size)
+        sets = [f"capture.reserve={max(64, reserve)} KiB", "capture.on_full=continue_unlogged"]
+        writer = new_writer(place / "run.mcap", hub_run, *sets)
+        for closings in range(4):
+            for closing in hub_run.closings if closings == 0 else hub_run.closings[-1:]:
+                writer.keep(closing)
+        (place / "others").write_bytes(bytes(max(0, disk.free_bytes(place) - 4096)))
+        writer.finish({"reason": "enough"})
+        found = writer.statistics()
+        assert found.offered == found.written + found.refused
+        if open_capture(writer.path).finished:
+            assert_valid(writer.path)
+        assert open_capture(writer.path).about.unfinished_bytes == 0

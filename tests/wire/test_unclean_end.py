@@ -1,0 +1,126 @@
+"""Runs of processes that end uncleanly, and runs whose disks get full: captures are valid, nothing is lost silently."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from foosim.protocol import disk
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.verify import verify_capture
+from foosim.vhub.capture_reader import capture_info, open_capture
+from foosim.vhub.capture_recovery import UNCLEAN
+from tests.wire.conftest import House
+
+
+def last_json(out: str) -> dict[str, Any]:
+    content: dict[str, Any] = msgspec.json.decode(out.splitlines()[-1])
+    return content
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
+    """Mounts a file system of so many KiB."""
+    if os.geteuid() != 0:
+        pytest.skip("mounting a file system takes root")
+    mounted: list[Path] = []
+
+    def mount(kib: int) -> Path:
+        place = tmp_path / f"disk-{kib}"
+        place.mkdir()
+        command = ["mount", "-t", "tmpfs", "-o", f"size={kib}k", "foosim-test", str(place)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            pytest.skip(f"no tmpfs can be mounted here: {done.stderr.strip()}")
+        mounted.append(place)
+        return place
+
+    yield mount
+    for place in mounted:
+        subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(house: House) -> None:
+    up = house.up("--pace", "fast", "--engine", "pure", "--capture", "run.mcap", players=True)
+    run = house.info()
+    house.ticking(50)
+    up.kill()
+    house.end(up)
+    house.wait_for("an end of all of them", lambda: not house.processes_with(run.simulation))
+    path = house.folder / "run.mcap"
+    had = open_capture(path)
+    assert not had.finished
+
+    (house.folder / "elsewhere").mkdir()
+    again = house.up("--for", "2 ms", "--no-capture", "--engine", "pure")
+    code, out, err = house.end(again)
+    assert code == 0, err
+    (line,) = [line for line in out.splitlines() if "recovered" in line]
+    assert line.startswith(f"run {run.run}: capture {path} of an unclean end is recovered: ")
+    journals = house.folder / "state" / "foosim" / "runs" / run.run / "journals"
+    assert not list(journals.glob("vhub-*")), "they are done with"
+
+    capture = open_capture(path)
+    last = int(capture.ticks[-1])
+    assert capture.finished and capture.about.end["reason"] == UNCLEAN and "problem" not in capture.about.end
+    assert capture.ticks.tolist() == list(range(last + 1)) and last >= int(had.ticks[-1])
+    same = rehearse(house.table.read_text(), "table.yaml", last, None, ["engine=pure"])
+    assert capture_info(path).chain == same.json["digest"]["chain"]
+    assert verify_capture(path).equal
+    packets = capture.packets
+    fates = {fate: int((packets.fate == fate).sum()) for fate in ("delivered", "dropped", "in_flight")}
+    assert sum(fates.values()) == len(packets) and fates["in_flight"] > 0
+    assert len({*zip(packets.source, packets.sequence, packets.destination, strict=True)}) == len(packets)
+
+
+def test_a_run_whose_capture_gets_full_ends_with_all_of_it_captured(
+    house: House, small_disk: Callable[[int], Path]
+) -> None:
+    path = small_disk(400) / "run.mcap"
+    arguments = ("--engine", "pure", "--pace", "fast", "--for", "60s", "--json", "--capture", path)
+    code, out, err = house.end(house.up(*arguments, "--set", "capture.reserve=256 KiB", players=True))
+    content = last_json(out)
+    assert code == 1 and content["failed"], err
+    assert content["reason"].startswith(f"lost the capture: {path}: 0.") and "left on its disk" in content["reason"]
+    recording = content["recording"]
+    assert recording["state"] == "full" and recording["refused"] == 0
+    assert recording["offered"] == recording["written"] > 0
+    info = capture_info(path)
+    assert info.finished and info.ticks == content["ticks"] > 0
+    assert info.chain == content["digest"]["chain"] and info.packets["offered"] == content["packets"]["offered"]
+    assert f"capture full: {path}: " in err
+
+
+@pytest.mark.parametrize("fault", ["reserve", "refused"])
+def test_a_run_whose_journals_have_no_room_ends_with_all_that_is_committed_captured(
+    house: House, small_disk: Callable[[int], Path], monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
+    state = small_disk(64 * 1024)
+    monkeypatch.setenv("XDG_STATE_HOME", str(state))
+    reserve = "32 MiB" if fault == "reserve" else "64 KiB"
+    up = house.up(
+        *("--engine", "pure", "--pace", "fast", "--for", "600s", "--json", "--capture", "run.mcap"),
+        *("--set", f"capture.reserve={reserve}"),
+        players=True,
+    )
+    house.ticking(50)
+    keep = 16 * 1024 * 1024 if fault == "reserve" else 0
+    with suppress(OSError), (state / "others").open("wb") as others:
+        for _ in range((disk.free_bytes(state) - keep) // 4096 + 1):
+            others.write(bytes(4096))
+            others.flush()
+    code, out, err = house.end(up)
+    content = last_json(out)
+    assert code == 1 and content["failed"], err
+    assert content["reason"].startswith("lost room for the journal: " if fault == "reserve" else "lost "), content
+    info = capture_info(house.folder / "run.mcap")
+    assert info.finished and info.ticks == content["ticks"] >= 50
+    assert info.chain == content["digest"]["chain"]
+    assert verify_capture(house.folder / "run.mcap").equal
