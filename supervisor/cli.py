@@ -17,11 +17,12 @@ from foosim.protocol.deployment_file import load_deployment, read_deployment_tex
 from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
 from foosim.supervisor import control
+from foosim.supervisor.detach import detach
 from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
 from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
-from foosim.supervisor.plan import RunOptions, check_certificates, make_plan
+from foosim.supervisor.plan import RunOptions, check_certificates, make_plan, plan_again
 from foosim.supervisor.remote import Remote, unit_name
 from foosim.supervisor.run_folder import create_run, open_run, run_exists
 from foosim.supervisor.units import units_of
@@ -49,6 +50,10 @@ From = Annotated[
     str | None,
     typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
 ]
+OptionalFile = Annotated[
+    Path | None, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)
+]
+Balance = Annotated[bool, typer.Option("--balance", help="Move robots from busy nodes to idle ones.")]
 RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
 
 
@@ -65,7 +70,7 @@ def foosim_supervisor(version: VersionOption = False) -> None:
 
 @app.command()
 def up(  # noqa: PLR0913, PLR0917  # a command's options
-    file: File,
+    file: OptionalFile = None,
     pace: PaceOption = None,
     duration: For = None,
     seed: Seed = None,
@@ -78,6 +83,9 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     insecure: Insecure = False,
     pki: PkiOption = None,
     run: RunName = None,
+    balance: Balance = False,
+    detached: Annotated[bool, typer.Option("--detach", help="Run in the background; down ends it.")] = False,
+    resumed: Annotated[str | None, typer.Option("--resume", help="Go on with this run, whose launcher died.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
 ) -> None:
     """Run all that a deployment declares, here and on its hosts, until Ctrl-C or --for.
@@ -90,18 +98,32 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     With --from the world begins with the newest captured frame at or before that time (without a time: the last one),
     and time goes on from there; --for counts from there, too. The deployment may differ from the captured one in
     everything but its robots, their sensors, and the tick.
+
+    --resume RUN goes on with a run whose launcher died, from its last committed frame, with the options that it had.
     """
     if no_capture and capture is not None:
         raise BadValue("--capture and --no-capture exclude each other", str(capture))
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch))
+    folder = None if resumed is None else open_run(resumed)
+    if folder is not None:
+        if file is not None:
+            raise BadValue("--resume takes FILE and its options from the run", str(file))
+        plan, path = plan_again(folder)
+    elif file is None:
+        raise BadValue("a deployment FILE is needed, or --resume RUN", "")
+    else:
+        plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
+        path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
     warnings = check_certificates(plan)
-    path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
     display = Display(sys.stderr if json else sys.stdout)
     for warning in warnings:
         display.say(warning)
-    recover_leftovers(display.say)
+    recover_leftovers(display.say, but=resumed)
+    if detached:
+        name = detach(plan, path, run).name
+        display.say(f"run {name} is up; foosim-supervisor status --run {name} shows it, down --run {name} ends it")
+        return
     try:
-        outcome = Up(plan, path, display, run).run()
+        outcome = Up(plan, path, display, run, folder).run()
     except Killed as killed:
         print(killed, file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
@@ -125,13 +147,14 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     insecure: Insecure = False,
     pki: PkiOption = None,
     run: RunName = None,
+    balance: Balance = False,
 ) -> None:
     """Run a supervisor alone.
 
     vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
     folder has the run file, logs and journals.
     """
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     raise typer.Exit(serve(plan, folder))
 
@@ -147,9 +170,10 @@ def _options(  # noqa: PLR0913, PLR0917  # a command's options
     insecure: bool,
     pki: Path | None,
     branch: str | None,
+    balance: bool,
 ) -> RunOptions:
     settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]
-    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, pki, branch)
+    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, pki, branch, balance)
 
 
 @app.command()

@@ -43,7 +43,8 @@ class SupervisorProcess:
     def __init__(
         self, plan: Plan, folder: RunFolder, session: Session, inbox: Inbox, journal: Journal, history: History | None
     ) -> None:
-        settings = RunSettings(folder.name, str(plan.options.file), plan.text, plan.pace, plan.ticks, plan.start)
+        what = str(plan.options.file), plan.text, plan.pace, plan.ticks, plan.start, plan.options.balance
+        settings = RunSettings(folder.name, *what)
         start = time.monotonic_ns(), new_boot(), clock_name()
         self.core = SupervisorCore(settings, library_fingerprint(), *start, history)
         self._folder = folder

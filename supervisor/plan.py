@@ -14,10 +14,12 @@ from foosim.protocol.certificates import load_credentials, operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.journal import journal_files
 from foosim.protocol.messages import Origin
 from foosim.protocol.start import Start
 from foosim.protocol.units import Pace, parse_ns, parse_pace
+from foosim.supervisor.run_folder import RESULT_FILE, Launch, RunFolder
 from foosim.vhub.branching import Branch, read_branch
 
 
@@ -36,6 +38,8 @@ class RunOptions:
     pki: Path | None = None
     branch: str | None = None
     """`CAPTURE@12.5s`: begin with that frame."""
+    balance: bool = False
+    """Move robots by the nodes' measured load."""
 
     @property
     def all_sets(self) -> tuple[str, ...]:
@@ -51,13 +55,14 @@ class RunOptions:
         given += ["--for", self.duration] if self.duration is not None else []
         given += ["--seed", str(self.seed)] if self.seed is not None else []
         given += ["--from", self.branch] if self.branch is not None else []
+        given += ["--balance"] if self.balance else []
         for setting in self.sets:
             given += ["--set", setting]
         return given
 
     def pki_arguments(self) -> list[str]:
         """Return where the certificates are, as each process of the run is told it."""
-        return [] if self.pki is None else ["--pki", str(self.pki)]
+        return [] if self.pki is None else ["--pki", str(self.pki.absolute())]
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,3 +139,41 @@ def make_plan(options: RunOptions) -> Plan:
             raise BadValue("a run has at least one tick", options.duration)
     branch = None if options.branch is None else read_branch(options.branch, deployment)
     return Plan(options, text, deployment, pace, ticks, address, branch)
+
+
+def launch_of(options: RunOptions, capture: Path | None) -> Launch:
+    """Return the options of a run as they are kept in its folder."""
+    return Launch(
+        str(options.file.absolute()),
+        "" if capture is None else str(capture.absolute()),
+        options.pace,
+        options.duration,
+        options.seed,
+        options.sets,
+        options.listen,
+        options.insecure,
+        None if options.pki is None else str(options.pki.absolute()),
+        None if options.branch is None else str(Path(options.branch).absolute()),
+        options.balance,
+    )
+
+
+def options_of(launch: Launch) -> RunOptions:
+    """Return the options that are kept in a run's folder; the inverse of `launch_of`."""
+    pki = None if launch.pki is None else Path(launch.pki)
+    timing = launch.pace, launch.duration, launch.seed
+    return RunOptions(
+        Path(launch.file), *timing, launch.sets, launch.listen, launch.insecure, pki, launch.branch, launch.balance
+    )
+
+
+def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
+    """Return the plan and the capture of a run whose launcher is gone. Raises Refused when it cannot go on."""
+    launch = folder.launch()
+    if folder.result() is not None:
+        raise Refused(f"run {folder.name} has ended: {folder.path / RESULT_FILE} says how")
+    if launch is None or not journal_files(folder.journals, SUPERVISOR):
+        raise Refused(f"run {folder.name} has no journal to go on from in {folder.journals}")
+    if folder.is_live() or not folder.is_left():
+        raise Refused(f"run {folder.name} is alive: its processes are started again by themselves")
+    return make_plan(options_of(launch)), Path(launch.capture) if launch.capture else None

@@ -21,12 +21,14 @@ from foosim.protocol import wall
 from foosim.protocol.errors import BadValue, Failed, Refused
 from foosim.protocol.names import NAME_RULE, is_name, nearest_name
 
+LOGS: Final = "logs"
 KEPT_RUNS: Final = 20
 """How many runs that are over keep their folder."""
 RUN_FILE: Final = "run.json"
 RESULT_FILE: Final = "result.json"
 LOCK_FILE: Final = "lock"
 LAUNCHER_FILE: Final = "launcher"
+LAUNCH_FILE: Final = "launch.json"
 HOLD_TRIES: Final = 50
 SPARE_FILE: Final = "spare"
 SPARE_BYTES: Final = 64 * 1024
@@ -50,6 +52,22 @@ class RunInfo(msgspec.Struct, frozen=True):
     pki: str = ""
 
 
+class Launch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How `up` was called: the options of a run as they were typed, with absolute paths. No capture: an empty path."""
+
+    file: str
+    capture: str
+    pace: str | None = None
+    duration: str | None = None
+    seed: int | None = None
+    sets: tuple[str, ...] = ()
+    listen: str | None = None
+    insecure: bool = False
+    pki: str | None = None
+    branch: str | None = None
+    balance: bool = False
+
+
 class RunFolder:
     """The folder of one run."""
 
@@ -61,7 +79,7 @@ class RunFolder:
 
     @property
     def logs(self) -> Path:
-        return self.path / "logs"
+        return self.path / LOGS
 
     @property
     def journals(self) -> Path:
@@ -87,9 +105,36 @@ class RunFolder:
         raise NoRun(f"run {self.name} has a supervisor already")
 
     def hold_launcher(self) -> None:
-        """Lock the folder as the launcher of its run, until this process ends: somebody looks after the run."""
-        self._launcher = os.open(self.path / LAUNCHER_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        fcntl.flock(self._launcher, fcntl.LOCK_EX)
+        """Lock the folder as the launcher of its run, until this process ends: somebody looks after the run.
+
+        Raises Refused when another one does.
+        """
+        lock = os.open(self.path / LAUNCHER_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        for _ in range(HOLD_TRIES):  # who looks whether the run is left has the lock for a moment, too
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                time.sleep(0.01)
+                continue
+            self._launcher = lock
+            return
+        os.close(lock)
+        raise Refused(f"run {self.name} is looked after by the launcher that started it")
+
+    def write_launch(self, launch: Launch) -> None:
+        """Write how the run was launched, so that it can be launched again."""
+        _replace(self.path / LAUNCH_FILE, msgspec.json.format(msgspec.json.encode(launch)))
+
+    def launch(self) -> Launch | None:
+        """Return how the run was launched; None when no launcher did."""
+        try:
+            return msgspec.json.decode((self.path / LAUNCH_FILE).read_bytes(), type=Launch)
+        except (OSError, msgspec.DecodeError):
+            return None
+
+    def is_fresh(self) -> bool:
+        """Whether nothing has run in it yet."""
+        return not any((self.path / name).exists() for name in (LAUNCHER_FILE, LAUNCH_FILE, LOCK_FILE, RUN_FILE))
 
     def is_left(self) -> bool:
         """Whether the run had a launcher, which is gone, and has no supervisor: nobody starts its processes again."""
@@ -159,6 +204,8 @@ def create_run(world: str, name: str | None = None) -> RunFolder:
     if name is not None and not is_name(name):
         raise BadValue(f"--run: {NAME_RULE}", name)
     parent = runs_folder()
+    if name is not None and (parent / name / LOGS).is_dir() and RunFolder(parent / name).is_fresh():
+        return RunFolder(parent / name)  # made for us, by who waits for the run
     parent.mkdir(parents=True, exist_ok=True)
     _forget_old(parent)
     path = _make(parent, world, name)

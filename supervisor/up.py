@@ -27,7 +27,7 @@ from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.display import Display, recording_text, recovery_text
 from foosim.supervisor.hosts import check_hosts, fetch_capture
 from foosim.supervisor.launcher import Child, Launcher, command_line
-from foosim.supervisor.plan import Plan
+from foosim.supervisor.plan import Plan, launch_of
 from foosim.supervisor.remote import CAPTURE
 from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
@@ -97,15 +97,23 @@ class Outcome:
 class Up:
     """One run whose processes are children of this one."""
 
-    def __init__(self, plan: Plan, capture: Path | None, display: Display, run: str | None = None) -> None:
-        """`capture` is where it is captured; None captures nothing. `run` names it."""
+    def __init__(
+        self,
+        plan: Plan,
+        capture: Path | None,
+        display: Display,
+        run: str | None = None,
+        resumed: RunFolder | None = None,
+    ) -> None:
+        """`capture` is where it is captured; None captures nothing. `run` names it, `resumed` is one to go on with."""
         self.plan = plan
         self.capture = capture
         self.display = display
         remotes = remotes_of(plan.deployment)
         check_hosts(plan.deployment, plan.address, remotes)
-        self.folder: RunFolder = create_run(plan.deployment.world, run)
+        self.folder: RunFolder = resumed or create_run(plan.deployment.world, run)
         self.folder.hold_launcher()
+        self.folder.write_launch(launch_of(plan.options, capture))
         units = [name for name, node in plan.deployment.nodes.items() if node.launch == "systemd"]
         self._launcher = Launcher(self.folder.name, remotes, units)
         self._not_home = ""
@@ -151,7 +159,7 @@ class Up:
         display.say(f"run {folder.name}, logs in {folder.logs}")
         if self.plan.branch is not None:
             display.say(self.plan.branch.text)
-        info = self._await(folder.info)
+        info = self._await(self._own_info)
         if info is None:
             return False
         self._launch(VHUB, self._vhub_command(info))
@@ -194,6 +202,11 @@ class Up:
 
     def _launch(self, name: str, command: list[str]) -> None:
         self._launcher.start(name, command, self.folder.log(name))
+
+    def _own_info(self) -> RunInfo | None:
+        """Return what the run file says, once it is that of the supervisor that is our child."""
+        info = self.folder.info()
+        return info if info is not None and info.pid == self._launcher.children[SUPERVISOR].process.pid else None
 
     def _info_with_radio(self) -> RunInfo | None:
         info = self.folder.info()
