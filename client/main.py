@@ -7,6 +7,7 @@ One address is all that it needs: its class, rate, robots and parameters come wi
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,7 +17,7 @@ from foosim.client.player import PlayerLoop
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Say
 from foosim.protocol.channels import VHUB, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, ProgressOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
@@ -30,7 +31,9 @@ CONNECT_S = 60.0
 class PlayerProcess:
     """One player on one session, until the run ends, the vHub is gone, or `stop`."""
 
-    def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
+    def __init__(
+        self, name: str, session: Session, inbox: Inbox, world: str = "", progress: Path | None = None
+    ) -> None:
         self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
         self.stopped = False
         self._player = PlayerLoop(self.core)
@@ -39,6 +42,7 @@ class PlayerProcess:
         self._wire = Wire(session, Plane.RADIO, inbox, name)
         self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
         self._loop.connect(self._wire)
+        self._loop.show_progress(progress)
         self._loop.turn = self._turn
         self._loop.on_alive = self._on_alive
         self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
@@ -75,7 +79,7 @@ class PlayerProcess:
             self.stop()
 
 
-def run_player(name: str, connect: str, world: str = "") -> int:
+def run_player(name: str, connect: str, world: str = "", progress: Path | None = None) -> int:
     """Run a declared player until its run ends; return the exit code.
 
     Raises Refused when there is nobody to connect to, PlayerError when its class cannot be loaded or fails.
@@ -86,7 +90,7 @@ def run_player(name: str, connect: str, world: str = "") -> int:
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
     with Session.client(connect, CONNECT_S, limits.RADIO_MESSAGE_BYTES_MAX, stop.is_set) as session:
-        player = PlayerProcess(name, session, inbox, world)
+        player = PlayerProcess(name, session, inbox, world, progress)
         stop.then(player.stop)
         return player.run()
 
@@ -99,6 +103,7 @@ def player(
     name: Annotated[str, typer.Option(help="Its name, as the deployment declares it under players.")],
     connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT.")],
     world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
     """Play in a run: load the class that the deployment names and let it act.
@@ -107,7 +112,7 @@ def player(
     lost, and with 3 when the vHub would not have it.
     """
     die_with_parent()
-    raise typer.Exit(run_player(name, connect, world))
+    raise typer.Exit(run_player(name, connect, world, progress_file))
 
 
 def main() -> None:

@@ -7,6 +7,7 @@ has the engines, `protocol.loop` is the loop.
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,7 +17,7 @@ from foosim.node.solver import Solver
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Say
 from foosim.protocol.channels import SUPERVISOR, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, ProgressOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
@@ -31,7 +32,9 @@ CONNECT_S = 60.0
 class NodeProcess:
     """One node on one session, until the run ends, the supervisor is gone, or `stop`."""
 
-    def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
+    def __init__(
+        self, name: str, session: Session, inbox: Inbox, world: str = "", progress: Path | None = None
+    ) -> None:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
         self.stopped = False
         self._solver = Solver(self.core)
@@ -40,6 +43,7 @@ class NodeProcess:
         self._is_present = False
         self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
         self._loop.connect(self._wire)
+        self._loop.show_progress(progress)
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
@@ -89,7 +93,7 @@ class NodeProcess:
             self.stop()
 
 
-def run_node(name: str, connect: str, world: str = "") -> int:
+def run_node(name: str, connect: str, world: str = "", progress: Path | None = None) -> int:
     """Run a node until its run ends; return the exit code. Raises Refused when there is nobody to connect to."""
     if not is_name(name):
         raise BadValue("not a name for a node", name)
@@ -97,7 +101,7 @@ def run_node(name: str, connect: str, world: str = "") -> int:
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
     with Session.client(connect, CONNECT_S, give_up=stop.is_set) as session:
-        node = NodeProcess(name, session, inbox, world)
+        node = NodeProcess(name, session, inbox, world, progress)
         stop.then(node.stop)
         return node.run()
 
@@ -110,6 +114,7 @@ def node(
     name: Annotated[str, typer.Option(help="Its name, as the deployment declares it.")],
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
     world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
     """Take part in a run as a node.
@@ -118,7 +123,7 @@ def node(
     0 when the run ended, with 1 when it lost the supervisor, and with 3 when the supervisor would not have it.
     """
     die_with_parent()
-    raise typer.Exit(run_node(name, connect, world))
+    raise typer.Exit(run_node(name, connect, world, progress_file))
 
 
 def main() -> None:

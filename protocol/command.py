@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from importlib.metadata import version
+from pathlib import Path
 from typing import Annotated, Final
 
 import typer
@@ -31,6 +32,11 @@ def _show_version(wanted: bool) -> None:
 VersionOption = Annotated[
     bool,
     typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
+]
+
+ProgressOption = Annotated[
+    Path | None,
+    typer.Option("--progress-file", help="Write signs of life here, for foosim-probe."),
 ]
 
 

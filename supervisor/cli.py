@@ -13,7 +13,7 @@ import typer
 
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.codec import encode_json
-from foosim.protocol.command import DONE, FAILED, INTERRUPTED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, INTERRUPTED, ProgressOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
@@ -102,6 +102,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     listen: Listen = LOOPBACK,
     insecure: Insecure = False,
     run: RunName = None,
+    progress_file: ProgressOption = None,
 ) -> None:
     """Run a supervisor alone.
 
@@ -110,7 +111,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     """
     plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
-    raise typer.Exit(serve(plan, folder))
+    raise typer.Exit(serve(plan, folder, progress_file))
 
 
 def _options(

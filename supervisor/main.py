@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import time
+from pathlib import Path
 
 import msgspec
 
@@ -30,7 +31,15 @@ from foosim.supervisor.status import result
 class SupervisorProcess:
     """The supervisor on its session, until the run has ended."""
 
-    def __init__(self, plan: Plan, folder: RunFolder, session: Session, inbox: Inbox, journal: Journal) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        folder: RunFolder,
+        session: Session,
+        inbox: Inbox,
+        journal: Journal,
+        progress: Path | None = None,
+    ) -> None:
         settings = RunSettings(folder.name, str(plan.options.file), plan.text, plan.pace, plan.ticks)
         self.core = SupervisorCore(settings, library_fingerprint(), time.monotonic_ns())
         self._folder = folder
@@ -47,6 +56,7 @@ class SupervisorProcess:
         wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
         self._loop = Loop(self.core, inbox, start_log(SUPERVISOR), self.core.deadline_ns)
         self._loop.connect(wire)
+        self._loop.show_progress(progress)
         self._journal = self._loop.journal = journal
         self._turned_tick = 0
         self._loop.turn = self._turn
@@ -105,14 +115,14 @@ class SupervisorProcess:
             self.core.process_gone(name, time.monotonic_ns())
 
 
-def serve(plan: Plan, folder: RunFolder) -> int:
+def serve(plan: Plan, folder: RunFolder, progress: Path | None = None) -> int:
     """Run the supervisor of a run in this process; return the exit code. Raises Refused before it has begun."""
     die_with_parent()
     folder.hold()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
     with Journal(folder.journals, SUPERVISOR) as journal, Session.router(str(plan.address)) as session:
-        supervisor = SupervisorProcess(plan, folder, session, inbox, journal)
+        supervisor = SupervisorProcess(plan, folder, session, inbox, journal, progress)
         stop.then(supervisor.stop)
         code = supervisor.run()
     if code == DONE:

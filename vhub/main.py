@@ -20,7 +20,7 @@ from foosim.protocol.actions import Say
 from foosim.protocol.addresses import LOOPBACK, check_listen
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
-from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, ProgressOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
@@ -44,6 +44,7 @@ class HubOptions:
     capture: Path | None = None
     keeps: bool = True
     folder: Path | None = None
+    progress: Path | None = None
 
 
 class HubProcess:
@@ -66,6 +67,7 @@ class HubProcess:
         self._loop = Loop(self.core, inbox, self._log, lambda now_ns: self.core.deadline_ns())
         self._loop.connect(self._wire)
         self._loop.connect(self._radio)
+        self._loop.show_progress(options.progress)
         self._loop.turn = self._turn
         self._loop.took = self.core.waits.took
         self._loop.lacking = lambda: self.core.lacking
@@ -204,6 +206,7 @@ def vhub(
     capture: Annotated[Path | None, typer.Option(help="What to write; by default captures/WORLD-TIME.mcap.")] = None,
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
     run_folder: Annotated[Path | None, typer.Option(help="Where its journal goes; by default RUN.vhub.")] = None,
+    progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
     """Take part in a run as its virtual hub.
@@ -214,7 +217,8 @@ def vhub(
     die_with_parent()
     if no_capture and capture is not None:
         raise BadValue("--no-capture and --capture exclude each other", str(capture))
-    raise typer.Exit(run_vhub(connect, listen, insecure, HubOptions(capture, not no_capture, run_folder)))
+    options = HubOptions(capture, not no_capture, run_folder, progress_file)
+    raise typer.Exit(run_vhub(connect, listen, insecure, options))
 
 
 def main() -> None:
