@@ -17,12 +17,13 @@ from foosim.node.solver import Solver
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Say
 from foosim.protocol.channels import SUPERVISOR, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED, ProgressOption, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
+from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
 

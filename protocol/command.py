@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import sys
 from importlib.metadata import version
-from pathlib import Path
 from typing import Annotated, Final
 
 import typer
@@ -33,12 +32,6 @@ VersionOption = Annotated[
     bool,
     typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
 ]
-
-ProgressOption = Annotated[
-    Path | None,
-    typer.Option("--progress-file", help="Write signs of life here, for foosim-probe."),
-]
-
 
 def new_app() -> typer.Typer:
     """Return a command with foosim's habits: help on no arguments, no shell completion to install, plain tracebacks."""

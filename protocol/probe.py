@@ -1,6 +1,6 @@
 """The command `foosim-probe`: whether a process of a run still works, for health checks and probes.
 
-Neighbours: `progress` has the file that it reads.
+Neighbours: `progress` has the file that it reads, every process the option that has it written.
 """
 
 from __future__ import annotations
@@ -15,6 +15,12 @@ from foosim.protocol.command import VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.progress import NoProgress, age_ns
 from foosim.protocol.units import parse_ns
+
+ProgressOption = Annotated[
+    Path | None,
+    typer.Option("--progress-file", help="Write signs of life here, for foosim-probe."),
+]
+"""The option of a process that is watched."""
 
 app = new_app()
 

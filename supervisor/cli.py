@@ -13,10 +13,11 @@ import typer
 
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.codec import encode_json
-from foosim.protocol.command import DONE, FAILED, INTERRUPTED, ProgressOption, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, INTERRUPTED, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
+from foosim.protocol.probe import ProgressOption
 from foosim.supervisor import control
 from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.main import serve

@@ -20,13 +20,14 @@ from foosim.protocol.actions import Say
 from foosim.protocol.addresses import LOOPBACK, check_listen
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
-from foosim.protocol.command import DONE, FAILED, REFUSED, ProgressOption, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
+from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.vhub.capture_writer import CaptureWriter

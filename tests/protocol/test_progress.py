@@ -1,8 +1,9 @@
-"""The progress file: what a probe makes of it, whatever is in it, and that a loop writes it only while it goes round."""
+"""The progress file: what a probe makes of it, and that a loop writes it only while it goes round."""
 
 import logging
 import os
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def test_a_probe_says_no_when_the_last_sign_is_too_old(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_written_ends_the_start(tmp_path: Path) -> None:
-    with pytest.raises(Failed, match="--progress-file .*/none/progress: cannot be written, No such file or directory"):
+    with pytest.raises(Failed, match=r"--progress-file .*/none/progress: cannot be written, No such file or directory"):
         ProgressFile(tmp_path / "none" / "progress")
 
 
@@ -86,12 +87,12 @@ def test_a_loop_with_nothing_to_do_goes_on_giving_signs_and_one_that_hangs_does_
     path, loop = tmp_path / "progress", make_loop()
     loop.go_round()  # the first round finds its own deadline
     loop.show_progress(path)
-    signs = set()
+    signs: set[bytes] = set()
     while len(signs) < 3:  # the core's deadline is an hour away
         loop.go_round()
         signs.add(path.read_bytes())
     times = sorted(map(int, signs))
-    assert all(later - sooner >= EVERY_NS for sooner, later in zip(times[1:], times[2:], strict=False))
+    assert all(later - sooner >= EVERY_NS for sooner, later in pairwise(times[1:]))
 
     hung_ns = 0
 
