@@ -23,11 +23,12 @@ from bench import machine
 from bench.faults.cluster import Cluster, FaultError
 from bench.faults.digest import DISTURBED
 from bench.faults.kinds import KINDS, NODE, Kind, Trial
+from bench.faults.launched import LAUNCHED, Launched
 
 COUNT: Final = 20
 TRIALS_A_RUN: Final = 20
 """Then a new run begins, so that the frames of each can be computed again."""
-ALL: Final = (*KINDS, DISTURBED)
+ALL: Final = (*KINDS, *LAUNCHED, DISTURBED)
 
 
 @dataclass(slots=True)
@@ -52,20 +53,17 @@ def p99(values: Sequence[float]) -> float:
     return sorted(values)[max(0, -(-99 * len(values) // 100) - 1)]
 
 
-def repeat(kind: Kind, count: int, seed: int, folder: Path) -> Found:
+def repeat(kind: Kind | Launched, count: int, seed: int, folder: Path) -> Found:
     """Do a fault `count` times, on as many runs as that takes."""
     found, dice, run = Found(kind.name), random.Random(f"{seed} {kind.name}"), 0
     while found.trials < count:
         run += 1
         name = f"{kind.name.replace('_', '-')}-{run}"
-        trials = min(kind.trials_a_run or TRIALS_A_RUN, count - found.trials)
         try:
-            nodes = dict.fromkeys(("red", "blue"), NODE)
-            with Cluster(folder, name, kind.sets, pace=kind.pace, seed=seed, programs=nodes) as cluster:
-                kind.prepare(cluster)
-                for _ in range(trials):
-                    found.take(kind.trial(Trial(cluster, dice)))
-                found.ticks += cluster.end(kind.altered)["ticks"]
+            if isinstance(kind, Launched):
+                found.take(kind.trial(folder, name, dice))
+            else:
+                on_one_run(kind, count - found.trials, Place(folder, name, seed), dice, found)
         except FaultError as error:
             found.failures.append(f"{name}, trial {found.trials + 1}: {error}")
             return found
@@ -78,7 +76,26 @@ def repeat(kind: Kind, count: int, seed: int, folder: Path) -> Found:
     return found
 
 
-def lines(kind: Kind, found: Found, took_s: float) -> list[str]:
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a run is, what it is called, and the seed of its links."""
+
+    folder: Path
+    name: str
+    seed: int
+
+
+def on_one_run(kind: Kind, count: int, place: Place, dice: random.Random, found: Found) -> None:
+    """Do a fault to one run, up to `count` times, and end and compare the run."""
+    nodes = dict.fromkeys(("red", "blue"), NODE)
+    with Cluster(place.folder, place.name, kind.sets, pace=kind.pace, seed=place.seed, programs=nodes) as cluster:
+        kind.prepare(cluster)
+        for _ in range(min(kind.trials_a_run or TRIALS_A_RUN, count)):
+            found.take(kind.trial(Trial(cluster, dice)))
+        found.ticks += cluster.end(kind.altered)["ticks"]
+
+
+def lines(kind: Kind | Launched, found: Found, took_s: float) -> list[str]:
     """Return the rows of one kind for people."""
     shown = []
     start = f"{kind.name:14}{found.trials:5}"
@@ -86,7 +103,8 @@ def lines(kind: Kind, found: Found, took_s: float) -> list[str]:
         row = f"{start}  {figure:12}{median(values):9.1f}{p99(values):9.1f}{max(values):9.1f}"
         shown.append(row + (f"{kind.limits[figure]:8.0f}" if figure in kind.limits else " " * 8))
     shown = shown or [start]
-    shown[0] += f"   {kind.title}; {found.ticks} ticks compared [{took_s:.0f} s]"
+    compared = f"; {found.ticks} ticks compared" if found.ticks else ""
+    shown[0] += f"   {kind.title}{compared} [{took_s:.0f} s]"
     return [*shown, *(f"    FAILED: {failure}" for failure in found.failures)]
 
 
@@ -97,6 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=COUNT, help=f"how often each fault is made, {COUNT} by default")
     parser.add_argument("--seed", type=int, help="of times and choices; by default a new one, which is printed")
     parser.add_argument("--only", action="append", choices=names, help="this kind alone; may be repeated")
+    parser.add_argument("--folder", type=Path, help="an empty one, which keeps the logs of all runs")
     chosen = parser.parse_args(arguments)
     if chosen.count < 1:
         parser.error(f"--count {chosen.count}: at least 1")
@@ -105,13 +124,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"seed {seed}; {here.cores} cores, {here.cpu}, load {here.load:.2f} before", flush=True)
     print(f"{'fault':14}{'times':>5}  {'figure (ms)':12}{'median':>9}{'p99':>9}{'max':>9}{'limit':>8}", flush=True)
     everything = []
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_STATE_HOME"] = folder  # the user's own runs keep their folders
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = chosen.folder or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        os.environ["XDG_STATE_HOME"] = str(folder)  # the user's own runs keep their folders
         for kind in ALL:
             if chosen.only and kind.name not in chosen.only:
                 continue
             begun_s = time.monotonic()
-            found = repeat(kind, max(1, chosen.count // kind.costs), seed, Path(folder))
+            found = repeat(kind, max(1, chosen.count // kind.costs), seed, folder.absolute())
             everything.append(found)
             print("\n".join(lines(kind, found, time.monotonic() - begun_s)), flush=True)
     print(json.dumps({"seed": seed, "machine": asdict(here), "faults": [asdict(found) for found in everything]}))
