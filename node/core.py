@@ -107,6 +107,7 @@ class NodeCore:
             channels.EPOCH.name: self._on_epoch,
             channels.COMMIT.name: self._on_commit,
             channels.WANT.name: self._on_want,
+            channels.RECALL.name: self.member.recall,
             channels.BUILD.name: self._on_build,
             channels.PREPARE.name: self._on_prepare,
             channels.END.name: self._on_end,
@@ -330,7 +331,7 @@ class NodeCore:
             self._repeated += 1
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
-        own_tick = 0 if self.frame is None else self.frame.tick
+        own_tick = self.member.first_tick if self.frame is None else self.frame.tick
         if not self._inputs.take_deliveries(deliveries, payload, own_tick):
             self._repeated += 1
 
@@ -403,6 +404,7 @@ class NodeCore:
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self.epoch or self.deployment is None:
             self._repeated += 1
+            self.member.repeated(epoch.epoch == self.epoch)
             return
         self.member.check_epoch(epoch)
         if self.name not in epoch.roster:
