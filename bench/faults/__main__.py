@@ -98,7 +98,7 @@ def on_one_run(kind: Kind, count: int, place: Place, dice: random.Random, found:
 def lines(kind: Kind | Launched, found: Found, took_s: float) -> list[str]:
     """Return the rows of one kind for people."""
     shown = []
-    start = f"{kind.name:14}{found.trials:5}"
+    start = f"{kind.name:18}{found.trials:5}"
     for figure, values in found.figures.items():
         row = f"{start}  {figure:12}{median(values):9.1f}{p99(values):9.1f}{max(values):9.1f}"
         shown.append(row + (f"{kind.limits[figure]:8.0f}" if figure in kind.limits else " " * 8))
@@ -122,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     seed = random.SystemRandom().randrange(1_000_000) if chosen.seed is None else chosen.seed
     here = machine.this_machine()
     print(f"seed {seed}; {here.cores} cores, {here.cpu}, load {here.load:.2f} before", flush=True)
-    print(f"{'fault':14}{'times':>5}  {'figure (ms)':12}{'median':>9}{'p99':>9}{'max':>9}{'limit':>8}", flush=True)
+    print(f"{'fault':18}{'times':>5}  {'figure (ms)':12}{'median':>9}{'p99':>9}{'max':>9}{'limit':>8}", flush=True)
     everything = []
     with tempfile.TemporaryDirectory() as temporary:
         folder = chosen.folder or Path(temporary)

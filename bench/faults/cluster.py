@@ -169,7 +169,7 @@ class Cluster:
         for child in self._launcher.ended():
             if child.name in self._down:
                 continue
-            if child.name not in self.deployment.nodes:
+            if child.name in self.deployment.players:
                 raise FaultError(f"{child.name} {child.ending}: {' | '.join(child.last_lines())}")
             self.start(child.name)
 

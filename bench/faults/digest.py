@@ -22,6 +22,8 @@ FAULTS: Final = (
     kinds.link_silent,
     kinds.node_stopped,
     kinds.robot_moved,
+    kinds.supervisor_killed,
+    kinds.vhub_killed,
 )
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from bench.faults.cluster import LIMIT_S, Cluster, FaultError
+from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.supervisor.launcher import script
 from tests.wire.proxy import BOTH, Direction
 
@@ -24,9 +25,10 @@ Figures = dict[str, float]
 
 KILLED_MS: Final = 250.0
 HUNG_MS: Final = 1500.0
+SUPERVISOR_MS: Final = 2000.0
+VHUB_MS: Final = 1000.0
 BACK_MS: Final = 2000.0
 JOIN_MS: Final = 1000.0
-TWIN_MS: Final = 500.0
 BLINK_S: Final = 0.2
 CALM_S: Final = (0.2, 0.7)
 ADDED: Final = 41
@@ -196,6 +198,25 @@ def twin_refused(trial: Trial) -> Figures:
     return {}
 
 
+def supervisor_killed(trial: Trial) -> Figures:
+    """`kill -9` of the supervisor: another one takes over the nodes that hold."""
+    return _started_again(trial, SUPERVISOR)
+
+
+def vhub_killed(trial: Trial) -> Figures:
+    """`kill -9` of the vHub: another one goes on from its journal, and the players come back to it."""
+    return _started_again(trial, VHUB)
+
+
+def _started_again(trial: Trial, process: str) -> Figures:
+    cluster = trial.cluster
+    trial.calm()
+    known = len(cluster.recoveries(process, process))
+    cluster.take_down(process)
+    cluster.start(process)
+    return {"outage": float(cluster.next_recovery(process, process, known)["outage_ms"])}
+
+
 def node_joins(trial: Trial) -> Figures:
     """A node comes late to a world of 50 bodies: from its hello until it takes part."""
     cluster, node = trial.cluster, trial.node()
@@ -263,6 +284,8 @@ KINDS: Final = (
     Kind("link_silent", "a node's link is silent, one way or both", link_silent, {"outage": HUNG_MS}),
     Kind("node_stopped", "a node is stopped and started", node_stopped, {"outage": KILLED_MS}),
     Kind("robot_moved", "a robot moves to another node and back", robot_moved),
+    Kind("supervisor_killed", "kill -9 of the supervisor", supervisor_killed, {"outage": SUPERVISOR_MS}),
+    Kind("vhub_killed", "kill -9 of the vHub", vhub_killed, {"outage": VHUB_MS}),
     Kind("twin_refused", "a second node of the same name", twin_refused),
     Kind(
         "node_joins",

@@ -34,9 +34,12 @@ def compose() -> dict[str, Any]:
 
 
 def from_compose() -> list[Declared]:
-    """Return one process for each service."""
-    services = compose()["services"].items()
-    return [Declared(name, tuple(it["command"]), tuple(it["healthcheck"]["test"][1:])) for name, it in services]
+    """Return one process for each service, variables by their defaults."""
+    found = []
+    for name, it in compose()["services"].items():
+        words = [re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", word) for word in it["command"]]
+        found.append(Declared(name, tuple(words), tuple(it["healthcheck"]["test"][1:])))
+    return found
 
 
 def objects() -> list[dict[str, Any]]:

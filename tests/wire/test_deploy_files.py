@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from tests.wire.conftest import House
 
 TICKS: Final = 100
+NAMES: Final = {"node-0": "red", "node-1": "blue", "supervisor": "table"}
+"""What pods are called where the other files say otherwise: nodes, and the run, which is named as its pod."""
 FIRST: Final = ("foosim-player", "foosim-node", "foosim-vhub", "foosim-supervisor")
 
 
@@ -42,7 +44,7 @@ def own_words(process: Declared) -> tuple[str, ...]:
         if word in ("--progress-file", "--set"):
             next(words)
         elif word != "--insecure":
-            found.append(re.sub(r"tcp/[\w.]+:", "tcp/HOST:", {"node-0": "red", "node-1": "blue"}.get(word, word)))
+            found.append(re.sub(r"tcp/[\w.]+:", "tcp/HOST:", NAMES.get(word, word)))
     return tuple(found)
 
 
@@ -92,6 +94,6 @@ def test_the_processes_run_with_the_arguments_of_their_file(house: House) -> Non
 
 def result_of(folder: Path) -> dict[str, Any]:
     """What the supervisor wrote at the run's end."""
-    content = json.loads((folder / "state" / "foosim" / "runs" / "table" / "result.json").read_text())
+    content = json.loads((folder / "state" / "foosim" / "runs" / "supervisor" / "result.json").read_text())
     assert isinstance(content, dict)
     return content

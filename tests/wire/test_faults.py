@@ -41,7 +41,7 @@ def test_a_run_disturbed_by_every_fault_is_the_run_that_would_have_been(house: H
     with pytest.raises(FaultError, match=r"digest: .*, undisturbed "):
         cluster.compare(result)
     assert result["handovers"] + result["moves"] > 0
-    assert {entry["what"] for entry in result["recoveries"]} == {"node", "join"}
+    assert {entry["what"] for entry in result["recoveries"]} == {"node", "join", "supervisor", "vhub"}
     assert house.processes_with(str(house.folder)) == {}
 
 
