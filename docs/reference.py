@@ -23,6 +23,9 @@ from foosim.protocol.probe import app as probe_app
 from foosim.rehearsal.rehearse_command import app as rehearse_app
 from foosim.rehearsal.replay_command import app as replay_app
 from foosim.supervisor.cli import app as supervisor_app
+from foosim.supervisor.doctor_command import app as doctor_app
+from foosim.supervisor.guard import app as guard_app
+from foosim.supervisor.pki_command import app as pki_app
 from foosim.vhub.main import app as vhub_app
 from foosim.vhub.rows import ROW_TYPES, row_schema
 
@@ -35,6 +38,9 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-node": node_app,
     "foosim-player": player_app,
     "foosim-probe": probe_app,
+    "foosim-guard": guard_app,
+    "foosim-pki": pki_app,
+    "foosim-doctor": doctor_app,
 }
 _PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
 

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from bench.faults.cluster import LIMIT_S, Cluster, FaultError
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.supervisor.launcher import script
+from foosim.supervisor.children import script
 from tests.wire.proxy import BOTH, Direction
 
 Figures = dict[str, float]

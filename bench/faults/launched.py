@@ -21,7 +21,7 @@ from bench.faults.kinds import CALM_S, Figures
 from foosim.protocol.errors import Refused
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor import control
-from foosim.supervisor.launcher import script
+from foosim.supervisor.children import script
 
 END_MS: Final = 5000.0
 GONE_MS: Final = 1000.0

@@ -48,7 +48,7 @@ USED_BY: Final = {
     "Dockerfile": "docker build",
     "compose.yaml": "docker compose --file deploy/compose.yaml up",
     "kubernetes.yaml": "kubectl --namespace foosim apply --filename deploy/kubernetes.yaml",
-    "systemd/foosim-supervisor.service": "systemctl start foosim-supervisor",
+    "systemd/foosim-supervisor.service": "systemctl start --no-block foosim-supervisor",
     "systemd/foosim-vhub.service": "see foosim-supervisor.service",
     "systemd/foosim-node@.service": "systemctl start foosim-node@red",
     "systemd/foosim-player@.service": "systemctl start foosim-player@player-red",
