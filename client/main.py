@@ -24,6 +24,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
+from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
 from foosim.protocol.session_settings import Security
@@ -35,7 +36,13 @@ class PlayerProcess:
     """One player on one session, until the run ends, the vHub is gone for good, or `stop`."""
 
     def __init__(
-        self, name: str, session: Session, inbox: Inbox, world: str = "", credentials: Credentials | None = None
+        self,
+        name: str,
+        session: Session,
+        inbox: Inbox,
+        world: str = "",
+        credentials: Credentials | None = None,
+        progress: Path | None = None,
     ) -> None:
         self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
         self.stopped = False
@@ -48,6 +55,7 @@ class PlayerProcess:
         warn_of_end(credentials, log)
         self._loop = Loop(self.core, inbox, log, self._deadline_ns)
         self._loop.connect(self._wire)
+        self._loop.show_progress(progress)
         self._loop.turn = self._turn
         self._loop.on_alive = self._on_alive
         self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
@@ -87,7 +95,7 @@ class PlayerProcess:
             (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
 
 
-def run_player(name: str, connect: str, world: str = "", pki: Path | None = None) -> int:
+def run_player(name: str, connect: str, world: str = "", pki: Path | None = None, progress: Path | None = None) -> int:
     """Run a declared player until its run ends; return the exit code. `pki` has its certificate, or its password.
 
     Raises Refused when there is nobody to connect to, PlayerError when its class cannot be loaded or fails.
@@ -100,7 +108,7 @@ def run_player(name: str, connect: str, world: str = "", pki: Path | None = None
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
     with Session.client(connect, CONNECT_S, limits.RADIO_MESSAGE_BYTES_MAX, stop.is_set, security) as session:
-        player = PlayerProcess(name, session, inbox, world, credentials)
+        player = PlayerProcess(name, session, inbox, world, credentials, progress)
         stop.then(player.stop)
         return player.run()
 
@@ -114,6 +122,7 @@ def player(
     connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT.")],
     world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
     pki: PkiOption = None,
+    progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
     """Play in a run: load the class that the deployment names and let it act.
@@ -122,7 +131,7 @@ def player(
     gone for longer than a run waits for it, and with 3 when the vHub would not have it.
     """
     die_with_parent()
-    raise typer.Exit(run_player(name, connect, world, pki))
+    raise typer.Exit(run_player(name, connect, world, pki, progress_file))
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from foosim.node.main import app as node_app
 from foosim.protocol import limits, units
 from foosim.protocol.channels import CHANNELS
 from foosim.protocol.deployment import deployment_schema
+from foosim.protocol.probe import app as probe_app
 from foosim.rehearsal.rehearse_command import app as rehearse_app
 from foosim.rehearsal.replay_command import app as replay_app
 from foosim.supervisor.cli import app as supervisor_app
@@ -36,6 +37,7 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-vhub": vhub_app,
     "foosim-node": node_app,
     "foosim-player": player_app,
+    "foosim-probe": probe_app,
     "foosim-guard": guard_app,
     "foosim-pki": pki_app,
     "foosim-doctor": doctor_app,

@@ -27,6 +27,7 @@ from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
 from foosim.protocol.notify import Notify
 from foosim.protocol.orphan import Orphan
+from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
 from foosim.protocol.session_settings import Security
@@ -38,7 +39,13 @@ class NodeProcess:
     """One node on one session, until the run ends, the supervisor is gone for too long, or `stop`."""
 
     def __init__(
-        self, name: str, session: Session, inbox: Inbox, world: str = "", credentials: Credentials | None = None
+        self,
+        name: str,
+        session: Session,
+        inbox: Inbox,
+        world: str = "",
+        credentials: Credentials | None = None,
+        progress: Path | None = None,
     ) -> None:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
         self.stopped = False
@@ -52,6 +59,7 @@ class NodeProcess:
         warn_of_end(credentials, log)
         self._loop = Loop(self.core, inbox, log, self._deadline_ns)
         self._loop.connect(self._wire)
+        self._loop.show_progress(progress)
         self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking
@@ -109,7 +117,7 @@ class NodeProcess:
         self._orphan.hear(is_alive, time.monotonic_ns())
 
 
-def run_node(name: str, connect: str, world: str = "", pki: Path | None = None) -> int:
+def run_node(name: str, connect: str, world: str = "", pki: Path | None = None, progress: Path | None = None) -> int:
     """Run a node until its run ends; return the exit code. Raises Refused when there is nobody to connect to.
 
     `pki` is the folder with its certificate.
@@ -122,7 +130,7 @@ def run_node(name: str, connect: str, world: str = "", pki: Path | None = None) 
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
     with Session.client(connect, CONNECT_S, give_up=stop.is_set, security=security) as session:
-        node = NodeProcess(name, session, inbox, world, credentials)
+        node = NodeProcess(name, session, inbox, world, credentials, progress)
         stop.then(node.stop)
         return node.run()
 
@@ -136,6 +144,7 @@ def node(
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
     world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
     pki: PkiOption = None,
+    progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
     """Take part in a run as a node.
@@ -145,7 +154,7 @@ def node(
     with 3 when the supervisor would not have it.
     """
     die_with_parent()
-    raise typer.Exit(run_node(name, connect, world, pki))
+    raise typer.Exit(run_node(name, connect, world, pki, progress_file))
 
 
 def main() -> None:

@@ -11,6 +11,7 @@ import gc
 import logging
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Final, Protocol
 
 from foosim.protocol.actions import Journal, Publish, Say
@@ -18,6 +19,7 @@ from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import JournalError
 from foosim.protocol.notify import Notify
+from foosim.protocol.progress import EVERY_NS, ProgressFile
 from foosim.protocol.session import Publisher, Session
 
 BUSY_WINDOW_NS: Final = 1_000_000_000
@@ -25,6 +27,7 @@ NS_PER_S: Final = 1_000_000_000
 GC_THRESHOLDS: Final = (20_000, 20, 100)
 _BY_KEY: Final = {channel.key.removesuffix("/{name}"): channel for channel in CHANNELS}
 _NAMED: Final = "/{name}"
+NEVER_NS: Final = 2**63 - 1
 _LEVELS: Final = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
@@ -139,6 +142,14 @@ class Loop:
         self._wake_ns = now_ns
         self._window_ns = self._turn_ns = now_ns
         self._slept_ns = 0
+        self._progress: ProgressFile | None = None
+        self._sign_ns = NEVER_NS
+
+    def show_progress(self, path: Path | None) -> None:
+        """Give signs of life in this file as long as the loop goes round; None gives none. Raises Failed."""
+        if path is not None:
+            self._progress = ProgressFile(path)
+            self._sign_ns = 0
 
     def connect(self, wire: Wire) -> None:
         """Publish what belongs to this wire's plane on it."""
@@ -161,7 +172,7 @@ class Loop:
         slept_ns = time.monotonic_ns()
         self.took(self._turn_ns, slept_ns)
         lacking = self.lacking()
-        timeout_s = max(0, self._wake_ns - slept_ns) / NS_PER_S
+        timeout_s = max(0, min(self._wake_ns, self._sign_ns) - slept_ns) / NS_PER_S
         lacks, count = ("", 1) if lacking is None else (lacking[0].key, lacking[1])
         items = self._inbox.take(timeout_s, lacks, count)
         now_ns = self._turn_ns = time.monotonic_ns()
@@ -183,6 +194,8 @@ class Loop:
             self._wake_ns = self.deadline_ns(now_ns)
         else:
             self._wake_ns = min(self._wake_ns, self.deadline_ns(now_ns))
+        if now_ns >= self._sign_ns:
+            self._sign(now_ns)
 
     def perform(self) -> None:
         """Do what the core asks for, in order."""
@@ -213,6 +226,14 @@ class Loop:
                 raise
             self.journal = None
             self.on_unwritten(error)
+
+    def _sign(self, now_ns: int) -> None:
+        assert self._progress is not None, "signs are due only when there is a file for them"
+        self._sign_ns = now_ns + EVERY_NS
+        try:
+            self._progress.write(now_ns)
+        except OSError as error:  # whoever watches sees an old sign; the run itself is not harmed
+            self._log.warning("no sign of life could be written: %s", error.strerror)
 
     def _measure(self, now_ns: int, slept_ns: int) -> None:
         self._slept_ns += slept_ns

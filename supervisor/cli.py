@@ -16,6 +16,7 @@ from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, Versio
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
+from foosim.protocol.probe import ProgressOption
 from foosim.supervisor import control
 from foosim.supervisor.detach import detach
 from foosim.supervisor.display import Display, render_text
@@ -148,6 +149,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     pki: PkiOption = None,
     run: RunName = None,
     balance: Balance = False,
+    progress_file: ProgressOption = None,
 ) -> None:
     """Run a supervisor alone.
 
@@ -156,7 +158,7 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     """
     plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
-    raise typer.Exit(serve(plan, folder))
+    raise typer.Exit(serve(plan, folder, progress_file))
 
 
 def _options(  # noqa: PLR0913, PLR0917  # a command's options

@@ -54,10 +54,11 @@ class Handshake:
         """A layout is built: the run may begin, a node may join, a change of the world may be ordered."""
         core = self._core
         process = core.roster.by_name.get(ready.name)
-        if process is None or process.boot != ready.boot or process.lost:
+        if process is None or process.boot != ready.boot or ready.name in core.roster.stopped:
             core.count_repeat()
             return
         process.heard_ns = now_ns
+        process.lost = False  # building, it may have been silent for too long
         if self._has_ended():
             return
         reason = core.roster.note_ready(process, ready)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import time
+from pathlib import Path
 
 import msgspec
 
@@ -41,7 +42,14 @@ class SupervisorProcess:
     """The supervisor on its session, until the run has ended."""
 
     def __init__(
-        self, plan: Plan, folder: RunFolder, session: Session, inbox: Inbox, journal: Journal, history: History | None
+        self,
+        plan: Plan,
+        folder: RunFolder,
+        session: Session,
+        inbox: Inbox,
+        journal: Journal,
+        history: History | None,
+        progress: Path | None = None,
     ) -> None:
         what = str(plan.options.file), plan.text, plan.pace, plan.ticks, plan.start, plan.options.balance
         settings = RunSettings(folder.name, *what)
@@ -67,6 +75,7 @@ class SupervisorProcess:
         self.log = start_log(SUPERVISOR)
         self._loop = Loop(self.core, inbox, self.log, self.core.deadline_ns)
         self._loop.connect(wire)
+        self._loop.show_progress(progress)
         self._journal = self._loop.journal = journal
         self._turned_tick = 0
         self._loop.notify = Notify()
@@ -139,7 +148,7 @@ class SupervisorProcess:
             self.core.process_gone(name, time.monotonic_ns())
 
 
-def serve(plan: Plan, folder: RunFolder) -> int:
+def serve(plan: Plan, folder: RunFolder, progress: Path | None = None) -> int:
     """Run the supervisor of a run in this process; return the exit code. Raises Refused before it has begun."""
     die_with_parent()
     folder.hold()
@@ -153,7 +162,7 @@ def serve(plan: Plan, folder: RunFolder) -> int:
     security = None if credentials is None else Security(credentials, access)
     with Journal(folder.journals, SUPERVISOR) as journal, Session.router(address, security=security) as session:
         check_host(credentials, session.locator)
-        supervisor = SupervisorProcess(plan, folder, session, inbox, journal, history)
+        supervisor = SupervisorProcess(plan, folder, session, inbox, journal, history, progress)
         warn_of_end(credentials, supervisor.log)
         stop.then(supervisor.stop)
         code = supervisor.run()

@@ -282,4 +282,6 @@ def find_run(name: str | None = None) -> RunFolder:
     folder = open_run(name)
     if not folder.is_live():
         raise NoRun(f"run {name} is over")
+    if folder.info() is None:
+        raise NoRun(f"run {name} is starting, and does not listen yet")
     return folder

@@ -37,6 +37,7 @@ from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
 from foosim.protocol.notify import Notify
 from foosim.protocol.orphan import Orphan
+from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
@@ -60,6 +61,7 @@ class HubOptions:
     capture: Path | None = None
     keeps: bool = True
     folder: Path | None = None
+    progress: Path | None = None
 
 
 class HubProcess:
@@ -92,6 +94,7 @@ class HubProcess:
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
         self._loop = Loop(self.core, inbox, self._log, lambda now_ns: self.core.deadline_ns())
         self._loop.connect(self._wire)
+        self._loop.show_progress(options.progress)
         self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.took = self.core.waits.took
@@ -324,7 +327,7 @@ app = new_app()
 
 
 @app.command()
-def vhub(
+def vhub(  # noqa: PLR0913, PLR0917  # a command's options
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
     listen: Annotated[str, typer.Option(help="Where clients find it; port 0 lets the system choose.")] = LOOPBACK,
     insecure: Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")] = False,
@@ -332,6 +335,7 @@ def vhub(
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
     run_folder: Annotated[Path | None, typer.Option(help="Where its journal goes; by default RUN.vhub.")] = None,
     pki: PkiOption = None,
+    progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
     """Take part in a run as its virtual hub.
@@ -345,7 +349,8 @@ def vhub(
     die_with_parent()
     if no_capture and capture is not None:
         raise BadValue("--no-capture and --capture exclude each other", str(capture))
-    raise typer.Exit(run_vhub(connect, listen, insecure, HubOptions(capture, not no_capture, run_folder), pki))
+    options = HubOptions(capture, not no_capture, run_folder, progress_file)
+    raise typer.Exit(run_vhub(connect, listen, insecure, options, pki))
 
 
 def main() -> None:

@@ -130,6 +130,18 @@ def test_a_zombie_writes_nothing_and_comes_back_by_the_handshake() -> None:
     assert "overdue" in run.json["recoveries"][0]["reason"] or "heartbeat" in run.json["recoveries"][0]["reason"]
 
 
+def test_a_newcomer_that_is_silent_while_it_builds_is_let_in_when_it_is_ready() -> None:
+    """It is given up between its hello and its ready, and nobody but its ready tells that it is here after all."""
+
+    def start_slowly(system: System) -> None:
+        system.start("n2")
+        system.pause("n2", 3_000 * MS)
+
+    run = disturbed([(40, kill("n2")), (80, start_slowly)], pace=Pace("realtime"), ticks=2_200)
+    assert told(run) == [("node", "n2"), ("join", "n2")]
+    assert run.json["nodes"]["n2"]["owned"] and run.digests == undisturbed(ticks=2_200).digests
+
+
 def test_a_short_pause_costs_nobody_its_membership() -> None:
     run = disturbed([(100, pause("n2", 200))], pace=Pace("realtime"))
     assert run.digests == undisturbed().digests and told(run) == []

@@ -49,7 +49,7 @@ def test_the_supervisors_process_makes_the_same_plan(
     monkeypatch.setattr(sys, "argv", ["foosim-supervisor", "run", *options.arguments(), "--run", "mine"])
     served: list[Any] = []
 
-    def serve(plan: Plan, folder: RunFolder) -> int:
+    def serve(plan: Plan, folder: RunFolder, progress: Path | None = None) -> int:
         served.extend((plan, folder.name))
         return 0
 

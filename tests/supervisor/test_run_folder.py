@@ -81,6 +81,12 @@ def test_a_run_has_one_supervisor() -> None:
         RunFolder(folder.path).hold()
 
 
+def test_a_run_that_does_not_listen_yet_is_said_to_start() -> None:
+    create_run("table", "mine").hold()
+    with pytest.raises(NoRun, match="run mine is starting, and does not listen yet"):
+        find_run("mine")
+
+
 def test_the_newest_live_run_is_meant_when_none_is_named() -> None:
     start("first", "2026-03-01T12:00:00.000000Z")
     start("third", "2026-03-01T12:00:02.000000Z").release()

@@ -1,0 +1,70 @@
+"""Every fault of bench/faults once, on real processes: what must hold however slow the machine is.
+
+`make faults` repeats each at random times and asserts the figures.
+"""
+
+from __future__ import annotations
+
+import random
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from bench.faults.__main__ import ALL, Found, main, p99
+from bench.faults.cluster import Cluster, FaultError
+from bench.faults.digest import FAULTS
+from bench.faults.kinds import KINDS, NODE, Trial, twin_refused
+from tests.wire.proxy import Weather
+
+if TYPE_CHECKING:
+    from tests.wire.conftest import House
+
+SETS: Final = (
+    "engine=pure",
+    "deadlines={heartbeat: 5 s, tick_named: 50 s, tick_lost: 100 s, lockstep_fast: 100 s, lockstep_realtime: 100 s,"
+    " start: 100 s}",
+)
+"""A process is lost when its link is, or when it does not go round for longer than a busy machine holds one up."""
+BAD: Final = Weather(delay_s=0.001, jitter_s=0.002, bytes_per_s=20e6, stall=0.01, stall_s=0.03)
+SEED: Final = 5
+
+
+def test_a_run_disturbed_by_every_fault_is_the_run_that_would_have_been(house: House) -> None:
+    """On links that delay and stall; `end` compares the digests of all ticks with an undisturbed rehearsal's."""
+    nodes = dict.fromkeys(("red", "blue"), NODE)
+    with Cluster(house.folder, "faults", SETS, pace="0.2x", seed=SEED, weather=BAD, programs=nodes) as cluster:
+        trial = Trial(cluster, random.Random(SEED), calm_s=(0.0, 0.05))
+        for fault in (*FAULTS, twin_refused):
+            fault(trial)
+        result = cluster.end()
+    cluster.text = cluster.text.replace("seed: 1\n", "seed: 2\n")
+    with pytest.raises(FaultError, match=r"digest: .*, undisturbed "):
+        cluster.compare(result)
+    assert result["handovers"] + result["moves"] > 0
+    assert {entry["what"] for entry in result["recoveries"]} == {"node", "join", "supervisor", "vhub"}
+    assert house.processes_with(str(house.folder)) == {}
+
+
+def test_every_kind_of_make_faults_is_made_here_or_needs_a_world_of_its_own() -> None:
+    """What is done to a whole run is in test_run.py."""
+    faults = {kind.trial for kind in KINDS if not kind.altered}
+    assert faults == {*FAULTS, twin_refused}
+    assert len({kind.name for kind in ALL}) == len(ALL)
+
+
+def test_percentiles_are_those_of_nearest_rank() -> None:
+    assert p99([3.0]) == 3.0
+    assert p99(list(range(1, 101))) == 99
+    assert p99(list(range(1, 202))) == 199
+    found = Found("any")
+    found.take({"outage": 2.0})
+    found.take({"outage": 1.0})
+    assert (found.trials, found.figures) == (2, {"outage": [2.0, 1.0]})
+
+
+@pytest.mark.parametrize("arguments", [["--count", "0"], ["--only", "node_kild"]])
+def test_what_cannot_be_repeated_is_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    assert "at least 1" in (said := capsys.readouterr().err) or "choose from 'node_killed'" in said
