@@ -38,6 +38,7 @@ from foosim.protocol.messages import (
     Order,
     Outbox,
     Part,
+    Piece,
     Prepare,
     Samples,
     Want,
@@ -108,6 +109,7 @@ class NodeCore:
             channels.COMMIT.name: self._on_commit,
             channels.WANT.name: self._on_want,
             channels.BUILD.name: self._on_build,
+            channels.PIECE.name: self._on_build,
             channels.PREPARE.name: self._on_prepare,
             channels.END.name: self._on_end,
         }
@@ -384,9 +386,9 @@ class NodeCore:
 
     # --- epochs, layouts, start and end ------------------------------------------------------------------------------
 
-    def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
+    def _on_build(self, build: Build | Piece, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
-            self._repeated += 1
+            self._repeated += not self.member.is_fetching
             return
         self.deployment, layout = self.member.deployment, self.member.layout
         assert layout is not None

@@ -62,6 +62,8 @@ def _radio(name: str, message: Any, writers: str, readers: str, rate: str) -> Ch
 
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered")
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
+FETCH: Final = _simulation("fetch", messages.Fetch, "node, vhub", "supervisor", "a piece of a file")
+PIECE: Final = _simulation("piece", messages.Piece, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation("ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch")
 PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
@@ -88,6 +90,8 @@ DOWN: Final = _radio("down", messages.Go | messages.Down, "vhub", "the named one
 CHANNELS: Final[tuple[Channel, ...]] = (
     HELLO,
     BUILD,
+    FETCH,
+    PIECE,
     REFUSAL,
     READY,
     PREPARE,
@@ -131,14 +135,14 @@ def read(channel: Channel, name: str, payload: bytes) -> Any:
     return message
 
 
-NODE_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
+NODE_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
     PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
 )))  # fmt: skip
-VHUB_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
+VHUB_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
     EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final = tuple((channel, False) for channel in (
-    HELLO, READY, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
+    HELLO, FETCH, READY, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
 ))  # fmt: skip
 CLIENT_READS: Final = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
 OPERATOR_READS: Final = ((ANSWER, True),)

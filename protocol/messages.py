@@ -241,6 +241,26 @@ class Build(Message, frozen=True):
     added: Added
 
 
+class Fetch(Message, frozen=True):
+    """A process that builds the world asks for the file with this digest, from the byte at `offset` on."""
+
+    name: Name
+    boot: Name
+    digest: Digest
+    offset: Counter
+
+
+class Piece(Message, frozen=True):
+    """The bytes at `offset` of the file of `size` bytes with this digest."""
+
+    name: Name
+    boot: Name
+    digest: Digest
+    offset: Counter
+    size: Annotated[int, Meta(ge=0, le=limits.ASSET_BYTES_MAX)]
+    content: Annotated[bytes, Meta(max_length=limits.ASSET_PIECE_BYTES)]
+
+
 class Refusal(Message, frozen=True, tag="refusal"):
     """The supervisor will not have this process, and why."""
 

@@ -63,7 +63,8 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
             typer.echo(f"{process}: {level}: {text}", err=True)
 
     settled = Settings(on_say=show)
-    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settled, capture=capture).json
+    name, folder = str(file), file.parent
+    result = rehearse(plan.text, name, plan.ticks, nodes, settings=settled, capture=capture, folder=folder).json
     if json:
         typer.echo(encode_json(result).decode())
     else:

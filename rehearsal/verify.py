@@ -6,10 +6,11 @@ nodes, and names the first tick and entity that differ. Neighbours: `replica` co
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from foosim.node.engines.probation import check_models
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next
 from foosim.rehearsal.rehearse import with_nodes
@@ -42,15 +43,22 @@ def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
     """Verify a capture file. Raises CaptureError for one that cannot be read."""
     capture = open_capture(path)
     about = capture.about
-    found = verify(about.deployment_text, about.deployment_name, capture.captured_ticks(), nodes)
+    found = verify(about.deployment_text, about.deployment_name, capture.captured_ticks(), nodes, about.files)
     kept = {epoch.arithmetic for epoch in capture.epochs}
     return replace(found, other_arithmetic=tuple(sorted(kept - {"", found.arithmetic})))
 
 
-def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1) -> Verified:
-    """Simulate again what `ticks` (from 0 on, in order) say, on `nodes` nodes, and compare."""
+def verify(
+    text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1, files: Mapping[str, bytes] | None = None
+) -> Verified:
+    """Simulate again what `ticks` (from 0 on, in order) say, on `nodes` nodes, and compare.
+
+    `files` are those that the deployment refers to, by path. Raises AssetError for one that is not acceptable.
+    """
     text = with_nodes(text, name, nodes)
-    replica = Replica(text, name, load_deployment(text, name))
+    deployment = load_deployment(text, name).with_assets(files or {})
+    check_models(deployment, name, text)
+    replica = Replica(text, name, deployment)
     try:
         return replace(_compare(replica, ticks, nodes), arithmetic=replica.arithmetic.hex())
     finally:

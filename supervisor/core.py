@@ -28,6 +28,7 @@ from foosim.protocol.messages import (
     End,
     Epoch,
     Farewell,
+    Fetch,
     Heartbeat,
     Hello,
     Order,
@@ -65,7 +66,8 @@ class SupervisorCore:
     def __init__(self, settings: RunSettings, fingerprint: bytes, now_ns: int) -> None:
         self.settings = settings
         self.actions: list[Action] = []
-        self.deployment: Deployment = load_deployment(settings.deployment_text, settings.deployment_name)
+        deployment = load_deployment(settings.deployment_text, settings.deployment_name)
+        self.deployment: Deployment = deployment.with_assets(settings.files)
         self.roster = Roster(self.deployment, fingerprint)
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
         self.watch = Watch(self.deployment, self.roster, now_ns)
@@ -100,6 +102,7 @@ class SupervisorCore:
         self._refused = self._repeated = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Hello: self.handshake.hello,
+            Fetch: self.handshake.fetch,
             Ready: self.handshake.ready,
             Heartbeat: self.handshake.heartbeat,
             Part: self._on_part,

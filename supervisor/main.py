@@ -31,7 +31,7 @@ class SupervisorProcess:
     """The supervisor on its session, until the run has ended."""
 
     def __init__(self, plan: Plan, folder: RunFolder, session: Session, inbox: Inbox, journal: Journal) -> None:
-        settings = RunSettings(folder.name, str(plan.options.file), plan.text, plan.pace, plan.ticks)
+        settings = RunSettings(folder.name, str(plan.options.file), plan.text, plan.pace, plan.ticks, plan.files)
         self.core = SupervisorCore(settings, library_fingerprint(), time.monotonic_ns())
         self._folder = folder
         self._inbox = inbox

@@ -5,10 +5,13 @@ Neighbours: `up` and `main` carry it out, `cli` reads the options from a command
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from foosim.node.engines.probation import check_models
 from foosim.protocol.addresses import LOOPBACK, Address, check_listen
+from foosim.protocol.assets import pin_assets
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
@@ -52,6 +55,8 @@ class RunSettings:
     deployment_text: str
     pace: Pace
     ticks: int = 0
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    """The contents of the files that the deployment refers to, by path."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +69,16 @@ class Plan:
     pace: Pace
     ticks: int
     address: Address
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
 
 
 def make_plan(options: RunOptions) -> Plan:
     """Check everything that was asked for before anything is started; raises Refused."""
     name = str(options.file)
     text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
-    deployment = load_deployment(text, name)
+    text, files = pin_assets(text, name, options.file.parent)
+    deployment = load_deployment(text, name).with_assets(files)
+    check_models(deployment, name, text)
     address = check_listen(options.listen, options.insecure, ports=2)
     pace = deployment.pace if options.pace is None else parse_pace(options.pace)
     ticks = 0
@@ -78,4 +86,4 @@ def make_plan(options: RunOptions) -> Plan:
         ticks = -(-parse_ns(options.duration) // deployment.tick_ns)
         if ticks == 0:
             raise BadValue("a run has at least one tick", options.duration)
-    return Plan(options, text, deployment, pace, ticks, address)
+    return Plan(options, text, deployment, pace, ticks, address, files)

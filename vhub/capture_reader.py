@@ -31,7 +31,7 @@ from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
 from foosim.protocol.table_scene import build_scene
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
-from foosim.vhub.capture_writer import DEPLOYMENT, END_METADATA, METADATA, VERSIONS
+from foosim.vhub.capture_writer import ASSETS, DEPLOYMENT, END_METADATA, METADATA, VERSIONS
 from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.rows import (
     CLIENTS,
@@ -79,6 +79,8 @@ class About:
     metadata: dict[str, str] = field(default_factory=dict)
     end: dict[str, str] = field(default_factory=dict)
     deployment_text: str = ""
+    files: dict[str, bytes] = field(default_factory=dict)
+    """The files that the deployment refers to, by path."""
     versions: dict[str, str] = field(default_factory=dict)
     finished: bool = False
     unfinished_bytes: int = 0
@@ -149,6 +151,8 @@ class _Scan:
         try:
             if content.name == DEPLOYMENT:
                 about.deployment_text = content.data.decode()
+            elif content.name.startswith(ASSETS):
+                about.files[content.name.removeprefix(ASSETS)] = content.data
             elif content.name == VERSIONS:
                 about.versions = msgspec.convert(decode_json(content.data), dict[str, str])
         except (Malformed, UnicodeDecodeError, msgspec.ValidationError) as error:
@@ -275,7 +279,7 @@ def open_capture(path: Path | str) -> CaptureData:
 
 def _deployment_of(about: About) -> Deployment:
     try:
-        return load_deployment(about.deployment_text, about.deployment_name)
+        return load_deployment(about.deployment_text, about.deployment_name).with_assets(about.files)
     except Refused as error:
         raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
 

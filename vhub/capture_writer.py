@@ -46,6 +46,8 @@ METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 DEPLOYMENT: Final = "deployment.yaml"
 VERSIONS: Final = "versions.json"
+ASSETS: Final = "assets/"
+"""How the names of the files begin that the deployment refers to; their paths follow."""
 GATHER_S: Final = 0.02
 """How long the writer lets closings gather: it wakes once for several, instead of taking the interpreter at each."""
 BATCH_ROWS: Final = 2_000
@@ -344,6 +346,8 @@ class CaptureWriter:
         }
         self._mcap.add_metadata(METADATA, content)
         self._mcap.add_attachment(DEPLOYMENT, "application/yaml", text.encode())
+        for path, file in deployment.asset_files.items():
+            self._mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
         self._mcap.add_attachment(VERSIONS, "application/json", encode_json(library_versions()))
 
     def _write_bytes(self, content: bytes) -> None:

@@ -35,6 +35,7 @@ from foosim.protocol.messages import (
     Farewell,
     Heartbeat,
     Join,
+    Piece,
     Samples,
     Tempo,
     Up,
@@ -98,6 +99,7 @@ class HubCore:
             Epoch: self._on_epoch,
             Want: self._on_want,
             Build: self._on_build,
+            Piece: self._on_build,
             Tempo: self._on_tempo,
             End: self._on_end,
             ClientHello: self._on_hello,
@@ -328,9 +330,9 @@ class HubCore:
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
-    def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
+    def _on_build(self, build: Build | Piece, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
-            self._repeated += 1
+            self._repeated += not self.member.is_fetching
             return
         deployment = self.deployment = self.member.deployment
         assert deployment is not None
