@@ -20,6 +20,7 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.door import Door
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.messages import (
     ClientHello,
@@ -76,6 +77,7 @@ class ClientCore:
         self.name = name
         self.boot = boot
         self.actions: list[Action] = []
+        self.door = Door(self.actions.append, lambda: self.deployment)
         self.welcome: ClientWelcome | None = None
         self.deployment: Deployment | None = None
         self.refusal = ""
@@ -120,8 +122,7 @@ class ClientCore:
             reader(message)
         except Malformed as error:
             self._malformed += 1
-            if self._malformed <= 3:
-                self.actions.append(Say("warning", f"refused on {channel.name}: {error}"))
+            self.door.refuse(channel, name, payload, error, now_ns)
 
     def wake(self, now_ns: int) -> None:
         """Say again what has not been answered, when it is due."""

@@ -23,6 +23,7 @@ from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode, encode_json
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.door import Door
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, basis_of, frame_from_bytes
 from foosim.protocol.layout import Entity, Layout, build_layout
@@ -76,6 +77,7 @@ class NodeCore:
     def __init__(self, name: str, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
         self.name = name
         self.actions: list[Action] = []
+        self.door = Door(self.actions.append, lambda: self.deployment)
         self.work: Work | None = None
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
@@ -125,11 +127,10 @@ class NodeCore:
             reader = self._readers.get(channel.name)
             if reader is None:
                 raise Malformed(f"a node does not read the channel {channel.name}")
-            reader(channels.read(channel, name, payload), payload, now_ns)
+            reader(self.door.read(channel, name, payload, now_ns), payload, now_ns)
         except Malformed as error:
             self._refused += 1
-            if self._refused <= 3:
-                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+            self.door.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Go on as far as the inputs allow; `work` is set when the engine has to solve."""
@@ -490,5 +491,5 @@ class NodeCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = self.frame.tick if self.frame is not None else 0
-        report = encode_json({"solved_ticks": self._solved_ticks})
+        report = encode_json({"solved_ticks": self._solved_ticks, "refused": self.door.by_sender()})
         return Heartbeat(self.name, tick, self.epoch, self.waiting_for, "", self.busy, report)

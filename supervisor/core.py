@@ -17,6 +17,7 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.door import Door
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, layout_after
 from foosim.protocol.layout import Layout, build_layout
@@ -66,6 +67,7 @@ class SupervisorCore:
     def __init__(self, settings: RunSettings, fingerprint: bytes, now_ns: int) -> None:
         self.settings = settings
         self.actions: list[Action] = []
+        self.door = Door(self.actions.append, lambda: self.deployment)
         deployment = load_deployment(settings.deployment_text, settings.deployment_name)
         self.deployment: Deployment = deployment.with_assets(settings.files)
         self.roster = Roster(self.deployment, fingerprint)
@@ -119,15 +121,14 @@ class SupervisorCore:
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
-            message = channels.read(channel, name, payload)
+            message = self.door.read(channel, name, payload, now_ns)
             reader = self._readers.get(type(message))
             if reader is None:
                 raise Malformed(f"the supervisor does not read the channel {channel.name}")
             reader(message, payload, now_ns)
         except Malformed as error:
             self._refused += 1
-            if self._refused <= 3:
-                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+            self.door.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Commit and release as far as parts, pace and clock allow."""

@@ -17,6 +17,7 @@ from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.door import Door
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
@@ -72,6 +73,7 @@ class HubCore:
 
     def __init__(self, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
         self.actions: list[HubAction] = []
+        self.door = Door(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
         self.deployment: Deployment | None = None
@@ -116,7 +118,7 @@ class HubCore:
             if channel is channels.REFUSAL:
                 self._repeated += not self.member.refuse(payload)
                 return
-            message = channels.read(channel, name, payload)
+            message = self.door.read(channel, name, payload, now_ns)
             reader = self._readers.get(type(message))
             if reader is None:
                 raise Malformed(f"the vHub does not read the channel {channel.name}")
@@ -125,8 +127,7 @@ class HubCore:
             self._malformed += 1
             if channel.plane is channels.Plane.RADIO and self.state is not None:
                 self.state.refuse_at_door("malformed")
-            if self._malformed <= 3:
-                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+            self.door.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Close ticks as far as the inputs allow."""
@@ -461,7 +462,7 @@ class HubCore:
         return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, self._report())
 
     def _report(self) -> bytes:
-        return report(self.state, self.capture, self.radio_address)
+        return report(self.state, self.capture, self.radio_address, self.door.by_sender())
 
     # --- the end -----------------------------------------------------------------------------------------------------
 

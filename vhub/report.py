@@ -5,6 +5,7 @@ Neighbours: `core` sends it, `supervisor.status` shows it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from foosim.protocol.codec import encode_json
@@ -33,13 +34,14 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
     return HubStatistics(state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated)
 
 
-def report(state: HubState | None, capture: str, radio_address: str) -> bytes:
+def report(state: HubState | None, capture: str, radio_address: str, refused: Mapping[str, int]) -> bytes:
     """Return the account so far, and where the radio plane and the capture are.
 
-    `links` are [from, to, offered, delivered, dropped, mean delay in ns].
+    `links` are [from, to, offered, delivered, dropped, mean delay in ns]; `refused` counts messages by channel and
+    sender, `refusals` packets by reason.
     """
     if state is None:
-        return encode_json({})
+        return encode_json({"refused": refused})
     packets = state.packets
     return encode_json(
         {
@@ -50,6 +52,7 @@ def report(state: HubState | None, capture: str, radio_address: str) -> bytes:
                 "in_flight": packets.in_flight,
                 "refused": packets.refused,
             },
+            "refused": refused,
             "refusals": state.refusals,
             "links": [
                 [*pair, s.offered, s.delivered, s.dropped, s.delay_ns // s.delivered if s.delivered else 0]

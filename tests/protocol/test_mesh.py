@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,9 @@ import pytest
 from foosim.protocol import limits
 from foosim.protocol.errors import Refused
 from foosim.protocol.mesh import AssetError, Mesh, read_mesh
+
+Point = tuple[float, float, float]
+Triangle = tuple[Point, Point, Point]
 
 CORNERS: Final = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
 SIDES: Final = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -22,13 +26,13 @@ TRIANGLES: Final = [(CORNERS[a], CORNERS[b], CORNERS[c]) for a, *rest in SIDES f
 
 
 def binary_stl(
-    triangles: list[tuple[tuple[float, ...], ...]], count: int | None = None, head: bytes = b"made"
+    triangles: Sequence[Triangle], count: int | None = None, head: bytes = b"made"
 ) -> bytes:
     body = b"".join(struct.pack("<12fH", *(0.0,) * 3, *a, *b, *c, 0) for a, b, c in triangles)
     return head.ljust(80, b" ") + struct.pack("<I", len(triangles) if count is None else count) + body
 
 
-def text_stl(triangles: list[tuple[tuple[float, ...], ...]]) -> str:
+def text_stl(triangles: Sequence[Triangle]) -> str:
     facets = "".join(
         "facet normal 0 0 0\n outer loop\n"
         + "".join("  vertex " + " ".join(map(str, corner)) + "\n" for corner in triangle)
@@ -115,7 +119,7 @@ def grid(triangles: int) -> str:
 
 
 FLAT: Final = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
-ONE: Final = [((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
+ONE: Final[list[Triangle]] = [((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
 STL: Final = text_stl(ONE)
 FEW: Final = 40
 """How many triangles a mesh may have in these tests."""
@@ -168,7 +172,7 @@ BAD: Final[dict[str, tuple[str, str | bytes, str]]] = {
     "a binary STL of too many": ("a.stl", binary_stl(ONE * (FEW + 1)), f"a.stl: more than {FEW} triangles"),
     "a binary STL with nan": (
         "a.stl",
-        binary_stl([*ONE, ((float("nan"), 0.0, 0.0), *ONE[0][1:])]),
+        binary_stl([*ONE, ((float("nan"), 0.0, 0.0), ONE[0][1], ONE[0][2])]),
         "a.stl: triangle 2 has a coordinate that is not finite",
     ),
     "a text STL with nan": ("a.stl", STL.replace("1.0 0.0 0.0", "nan 0 0"), "a.stl:5: not a finite number, 'nan'"),
@@ -219,7 +223,7 @@ def test_a_file_beyond_the_limit_is_not_looked_at(monkeypatch: pytest.MonkeyPatc
 
 
 def test_as_many_triangles_as_the_limit_says_are_read() -> None:
-    mesh = read_mesh("strip.stl", binary_stl(ONE * 5 + [((0.0, 0.0, 1.0), *ONE[0][1:])]))
+    mesh = read_mesh("strip.stl", binary_stl(ONE * 5 + [((0.0, 0.0, 1.0), ONE[0][1], ONE[0][2])]))
     assert len(mesh.triangles) == 6 and len(mesh.vertices) == 4
     rng = np.random.default_rng(4)
     corners = rng.uniform(-1, 1, (limits.MESH_TRIANGLES_MAX, 3, 3)).astype("<f4")
