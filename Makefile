@@ -5,17 +5,20 @@
 PACKAGES := client node protocol rehearsal supervisor vhub
 PYTHON := .venv/bin/python
 SEEDS ?= 100
+N ?= 200000
+SEED ?= 17
 
 # One worker per core. The shell's PYTHONPATH (ROS sets one) would load other people's pytest plugins.
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses auto --maxprocesses 8
 
-.PHONY: help up test play swarm lint bench clean environment
+.PHONY: help up test play swarm fuzz lint bench clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
 	@echo 'make test    lint, type check and all tests (ARGS: options of pytest)'
 	@echo 'make play    minutes of the table as deployed that make test leaves out: goals, hand-overs'
 	@echo 'make swarm   runs under random faults, by seed (SEEDS=100; ARGS: --seed N, --json)'
+	@echo 'make fuzz    hostile bytes on every channel and in every file (N=200000 each; SEED=17; ARGS: -k NAME)'
 	@echo 'make lint    ruff and mypy alone'
 	@echo 'make bench   measure speed, latency and throughput (ARGS: options of the bench)'
 	@echo 'make clean   remove environments, caches and builds; captures stay'
@@ -28,6 +31,10 @@ play: environment
 
 swarm: environment
 	@.venv/bin/foosim-rehearse deploy/table.yaml --swarm --seeds $(SEEDS) $(ARGS)
+
+# Tests that take an hour are no longer hung than those that take a second.
+fuzz: environment
+	@$(PYTEST) -o timeout=0 tests/laws/test_fuzz.py tests/laws/test_fuzz_files.py --fuzz-payloads $(N) --fuzz-seed $(SEED) $(ARGS)
 
 # Last in it is pytest, so that its summary ends the output.
 test: lint

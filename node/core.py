@@ -122,7 +122,7 @@ class NodeCore:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self._repeated += not self.member.refuse(payload)
+                self._repeated += not self.member.refuse(self.door.read(channel, name, payload, now_ns))
                 return
             reader = self._readers.get(channel.name)
             if reader is None:
@@ -321,7 +321,7 @@ class NodeCore:
         if message.epoch == self.epoch and self._awaited_epoch is None:
             return False
         if message.epoch >= self.epoch and len(self._held) < limits.INBOX_MESSAGES_MAX:
-            self._held.append((channel, message.node if isinstance(message, Part) else "", payload))
+            self._held.append((channel, message.node if isinstance(message, Part) else channels.SUPERVISOR, payload))
         else:
             self._repeated += 1
         return True

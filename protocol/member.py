@@ -11,7 +11,7 @@ from typing import Final, Literal
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
-from foosim.protocol.codec import decode, encode
+from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
@@ -112,9 +112,8 @@ class Member:
         fetch = Fetch(self.name, self.boot, bytes.fromhex(digest), offset)
         self._actions.append(Publish(channels.FETCH, self.name, encode(fetch)))
 
-    def refuse(self, payload: bytes) -> bool:
+    def refuse(self, refusal: Refusal) -> bool:
         """Take a refusal; False when it is meant for another boot."""
-        refusal = decode(Refusal, payload)
         if refusal.boot != self.boot:
             return False
         self.refusal = refusal.reason

@@ -116,7 +116,7 @@ class HubCore:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self._repeated += not self.member.refuse(payload)
+                self._repeated += not self.member.refuse(self.door.read(channel, name, payload, now_ns))
                 return
             message = self.door.read(channel, name, payload, now_ns)
             reader = self._readers.get(type(message))

@@ -74,29 +74,11 @@ Lie = tuple[str, Channel, str, msgspec.Struct]
 # --- bytes that are no message ---------------------------------------------------------------------------------------
 
 
-def mutated(rng: random.Random, raw: bytes) -> bytes:
-    """A message with some bytes flipped, put in or taken out; or cut, or with a tail."""
-    content = bytearray(raw)
-    for _ in range(rng.choice((1, 1, 2, 5))):
-        at = rng.randrange(len(content) + 1)
-        kind = rng.randrange(6)
-        if kind < 2 and at < len(content):
-            content[at] ^= 1 << rng.randrange(8)
-        elif kind == 2:
-            content[at : at + rng.randrange(4)] = b""
-        elif kind == 3:
-            content[at:at] = rng.randbytes(rng.randrange(1, 4))
-        elif kind == 4:
-            del content[at:]
-        else:
-            content += rng.randbytes(rng.randrange(1, 9))
-    return bytes(content)
-
-
-def no_message(rng: random.Random, channel: Channel, known: Sequence[bytes]) -> bytes:
+def no_message(disturbed: Disturbed, rng: random.Random, channel: Channel, known: Sequence[bytes]) -> bytes:
     """Random bytes, or a mutated message of this channel, that nobody can read as one of its messages."""
     while True:
-        payload = mutated(rng, rng.choice(known)) if known and rng.random() < 0.7 else rng.randbytes(rng.randrange(60))
+        is_near = bool(known) and rng.random() < 0.7
+        payload = disturbed.mutated(rng, rng.choice(known)) if is_near else rng.randbytes(rng.randrange(60))
         try:
             decode(channel.message, payload, channel.bytes_max)
         except Malformed:
@@ -113,7 +95,7 @@ def test_bytes_that_are_no_message_are_refused_counted_and_change_nothing(distur
     for channel in CHANNELS:
         for name in (*takes_part, NOBODY):
             for _ in range(4):
-                payload = no_message(rng, channel, said.get(channel.plane.name + channel.name, ()))
+                payload = no_message(disturbed, rng, channel, said.get(channel.plane.name + channel.name, ()))
                 tick = rng.randrange(disturbed.ticks - 20)
                 disturbed.at(tick, lambda c=channel, n=name, p=payload: disturbed.put(c, n, p))  # type: ignore[misc]
                 hearers = disturbed.hearers(channel, name)
