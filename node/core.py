@@ -18,12 +18,12 @@ from foosim.node.inputs import Inputs, check_near
 from foosim.node.step import Stepper, Work, moved_counters
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.asset_messages import Piece
 from foosim.protocol.assign import Assignment, Share, reach_of
 from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode, encode_json
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.door import Door
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, basis_of, frame_from_bytes
 from foosim.protocol.layout import Entity, Layout, build_layout
@@ -39,12 +39,12 @@ from foosim.protocol.messages import (
     Order,
     Outbox,
     Part,
-    Piece,
     Prepare,
     Samples,
     Want,
 )
 from foosim.protocol.patience import Patience
+from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import initial_frame
 
 
@@ -77,7 +77,7 @@ class NodeCore:
     def __init__(self, name: str, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
         self.name = name
         self.actions: list[Action] = []
-        self.door = Door(self.actions.append, lambda: self.deployment)
+        self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.work: Work | None = None
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
@@ -110,6 +110,7 @@ class NodeCore:
             channels.EPOCH.name: self._on_epoch,
             channels.COMMIT.name: self._on_commit,
             channels.WANT.name: self._on_want,
+            channels.RECALL.name: self.member.recall,
             channels.BUILD.name: self._on_build,
             channels.PIECE.name: self._on_build,
             channels.PREPARE.name: self._on_prepare,
@@ -122,15 +123,15 @@ class NodeCore:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self._repeated += not self.member.refuse(self.door.read(channel, name, payload, now_ns))
+                self._repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
                 return
             reader = self._readers.get(channel.name)
             if reader is None:
                 raise Malformed(f"a node does not read the channel {channel.name}")
-            reader(self.door.read(channel, name, payload, now_ns), payload, now_ns)
+            reader(self.refusals.read(channel, name, payload, now_ns), payload, now_ns)
         except Malformed as error:
             self._refused += 1
-            self.door.refuse(channel, name, payload, error, now_ns)
+            self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Go on as far as the inputs allow; `work` is set when the engine has to solve."""
@@ -333,7 +334,7 @@ class NodeCore:
             self._repeated += 1
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
-        own_tick = 0 if self.frame is None else self.frame.tick
+        own_tick = self.member.first_tick if self.frame is None else self.frame.tick
         if not self._inputs.take_deliveries(deliveries, payload, own_tick):
             self._repeated += 1
 
@@ -406,6 +407,7 @@ class NodeCore:
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self.epoch or self.deployment is None:
             self._repeated += 1
+            self.member.repeated(epoch.epoch == self.epoch)
             return
         self.member.check_epoch(epoch)
         if self.name not in epoch.roster:
@@ -491,5 +493,5 @@ class NodeCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = self.frame.tick if self.frame is not None else 0
-        report = encode_json({"solved_ticks": self._solved_ticks, "refused": self.door.by_sender()})
+        report = encode_json({"solved_ticks": self._solved_ticks, "refused": self.refusals.by_sender()})
         return Heartbeat(self.name, tick, self.epoch, self.waiting_for, "", self.busy, report)

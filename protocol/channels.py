@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, get_args
 
-from foosim.protocol import limits, messages
+from foosim.protocol import asset_messages, limits, messages
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import Malformed
 
@@ -61,11 +61,13 @@ def _radio(name: str, message: Any, writers: str, readers: str, rate: str) -> Ch
 
 
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered")
+RECALL: Final = _simulation("recall", messages.Recall, "supervisor", "node, vhub", "an unknown heartbeat", named=False)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
-FETCH: Final = _simulation("fetch", messages.Fetch, "node, vhub", "supervisor", "a piece of a file")
-PIECE: Final = _simulation("piece", messages.Piece, "supervisor", "the named one", "an answer")
+FETCH: Final = _simulation("fetch", asset_messages.Fetch, "node, vhub", "supervisor", "a piece of a file")
+PIECE: Final = _simulation("piece", asset_messages.Piece, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation("ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch")
+STANDING: Final = _simulation("standing", messages.Standing, "vhub", "supervisor", "with each ready")
 PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
 EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
 ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False)
@@ -85,15 +87,17 @@ CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
 CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
 UP: Final = _radio("up", messages.Join | messages.Up | messages.Done, "client", "vhub", "the client's rate")
-DOWN: Final = _radio("down", messages.Go | messages.Down, "vhub", "the named one", "the client's rate")
+DOWN: Final = _radio("down", messages.Go | messages.Down | messages.Heard, "vhub", "the named one", "the client's rate")
 
 CHANNELS: Final[tuple[Channel, ...]] = (
     HELLO,
+    RECALL,
     BUILD,
     FETCH,
     PIECE,
     REFUSAL,
     READY,
+    STANDING,
     PREPARE,
     EPOCH,
     ORDER,
@@ -136,13 +140,13 @@ def read(channel: Channel, name: str, payload: bytes) -> Any:
 
 
 NODE_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
-    PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
+    RECALL, PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
 )))  # fmt: skip
 VHUB_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
-    EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
+    RECALL, EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final = tuple((channel, False) for channel in (
-    HELLO, FETCH, READY, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
+    HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
 ))  # fmt: skip
 CLIENT_READS: Final = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
 OPERATOR_READS: Final = ((ANSWER, True),)

@@ -180,6 +180,10 @@ class Deadlines(Part):
     lockstep_fast_ns: Deadline = _default("10 s", "lockstep_fast")
     lockstep_realtime_ns: Deadline = _default("1 s", "lockstep_realtime")
     start_ns: Deadline = _default("60 s", "start")
+    orphan_ns: Deadline = _default("30 s", "orphan")
+    """Nodes and vHub end when their supervisor has been gone for so long."""
+    vhub_back_ns: Deadline = _default("30 s", "vhub_back")
+    client_back_ns: Deadline = _default("2 s", "client_back")
 
 
 def _int_only(value: object) -> object:
@@ -200,7 +204,7 @@ class Deployment(Part):
     engine: Literal["bullet", "pure"]
     pace: PaceField
     mixed_cpu: bool = False
-    on_node_loss: Literal["adopt", "stop"] = "adopt"
+    on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
     table: Table
     assets: AssetFolder = "."
     scenery: dict[Name, Scenery] = Field(default={}, max_length=SCENERY_MAX)

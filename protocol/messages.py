@@ -65,7 +65,19 @@ class Push(Message, frozen=True):
     impulse: Vector
 
 
-Edit = Add | Remove | Push
+class Freeze(Message, frozen=True):
+    """Take a robot out of service: it holds still, senses nothing, and no packet reaches it (`down` in the frame)."""
+
+    name: Name
+
+
+class Thaw(Message, frozen=True):
+    """Put a robot that was frozen back into service."""
+
+    name: Name
+
+
+Edit = Add | Remove | Push | Freeze | Thaw
 Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 
@@ -229,36 +241,37 @@ class AddedEntity(Item, frozen=True):
 Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
 
 
+class Recall(Message, frozen=True):
+    """The supervisor, started as `boot`, does not know a process that takes part: who knows another one says hello."""
+
+    boot: Name
+
+
+class Origin(Item, frozen=True):
+    """Where a run begins that does not begin anew: at frame `tick` of `source`, with that frame's digest and the chain
+    over all frames up to it."""
+
+    tick: Counter
+    source: Text
+    digest: Digest
+    chain: Digest
+
+
 class Build(Message, frozen=True):
-    """Everything that a process needs to build the world: one address was all that it had to know."""
+    """Everything that a process needs to build the world: one address was all that it had to know.
+
+    `supervisor` is the boot of the supervisor that says it.
+    """
 
     name: Name
     boot: Name
+    supervisor: Name
     run: Name
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     pace: Name
     added: Added
-
-
-class Fetch(Message, frozen=True):
-    """A process that builds the world asks for the file with this digest, from the byte at `offset` on."""
-
-    name: Name
-    boot: Name
-    digest: Digest
-    offset: Counter
-
-
-class Piece(Message, frozen=True):
-    """The bytes at `offset` of the file of `size` bytes with this digest."""
-
-    name: Name
-    boot: Name
-    digest: Digest
-    offset: Counter
-    size: Annotated[int, Meta(ge=0, le=limits.ASSET_BYTES_MAX)]
-    content: Annotated[bytes, Meta(max_length=limits.ASSET_PIECE_BYTES)]
+    origin: Origin | None = None
 
 
 class Refusal(Message, frozen=True, tag="refusal"):
@@ -279,6 +292,17 @@ class Ready(Message, frozen=True):
     boot: Name
     layout: Digest
     fingerprint: Digest
+
+
+class Standing(Message, frozen=True):
+    """How far the vHub has come, for a supervisor that takes over: the highest epoch that it knows, its last commit as
+    it came (empty before the first), the chain over the frames up to it, and its layout beside the deployment's."""
+
+    name: Name
+    epoch: Counter
+    commit: Numbers
+    chain: Digest
+    added: Added
 
 
 class Prepare(Message, frozen=True):
@@ -355,17 +379,24 @@ class Subscription(Item, frozen=True):
 
 
 class ClientHello(Message, frozen=True, tag="clienthello"):
-    """A client asks to be let in. `received` is the last downlink number it has."""
+    """A client asks to be let in. `received` is the last downlink number it has.
+
+    `again`: it had been let in before, has lost the vHub, and goes on with its own numbers.
+    """
 
     name: Name
     boot: Name
     version: Counter
     world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     received: Counter
+    again: bool = False
 
 
 class ClientWelcome(Message, frozen=True):
-    """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1."""
+    """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1.
+
+    Everything up to `sequence` is recorded, nothing behind it is: who comes back sends that again.
+    """
 
     name: Name
     boot: Name
@@ -374,6 +405,7 @@ class ClientWelcome(Message, frozen=True):
     downlink: Counter
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
+    run: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
 
 
 class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
@@ -407,7 +439,7 @@ class Join(Message, frozen=True):
 
 
 class Up(Message, frozen=True):
-    """Packets of a free-running client."""
+    """Packets of a free-running client, numbered one after the other; the vHub takes none behind a gap."""
 
     name: Name
     boot: Name
@@ -452,3 +484,12 @@ class Down(Message, frozen=True):
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     ended: bool
+
+
+class Heard(Message, frozen=True):
+    """The vHub has recorded what a free-running client sent up to the number `acknowledged`.
+
+    Downlinks say the same; this is for a client that gets none.
+    """
+
+    acknowledged: Counter

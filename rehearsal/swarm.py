@@ -23,6 +23,7 @@ from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.records import CommitRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.vhub.records import Closing, HubRecord, TickRecord
 
@@ -193,6 +194,26 @@ def _push(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "push", "push the ball", partial(System.request, verb="push", impulse=impulse))
 
 
+def _supervisor(dice: Dice, names: Sequence[str]) -> Fault:
+    amid, down_ms = dice.between(0, 3), dice.one_of((0, 1, 30, 600))
+
+    def do(system: System) -> None:
+        if channels.SUPERVISOR not in system.processes or system.is_dying(channels.SUPERVISOR):
+            return
+        system.end_amid(channels.SUPERVISOR, amid)
+        system.later(down_ms * MS, partial(_revive_supervisor, system, down_ms))
+
+    return Fault(_tick(dice), "supervisor", f"end the supervisor, {amid} actions into a turn, for {down_ms} ms", do)
+
+
+def _revive_supervisor(system: System, down_ms: int) -> None:
+    """Start the supervisor when it has ended; it has not while it had nothing to do since."""
+    if channels.SUPERVISOR in system.processes:
+        system.later((down_ms + 1) * MS, partial(_revive_supervisor, system, down_ms))
+    else:
+        system.start(channels.SUPERVISOR)
+
+
 FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "kill": _kill,
     "pause": _pause,
@@ -202,6 +223,7 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "stop": _stop,
     "slow": _slow,
     "push": _push,
+    "supervisor": _supervisor,
 }
 KINDS: Final = list(FAULT_OF)
 
@@ -237,16 +259,21 @@ class Laws:
                 self._closed = record.tick
             return
         record = decode_any(SupervisorRecord, traced.payload)
-        if isinstance(record, Commit) and record.tick > 0:
-            _hold(record.tick == self._committed + 1, f"commit {record.tick} after {self._committed}")
-            self._committed = record.tick
-            solved = sorted(index for each in self._solved.pop((record.epoch, record.tick)).values() for index in each)
-            _hold(solved == list(range(len(solved))), f"tick {record.tick}: entities {solved} are solved")
+        if isinstance(record, CommitRecord):
+            self._committed_one(decode(Commit, record.commit))
+            self._written[channels.SUPERVISOR].add(record.commit)
         elif isinstance(record, Epoch):
             _hold(record.epoch == self._epoch + 1, f"epoch {record.epoch} after {self._epoch}")
             _hold(record.tick == self._committed, f"epoch {record.epoch} does not start at the last commit")
             self._epoch = record.epoch
         self._written[channels.SUPERVISOR].add(traced.payload)
+
+    def _committed_one(self, commit: Commit) -> None:
+        if commit.tick > 0:
+            _hold(commit.tick == self._committed + 1, f"commit {commit.tick} after {self._committed}")
+            self._committed = commit.tick
+            solved = sorted(index for each in self._solved.pop((commit.epoch, commit.tick)).values() for index in each)
+            _hold(solved == list(range(len(solved))), f"tick {commit.tick}: entities {solved} are solved")
 
     def _said(self, traced: Traced) -> None:
         if traced.channel == channels.PART.name:
@@ -306,6 +333,7 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None) -> Fl
         settings or Settings(),
         weather=plan.weather,
         restart_ns=RESTART_NS,
+        keeps_journals=True,
         observer=laws.see,
         on_closing=laws.close,
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from heapq import heappop, heappush
 from typing import Any, Final
 
 from foosim.client.core import ClientCore
@@ -24,8 +25,10 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Epoch, Request
 from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
+from foosim.rehearsal.hub_journal import Ending, HubJournal
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.records import fold
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
@@ -33,6 +36,10 @@ from foosim.vhub.records import Closing
 OPERATOR: Final = "operator"
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
+
+
+HUB_BACK_NS: Final = 300_000_000
+"""After how long a vHub that ended is there again, as a launcher starts it."""
 
 
 class Stuck(AssertionError):
@@ -66,6 +73,8 @@ class Settings:
     supervisor: type[SupervisorCore] = SupervisorCore
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
+    keeps_journals: bool = False
+    """Whether the supervisor's journal is kept, so that it can be started again."""
     restart_ns: int = 0
     """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
     observer: Observer | None = None
@@ -89,16 +98,22 @@ class System:
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
+        self._timers: list[tuple[int, int, Callable[[], object]]] = []
+        self._frames: list[Frame] = []
+        """Committed in the present turn of the supervisor."""
+        self._dying: dict[str, int] = {}
+        """Processes that end amid their next actions: how many of these they still perform."""
         self._boots = 0
+        self._run = settings
+        self._journal: list[bytes] = []
+        """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
-        self.supervisor.on_commit = self._committed
-        self.hub = rehearsal.hub("boot", fingerprint, 0)
         deployment = self.supervisor.deployment
-        self._enter(channels.SUPERVISOR, self.supervisor, self.supervisor.advance, channels.SUPERVISOR_READS)
-        self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
-        self.processes[channels.SUPERVISOR].took = self.supervisor.watch.took
-        self.processes[channels.VHUB].took = self.hub.waits.took
+        self._enter_supervisor()
+        self.hub_journal = HubJournal()
+        self.hub: HubCore
+        self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
         for name, player in sorted(deployment.players.items()):
@@ -108,12 +123,33 @@ class System:
             self._enter(name, core, loop.step, channels.CLIENT_READS)
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
         self._last_commit_ns = 0
+        self._hub_back_ns = HUB_BACK_NS
 
     def _enter(
         self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
     ) -> None:
         self.bus.subscribe(name, reads)
         self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
+
+    def _enter_supervisor(self) -> None:
+        core = self.supervisor
+        core.on_commit = self._frames.append
+        self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
+        self.processes[channels.SUPERVISOR].took = core.watch.took
+
+    def _enter_hub(self, fingerprint: bytes) -> None:
+        """Let a vHub in, which goes on from the journal of the one before."""
+        self._boots += 1
+        hub = self.hub = self.settings.hub(f"boot-{self._boots}", fingerprint, self.bus.now_ns)
+
+        def turn(now_ns: int) -> None:
+            build = hub.member.build
+            if build is not None and hub.state is None:
+                hub.begin(self.hub_journal.past(hub, build.run), now_ns)
+            hub.advance(now_ns)
+
+        self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
+        self.processes[channels.VHUB].took = hub.waits.took
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -145,6 +181,9 @@ class System:
                 self._deliver()
                 continue
             deadline_ns = self._deadline_ns()
+            if self._timers and self._timers[0][0] <= min(deadline_ns, arrival_ns or deadline_ns):
+                self._go_off()
+                continue
             if arrival_ns is not None and arrival_ns <= deadline_ns:
                 bus.now_ns = arrival_ns
                 self._deliver()
@@ -191,6 +230,10 @@ class System:
         process.turn(self.bus.now_ns)
         self._perform(process)
 
+    def _turn(self, process: Process) -> None:
+        process.turn(self.bus.now_ns)
+        self._perform(process)
+
     def _core_deadline_ns(self, process: Process) -> int:
         core = process.core
         deadline: int = core.deadline_ns(self.bus.now_ns) if core is self.supervisor else core.deadline_ns()
@@ -212,18 +255,29 @@ class System:
         actions = process.core.actions
         if not actions:
             return
+        left = self._dying.pop(process.name, None)
+        if left is not None:
+            del actions[left:]
+            self.processes.pop(process.name)
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
             process.busy_until_ns = leaves_ns
             process.took(self.bus.now_ns, leaves_ns)
         for action in actions:
+            if self.hub_journal.ending and type(action) is Journal and process.core is self.hub:
+                if self.hub_journal.ending == "unsaid":
+                    self._keep(leaves_ns, process, action)
+                self._end_hub()
+                return
             if type(action) is Publish:
                 self._trace(leaves_ns, process, "publish", action.channel.name, action.payload)
                 self.bus.put(process.name, action.channel, action.name, action.payload, leaves_ns)
             else:
                 self._keep(leaves_ns, process, action)
         actions.clear()
+        if process.core is self.supervisor and self._frames:
+            self._tell_commits(was_cut=left is not None)
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             farewell = self.hub.farewell()
             self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
@@ -234,12 +288,18 @@ class System:
         settings = self.settings
         if isinstance(action, Journal):
             self._trace(now_ns, process, "journal", "", action.record)
+            if process.core is self.hub:
+                self.hub_journal.append(action.record)
+            elif settings.keeps_journals:
+                self._journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
         elif isinstance(action, Keep):
+            self.hub_journal.captured_tick = action.closing.frame.tick
             if settings.on_closing is not None:
                 settings.on_closing(action.closing)
         elif isinstance(action, KeepEpoch):
+            self.hub_journal.captured_epoch = action.epoch.epoch
             if settings.on_epoch is not None:
                 settings.on_epoch(action.epoch)
         elif isinstance(action, Say) and settings.on_say is not None:
@@ -249,11 +309,17 @@ class System:
         if self.settings.observer is not None:
             self.settings.observer(Traced(now_ns, process.name, what, channel, payload))
 
-    def _committed(self, frame: Frame) -> None:
-        self._last_commit_ns = self.bus.now_ns
-        if self.settings.on_commit is not None:
-            self.settings.on_commit(frame)
-        self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
+    def _tell_commits(self, was_cut: bool) -> None:
+        """Tell of the frames that were committed; what a supervisor that ended had not written never was."""
+        frames = self._frames.copy()
+        self._frames.clear()
+        written = fold(self.supervisor.deployment, self._journal).frame.tick if was_cut else frames[-1].tick
+        for frame in frames:
+            if frame.tick <= written:
+                self._last_commit_ns = self.bus.now_ns
+                if self.settings.on_commit is not None:
+                    self.settings.on_commit(frame)
+                self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
 
     def _where(self) -> str:
         nodes = {name: process.core.waiting_for for name, process in self.processes.items() if name in self.solvers}
@@ -265,19 +331,48 @@ class System:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
 
+    def later(self, after_ns: int, action: Callable[[], object]) -> None:
+        """Call `action` when some virtual time has passed."""
+        self._boots += 1
+        heappush(self._timers, (self.bus.now_ns + after_ns, self._boots, action))
+
+    def _go_off(self) -> None:
+        due_ns, _, action = heappop(self._timers)
+        self.bus.now_ns = max(self.bus.now_ns, due_ns)
+        self._next.append(action)
+
     def kill(self, name: str) -> None:
-        """End a node's process at once: what is on its way to it is lost, the supervisor sees the connection close."""
+        """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
         self.processes.pop(name)
+        if name == channels.SUPERVISOR:
+            return
         self.solvers.pop(name).close()
-        supervisor = self.processes[channels.SUPERVISOR]
+        if channels.SUPERVISOR not in self.processes:
+            return
         self.supervisor.process_gone(name, self.bus.now_ns)
-        supervisor.turn(self.bus.now_ns)
-        self._perform(supervisor)
+        self._turn(self.processes[channels.SUPERVISOR])
+
+    def end_amid(self, name: str, actions: int) -> None:
+        """End the supervisor amid its next turn, when it has performed so many of its actions."""
+        self._dying[name] = actions
+
+    def is_dying(self, name: str) -> bool:
+        """Whether a process ends amid its next turn."""
+        return name in self._dying
 
     def start(self, name: str) -> None:
-        """Start a node's process again, with a new boot."""
+        """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""
         assert name not in self.processes, f"{name} is running"
-        self._enter_node(name, library_fingerprint())
+        if name == channels.SUPERVISOR:
+            self._boots += 1
+            history = fold(self.supervisor.deployment, self._journal)
+            boot = f"boot-{self._boots}"
+            self.supervisor = self.settings.supervisor(
+                self._run, library_fingerprint(), self.bus.now_ns, boot, history=history
+            )
+            self._enter_supervisor()
+        else:
+            self._enter_node(name, library_fingerprint())
         self._wake(self.processes[name])
 
     def _start_again(self, name: str, refused: Solver) -> None:
@@ -288,6 +383,41 @@ class System:
         self.solvers.pop(name).close()
         self._enter_node(name, library_fingerprint())
         self.pause(name, self.settings.restart_ns)
+
+    def kill_hub(self, ending: Ending = "now", back_ns: int = HUB_BACK_NS) -> None:
+        """End the vHub's process, at once or at its next record; another one is started after a while."""
+        if channels.VHUB not in self.processes or self.hub_journal.ending or self.hub.ended is not None:
+            return
+        self._hub_back_ns = back_ns
+        if ending == "now":
+            self._end_hub()
+        else:
+            self.hub_journal.ending = ending
+
+    def _end_hub(self) -> None:
+        """What the vHub had not done yet is not done; the others see its connections close."""
+        self.hub_journal.ending = None
+        self.processes.pop(channels.VHUB)
+        self.hub.actions.clear()
+        self.after(self._hub_back_ns, self._start_hub)
+        now_ns = self.bus.now_ns
+        self.supervisor.process_gone(channels.VHUB, now_ns)
+        for loop in self.players.values():
+            loop.core.hub_gone(now_ns)
+        for name in (channels.SUPERVISOR, *self.players):
+            self._turn(self.processes[name])
+
+    def _start_hub(self) -> None:
+        self._enter_hub(library_fingerprint())
+        self._wake(self.processes[channels.VHUB])
+        for name, loop in self.players.items():
+            loop.core.hub_here(self.bus.now_ns)
+            self._wake(self.processes[name])
+
+    def after(self, for_ns: int, action: Callable[[], object]) -> None:
+        """Call `action` after some virtual time."""
+        self._boots += 1
+        heappush(self._timers, (self.bus.now_ns + for_ns, self._boots, action))
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
+from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.codec import decode_json, encode
 from foosim.protocol.fetching import piece_of
-from foosim.protocol.messages import Build, Farewell, Fetch, Heartbeat, Hello, Ready, Refusal
+from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Recall, Refusal
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -36,7 +37,7 @@ class Handshake:
         core.roster.take(hello, now_ns)
         run, pace, added = core.settings, str(core.pacer.pace), core.added_to(core.frame.layout)
         deployment = run.deployment_name, run.deployment_text
-        build = Build(hello.name, hello.boot, run.run, *deployment, pace, added)
+        build = Build(hello.name, hello.boot, core.boot, run.run, *deployment, pace, added, run.origin)
         core.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
 
     def fetch(self, fetch: Fetch, payload: bytes, now_ns: int) -> None:
@@ -70,9 +71,13 @@ class Handshake:
         if reason:
             self.refuse(process.role, process.name, process.boot, reason)
             return
-        if core.epoch == 0:
+        if core.take_over is not None:
+            core.take_over.wake(now_ns)
+        elif not core.is_open:
             core.start_if_ready(now_ns)
-        elif process.name in (*core.members, channels.VHUB):
+        elif process.name == channels.VHUB:
+            core.absence.ready(now_ns)
+        elif process.name in core.members:
             if ready.layout == core.frame.layout.digest:
                 core.say_epoch()
         elif ready.layout == core.frame.layout.digest:
@@ -86,10 +91,14 @@ class Handshake:
         core = self._core
         process = core.roster.by_name.get(heartbeat.sender)
         if process is None:
+            if heartbeat.sender in core.roster.expected:
+                core.actions.append(Publish(channels.RECALL, channels.SUPERVISOR, encode(Recall(core.boot))))
             core.count_repeat()
             return
         process.heard_ns = now_ns
-        if process.lost:
+        if process.lost and process.name == channels.VHUB:
+            core.absence.hear(now_ns)
+        elif process.lost:
             core.recovery.hear(process, now_ns)
         if not heartbeat.report:
             core.watch.told(heartbeat)
@@ -99,7 +108,7 @@ class Handshake:
         process.report = report if isinstance(report, dict) else {}
         if core.end is not None:
             core.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(core.end)))
-        elif core.epoch > 0 and heartbeat.epoch < core.epoch:
+        elif core.is_open and heartbeat.epoch < core.epoch:
             core.say_epoch()
             if heartbeat.sender == channels.VHUB:
                 core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))

@@ -39,18 +39,21 @@ def result(core: SupervisorCore) -> dict[str, Any]:
     red, blue = frame.score
     lags = core.pacer.lags
     fast = core.pacer.is_fast
+    origin = core.settings.origin
     return {
         "run": core.settings.run,
         "world": core.deployment.world,
         "seed": core.deployment.seed,
         "ticks": frame.tick,
+        "first_tick": core.first_tick,
         "tick_ns": core.deployment.tick_ns,
-        "rtf": round(frame.tick * core.deployment.tick_ns / wall_ns, 3) if wall_ns > 0 else None,
+        "rtf": round((frame.tick - core.first_tick) * core.deployment.tick_ns / wall_ns, 3) if wall_ns > 0 else None,
         "lag_ms": None
         if fast
         else {"p50": lags.quantile_ms(0.5), "p99": lags.quantile_ms(0.99), "max": lags.max_ns / 1e6},
         "digest": {"frame": frame.digest.hex(), "chain": core.chain.hex()},
         "packets": report.get("packets", NO_PACKETS),
+        "from": None if origin is None else {"capture": origin.source, "tick": origin.tick},
         "nodes": {
             name: {
                 "owned": sorted(robot for robot, owner in core.owners.items() if owner == name),
@@ -107,13 +110,13 @@ def _processes(core: SupervisorCore, waiting_for: str) -> dict[str, Any]:
         for name, process in sorted(core.roster.by_name.items())
     }
     own = {"role": SUPERVISOR, "lost": False, "stopped": False, "busy": round(core.busy, 3)}
-    told = {"tick": core.frame.tick, "waiting_for": waiting_for, "refused": core.door.by_sender()}
+    told = {"tick": core.frame.tick, "waiting_for": waiting_for, "refused": core.refusals.by_sender()}
     return {**processes, SUPERVISOR: {**own, **told}}
 
 
 def _state(core: SupervisorCore) -> str:
     if core.end is not None:
         return "failed" if core.end.failed else "ended"
-    if core.epoch == 0:
-        return "starting"
+    if not core.is_open:
+        return "starting" if core.take_over is None else "recovering"
     return "paused" if core.pacer.paused else "running"

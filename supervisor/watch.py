@@ -119,7 +119,7 @@ class Watch:
 
     def waiting_for(self, core: SupervisorCore) -> list[str]:
         """Return who is being waited for: processes and lockstep clients, in name order."""
-        if core.epoch == 0:
+        if not core.is_open:
             missing = self.roster.missing(core.frame.layout.digest)
             clients = self._hub_waits_for() if missing == [VHUB] else []
             return clients or missing
@@ -139,11 +139,16 @@ class Watch:
         """Return who is lost, and why."""
         self.now_ns = now_ns
         deadlines = self.deployment.deadlines
+        if core.take_over is not None:
+            return {}
         if core.epoch == 0:
             return self._late_to_start(core, now_ns)
         silent = self.roster.silent(now_ns, deadlines.heartbeat_ns)
         if silent:
             return dict.fromkeys(silent, f"no heartbeat for {deadlines.heartbeat_ns / 1e9:g} s")
+        if core.absence.is_away:
+            self._progress_ns = now_ns  # nothing goes on without it, and nobody else is to blame
+            return {}
         names = [name for name in self.waiting_for(core) if name in core.members or name not in self.deployment.nodes]
         if all(name in self.deployment.players or name in self.deployment.clients for name in names):
             self._progress_ns = max(self._progress_ns, now_ns - deadlines.tick_named_ns)  # the vHub has their deadline

@@ -66,7 +66,10 @@ SHELLS = {
     "supervisor/plan.py",
     "supervisor/run_folder.py",
     "supervisor/up.py",
+    "vhub/capture_file.py",
+    "vhub/branching.py",
     "vhub/capture_reader.py",
+    "vhub/capture_recovery.py",
     "vhub/capture_writer.py",
     "vhub/main.py",
 }

@@ -56,6 +56,7 @@ class Talk:
             inspect.IntType: self._number,
             inspect.FloatType: lambda kind: self.rng.choice((0.0, -1.0, 1e308, _NAN, _INFINITE)),
             inspect.BoolType: lambda kind: self.rng.random() < 0.5,
+            inspect.NoneType: lambda kind: None,
             inspect.StrType: lambda kind: self.rng.choice(
                 [name for name in NAMES if len(name) >= (kind.min_length or 0)]
             ),

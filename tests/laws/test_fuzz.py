@@ -18,8 +18,8 @@ import pytest
 from foosim.protocol import channels
 from foosim.protocol.channels import CLIENT_READS, NODE_READS, SUPERVISOR, SUPERVISOR_READS, VHUB, VHUB_READS, Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.door import OTHERS
 from foosim.protocol.errors import Malformed
+from foosim.protocol.refusals import OTHERS
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed, Fuzz, Running
@@ -95,10 +95,10 @@ class Target:
         """Let the core take it, and go on as its shell would."""
         core: Any = self._process.core
         name = self._rng.choice(NAMES) if self._rng.random() > TRUE else self._true_name(channel, is_addressed)
-        before = dict(core.door.counts)
+        before = dict(core.refusals.counts)
         self._now_ns += STEP_NS
         core.receive(channel, name, payload, self._now_ns)
-        after = core.door.counts
+        after = core.refusals.counts
         changed = {key: count - before.get(key, 0) for key, count in after.items() if count != before.get(key, 0)}
         if not is_message(channel, name, payload):
             assert changed in ({(channel.name, name): 1}, {(channel.name, OTHERS): 1}), changed

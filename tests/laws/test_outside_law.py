@@ -19,6 +19,7 @@ from msgspec.structs import replace
 
 from foosim.client.core import ClientCore
 from foosim.protocol import channels, limits
+from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.errors import Malformed
@@ -34,22 +35,22 @@ from foosim.protocol.messages import (
     Edit,
     Epoch,
     Farewell,
-    Fetch,
     Go,
     Heartbeat,
     Hello,
     Join,
     Order,
     Part,
-    Piece,
     Prepare,
     Push,
     Ready,
+    Recall,
     Refusal,
     Request,
     RobotPacket,
     Samples,
     Sent,
+    Standing,
     Tempo,
     Up,
     Want,
@@ -147,7 +148,7 @@ def lies_to_nodes(system: System) -> list[Lie]:
         (channels.EPOCH, SUPERVISOR, replace(new, roster=["n1", "n1", "n2"])),
         (channels.EPOCH, SUPERVISOR, replace(new, added=[AddedEntity("dragon", "dragon")])),
         (channels.PREPARE, SUPERVISOR, Prepare([AddedEntity("red.goal", "ball")])),
-        (channels.BUILD, "n1", Build("n1", "other", "run", "t", "", "fast", [])),
+        (channels.BUILD, "n1", Build("n1", "other", "first", "run", "t", "", "fast", [])),
         (channels.REFUSAL, "n1", Refusal("n1", "other", "go away")),
         (channels.PIECE, "n1", Piece("n1", "boot-1", bytes(32), 0, 3, b"lie")),
         (channels.COMMIT, "n1", Commit(epoch, tick, frame.digest, frame.values.tobytes(), [], [], True)),
@@ -178,7 +179,7 @@ def lies_to_the_hub(system: System) -> list[Lie]:
         (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], [], b"")),
         (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], [], b"")),
         (channels.TEMPO, SUPERVISOR, Tempo("1e999x", False)),
-        (channels.BUILD, VHUB, Build(VHUB, "other", "run", "t", "", "fast", [])),
+        (channels.BUILD, VHUB, Build(VHUB, "other", "first", "run", "t", "", "fast", [])),
         (channels.REFUSAL, VHUB, Refusal(VHUB, "other", "go away")),
         (channels.PIECE, VHUB, Piece(VHUB, "boot", bytes(32), 0, 3, b"lie")),
         (channels.CLIENT_HELLO, "player-red", ClientHello("player-red", "other", limits.PROTOCOL_VERSION, "", 0)),
@@ -215,6 +216,7 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
         (channels.HELLO, "n1", replace(hello, role="dragon", boot="boot")),
         (channels.FETCH, "n1", Fetch("n1", "boot-1", bytes(32), 0)),
         (channels.READY, "n1", Ready("n1", "other", bytes(32), bytes(32))),
+        (channels.STANDING, VHUB, Standing(VHUB, FAR, b"", bytes(32), [])),
         (channels.HEARTBEAT, "n1", replace(beat, report=b"{")),
         (channels.HEARTBEAT, "n1", beat),
         (channels.HEARTBEAT, NOBODY, replace(beat, sender=NOBODY)),
@@ -236,6 +238,7 @@ def lies(system: System) -> list[Lie]:
         *lies_to_nodes(system),
         *lies_to_the_hub(system),
         *lies_to_the_supervisor(system),
+        *((who, channels.RECALL, SUPERVISOR, Recall("other")) for who in ("n1", VHUB)),
         *((who, channels.WANT, NOBODY, stranger) for who in ("n1", VHUB, SUPERVISOR)),
         *((who, channels.WANT, NOBODY, replace(stranger, sender="n1")) for who in ("n1", VHUB, SUPERVISOR)),
         ("player-red", channels.CLIENT_WELCOME, "player-red", welcome),

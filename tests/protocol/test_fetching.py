@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish
+from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.assets import pin_assets
 from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
@@ -18,7 +19,7 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.fetching import Fetching, piece_of
 from foosim.protocol.member import AGAIN_NS, Member
-from foosim.protocol.messages import Build, Fetch, Heartbeat, Piece
+from foosim.protocol.messages import Build, Heartbeat
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SHARD: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"
@@ -90,7 +91,7 @@ def test_a_member_asks_until_all_is_there_and_lives_meanwhile(pinned: str) -> No
     """Every second message is lost; what is for another boot, or comes twice, changes nothing."""
     actions: list[Action] = []
     member = Member("node", "n1", "boot", bytes(32), "", actions, 0)
-    build = Build("n1", "boot", "run", "t", pinned, "fast", [])
+    build = Build("n1", "boot", "super", "run", "t", pinned, "fast", [])
     assert [(member.take_build(given), member.is_fetching) for given in (replace(build, boot="other"), build)] == [
         (False, False),
         (False, True),
@@ -122,7 +123,7 @@ def test_a_member_asks_until_all_is_there_and_lives_meanwhile(pinned: str) -> No
 
 def test_a_member_that_begins_anew_in_between_starts_over(pinned: str) -> None:
     member = Member("node", "n1", "boot", bytes(32), "", [], 0)
-    build = Build("n1", "boot", "run", "t", pinned, "fast", [])
+    build = Build("n1", "boot", "super", "run", "t", pinned, "fast", [])
     member.take_build(build)
     member.begin_anew()
     assert not member.is_fetching

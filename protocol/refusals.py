@@ -1,4 +1,4 @@
-"""The door of a process: what comes from outside is read here or refused, and refusals are counted by whom.
+"""What comes from outside is read here or refused, and refusals are counted by whom.
 
 Each refusal is counted by channel and sender; the first few of each are logged with their first bytes, for whoever has
 to find out. A stranger, under a name that the deployment does not declare, who is refused more than 100 times in a
@@ -47,7 +47,7 @@ class Quarantined(Malformed):
     """It was not looked at: too much that came under this name was refused."""
 
 
-class Door:
+class Refusals:
     """Reads what comes, and keeps the account of what is refused."""
 
     def __init__(self, say: Callable[[Say], object], deployment: Callable[[], Deployment | None]) -> None:

@@ -1,4 +1,4 @@
-"""The door: refusals counted by whom, the first ones told with their bytes, strangers who go too far shut out."""
+"""Refusals, counted by whom, the first ones told with their bytes, strangers who go too far shut out."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from foosim.protocol.actions import Say
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.door import OTHERS, QUARANTINE_NS, REFUSALS_MAX, TOLD_MAX, WINDOW_NS, Door, Quarantined
 from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import Want
+from foosim.protocol.refusals import OTHERS, QUARANTINE_NS, REFUSALS_MAX, TOLD_MAX, WINDOW_NS, Quarantined, Refusals
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final[Deployment] = load_deployment(TABLE.read_text(), TABLE.name)
 
 
 class Guard:
-    """A door, and what it says. `knock` brings something and returns whether it was let in, refused or shut out."""
+    """Refusals, and what it says. `knock` brings something and returns whether it was let in, refused or shut out."""
 
     def __init__(self, deployment: Deployment | None = DEPLOYMENT) -> None:
         self.said: list[Say] = []
-        self.door = Door(self.said.append, lambda: deployment)
+        self.refusals = Refusals(self.said.append, lambda: deployment)
 
     def knock(self, name: str, now_ns: int, payload: bytes = b"\xc1") -> str:
         try:
-            self.door.read(channels.WANT, name, payload, now_ns)
+            self.refusals.read(channels.WANT, name, payload, now_ns)
         except Malformed as error:
-            self.door.refuse(channels.WANT, name, payload, error, now_ns)
+            self.refusals.refuse(channels.WANT, name, payload, error, now_ns)
             return "shut out" if isinstance(error, Quarantined) else "refused"
         return "in"
 
@@ -44,8 +44,8 @@ def test_the_first_refusals_of_each_sender_are_told_with_their_bytes() -> None:
     guard = Guard()
     for number in range(5):
         assert guard.knock("red", number, b"\xc1" * 40) == guard.knock("x\n", number, b"") == "refused"
-    assert guard.door.counts == {("want", "red"): 5, ("want", "x\n"): 5}
-    assert guard.door.by_sender() == {"want 'x\\n'": 5, "want red": 5}
+    assert guard.refusals.counts == {("want", "red"): 5, ("want", "x\n"): 5}
+    assert guard.refusals.by_sender() == {"want 'x\\n'": 5, "want red": 5}
     lines = [say.text for say in guard.said]
     assert len(lines) == 6 and all("\n" not in line for line in lines)
     assert lines[0].startswith("refused from red on want: ") and lines[0].endswith(f"(40 bytes: {'c1' * 32})")
@@ -59,7 +59,7 @@ def test_a_stranger_who_goes_too_far_is_shut_out_for_a_while() -> None:
     assert guard.knock("stranger", 6) == "refused"
     assert guard.knock("stranger", 7, true_want("stranger")) == "shut out"
     assert guard.knock("stranger", 6 + QUARANTINE_NS - 1) == "shut out"
-    assert guard.door.counts == {("want", "stranger"): REFUSALS_MAX + 3}
+    assert guard.refusals.counts == {("want", "stranger"): REFUSALS_MAX + 3}
     (error,) = [say.text for say in guard.said if say.level == "error"]
     assert error == "more than 100 messages of stranger were refused within a second: it is in quarantine for 10 s"
     assert guard.knock("stranger", 6 + QUARANTINE_NS, true_want("stranger")) == "in"
@@ -92,6 +92,6 @@ def test_a_crowd_of_names_costs_no_more_than_a_limit() -> None:
     guard = Guard()
     for number in range(3 * limits.CLIENTS_MAX):
         guard.knock(f"s{number}", number)
-    assert len(guard.door.counts) == limits.CLIENTS_MAX + 1
-    assert guard.door.counts["want", OTHERS] == 2 * limits.CLIENTS_MAX
+    assert len(guard.refusals.counts) == limits.CLIENTS_MAX + 1
+    assert guard.refusals.counts["want", OTHERS] == 2 * limits.CLIENTS_MAX
     assert len(guard.said) == TOLD_MAX
