@@ -40,6 +40,7 @@ from foosim.protocol.messages import (
     Outbox,
     Part,
     Prepare,
+    Recall,
     Samples,
     Want,
 )
@@ -110,7 +111,7 @@ class NodeCore:
             channels.EPOCH.name: self._on_epoch,
             channels.COMMIT.name: self._on_commit,
             channels.WANT.name: self._on_want,
-            channels.RECALL.name: self.member.recall,
+            channels.RECALL.name: self._on_recall,
             channels.BUILD.name: self._on_build,
             channels.PIECE.name: self._on_build,
             channels.PREPARE.name: self._on_prepare,
@@ -125,10 +126,9 @@ class NodeCore:
             if channel is channels.REFUSAL:
                 self._repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
                 return
-            reader = self._readers.get(channel.name)
-            if reader is None:
+            if channel.name not in self._readers:
                 raise Malformed(f"a node does not read the channel {channel.name}")
-            reader(self.refusals.read(channel, name, payload, now_ns), payload, now_ns)
+            self._readers[channel.name](self.refusals.read(channel, name, payload, now_ns), payload, now_ns)
         except Malformed as error:
             self._refused += 1
             self.refusals.refuse(channel, name, payload, error, now_ns)
@@ -395,6 +395,9 @@ class NodeCore:
         self.deployment, layout = self.member.deployment, self.member.layout
         assert layout is not None
         self.member.want_layout(layout)
+
+    def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
+        self._repeated += not self.member.recall(recall)
 
     def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
         if self.deployment is not None:

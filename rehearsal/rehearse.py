@@ -93,7 +93,7 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
 
     settings.on_commit = committed
     pace = pace or Pace("fast")
-    run = RunSettings(settings.run, name, text, pace, ticks, start, files)
+    run = RunSettings(settings.run, name, text, pace, ticks, start, files=files)
     writer = None if capture is None else _open_capture(capture, deployment, text, name, settings, run)
     system = System(run, settings)
     if prepare is not None:

@@ -19,6 +19,7 @@ from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.protocol.messages import Commit, Deliveries, Epoch, Part
 from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import CALM, Traced, Weather
+from foosim.rehearsal.hub_journal import ENDINGS
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import Settings, System
@@ -32,7 +33,7 @@ HEALED_TICK: Final = 240
 """From here on nothing new happens, and what is down comes up."""
 FAULTS: Final = (8, 20)
 NODES: Final = (3, 6)
-PATIENT: Final = ("deadlines.tick_lost=5 s", "deadlines.lockstep_fast=1 h")
+PATIENT: Final = ("deadlines.tick_lost=5 s", "deadlines.lockstep_fast=1 h", "deadlines.client_back=1 h")
 """A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
 MS: Final = 1_000_000
 RESTART_NS: Final = 500 * MS
@@ -189,6 +190,12 @@ def _add(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "add", f"{verb} {name}", partial(System.request, verb=verb, **arguments))
 
 
+def _vhub(dice: Dice, names: Sequence[str]) -> Fault:
+    ending, back_ms = dice.one_of(ENDINGS), dice.one_of((1, 40, 400, 2_000))
+    kill = partial(System.kill_hub, ending=ending, back_ns=back_ms * MS)
+    return Fault(_tick(dice), "vhub", f"kill the vHub ({ending}), back after {back_ms} ms", kill)
+
+
 def _push(dice: Dice, names: Sequence[str]) -> Fault:
     impulse = [0.04 * (dice.unit() - 0.5) for _ in range(3)]
     return Fault(_tick(dice), "push", "push the ball", partial(System.request, verb="push", impulse=impulse))
@@ -224,6 +231,7 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "slow": _slow,
     "push": _push,
     "supervisor": _supervisor,
+    "vhub": _vhub,
 }
 KINDS: Final = list(FAULT_OF)
 
@@ -241,6 +249,7 @@ class Laws:
         self._solved: dict[tuple[int, int], dict[str, list[int]]] = {}
         self._written: dict[str, set[bytes]] = {channels.SUPERVISOR: set(), channels.VHUB: set()}
         self._closed = -1
+        self._delivered: dict[int, bytes] = {}
         self._final = 0
         """The last tick whose deliveries were said, also together with earlier ones."""
 
@@ -288,6 +297,8 @@ class Laws:
             known = tick - 1 <= self._closed or tick <= self._final
             _hold(known, f"deliveries {tick} are said before tick {tick - 1} is written")
             self._final = max(self._final, deliveries.last)
+            said = self._delivered.setdefault(tick, traced.payload)
+            _hold(said == traced.payload, f"deliveries {tick} are said again, and are others")
 
     def close(self, closing: Closing) -> None:
         """Compute the tick again from what led to it: the frame must be the same to the last bit."""

@@ -109,10 +109,10 @@ class System:
         """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
-        deployment = self.supervisor.deployment
-        self._enter_supervisor()
         self.hub_journal = HubJournal()
         self.hub: HubCore
+        deployment = self.supervisor.deployment
+        self._enter_supervisor()
         self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
@@ -131,12 +131,6 @@ class System:
         self.bus.subscribe(name, reads)
         self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
 
-    def _enter_supervisor(self) -> None:
-        core = self.supervisor
-        core.on_commit = self._frames.append
-        self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
-        self.processes[channels.SUPERVISOR].took = core.watch.took
-
     def _enter_hub(self, fingerprint: bytes) -> None:
         """Let a vHub in, which goes on from the journal of the one before."""
         self._boots += 1
@@ -150,6 +144,12 @@ class System:
 
         self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
         self.processes[channels.VHUB].took = hub.waits.took
+
+    def _enter_supervisor(self) -> None:
+        core = self.supervisor
+        core.on_commit = self._frames.append
+        self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
+        self.processes[channels.SUPERVISOR].took = core.watch.took
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -290,7 +290,7 @@ class System:
             self._trace(now_ns, process, "journal", "", action.record)
             if process.core is self.hub:
                 self.hub_journal.append(action.record)
-            elif settings.keeps_journals:
+            if settings.keeps_journals and process.core is self.supervisor:
                 self._journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
@@ -347,10 +347,7 @@ class System:
         if name == channels.SUPERVISOR:
             return
         self.solvers.pop(name).close()
-        if channels.SUPERVISOR not in self.processes:
-            return
-        self.supervisor.process_gone(name, self.bus.now_ns)
-        self._turn(self.processes[channels.SUPERVISOR])
+        self._supervisor_sees_gone(name)
 
     def end_amid(self, name: str, actions: int) -> None:
         """End the supervisor amid its next turn, when it has performed so many of its actions."""
@@ -399,13 +396,16 @@ class System:
         self.hub_journal.ending = None
         self.processes.pop(channels.VHUB)
         self.hub.actions.clear()
-        self.after(self._hub_back_ns, self._start_hub)
-        now_ns = self.bus.now_ns
-        self.supervisor.process_gone(channels.VHUB, now_ns)
-        for loop in self.players.values():
-            loop.core.hub_gone(now_ns)
-        for name in (channels.SUPERVISOR, *self.players):
+        self.later(self._hub_back_ns, self._start_hub)
+        self._supervisor_sees_gone(channels.VHUB)
+        for name, loop in self.players.items():
+            loop.core.hub_gone(self.bus.now_ns)
             self._turn(self.processes[name])
+
+    def _supervisor_sees_gone(self, name: str) -> None:
+        if channels.SUPERVISOR in self.processes:
+            self.supervisor.process_gone(name, self.bus.now_ns)
+            self._turn(self.processes[channels.SUPERVISOR])
 
     def _start_hub(self) -> None:
         self._enter_hub(library_fingerprint())
@@ -413,11 +413,6 @@ class System:
         for name, loop in self.players.items():
             loop.core.hub_here(self.bus.now_ns)
             self._wake(self.processes[name])
-
-    def after(self, for_ns: int, action: Callable[[], object]) -> None:
-        """Call `action` after some virtual time."""
-        self._boots += 1
-        heappush(self._timers, (self.bus.now_ns + for_ns, self._boots, action))
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""

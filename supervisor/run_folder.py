@@ -38,7 +38,7 @@ UNREADABLE: Final = (OSError, msgspec.DecodeError, UnicodeDecodeError, Recursion
 
 
 class RunInfo(msgspec.Struct, frozen=True):
-    """What a run file says. `radio` is empty until the vHub has told where it listens."""
+    """What a run file says. `radio` is empty until the vHub has told where it listens, `pki` without certificates."""
 
     run: str
     world: str
@@ -47,6 +47,7 @@ class RunInfo(msgspec.Struct, frozen=True):
     started: str
     simulation: str
     radio: str = ""
+    pki: str = ""
 
 
 class RunFolder:
