@@ -41,7 +41,7 @@ class Membership(RuleBasedStateMachine):
         self.now_ns = 0
         self.epochs: list[Epoch] = []
         self.answers: list[Answer] = []
-        self.requests = 0
+        self.requests = self.refused = 0
         # the model
         self.state = dict.fromkeys(NODES, ABSENT)
         self.boots = dict.fromkeys(NODES, 0)
@@ -102,10 +102,18 @@ class Membership(RuleBasedStateMachine):
 
     # --- what happens ------------------------------------------------------------------------------------------------
 
-    @initialize()
-    def the_hub_is_here(self) -> None:
+    @initialize(everybody=st.sampled_from((True, True, False)))
+    def the_hub_is_here(self, everybody: bool) -> None:
         self.tell(channels.HELLO, VHUB, Hello("vhub", VHUB, "b0", limits.PROTOCOL_VERSION, "", PRINT))
         self.tell(channels.READY, VHUB, Ready(VHUB, "b0", self.core.frame.layout.digest, PRINT))
+        for node in NODES if everybody else ():
+            self.come(node)
+
+    @rule(node=st.sampled_from(NODES))
+    def come(self, node: str) -> None:
+        """A process starts, says hello and builds the world."""
+        self.hello(node, again=False)
+        self.ready(node, of_another=False)
 
     @rule(node=st.sampled_from(NODES), again=st.booleans())
     def hello(self, node: str, again: bool) -> None:
@@ -175,6 +183,7 @@ class Membership(RuleBasedStateMachine):
         before = self.core.missing_nodes
         self.tell(channels.PART, node, Part(max(0, self.core.epoch - behind), 1, node, bytes(32), [], b"", b"", []))
         assert self.core.missing_nodes == before
+        self.refused = self.core.statistics().refused
 
     # --- what always holds -------------------------------------------------------------------------------------------
 
@@ -198,7 +207,7 @@ class Membership(RuleBasedStateMachine):
             assert (process is None) == (self.state[node] == ABSENT)
             if process is not None:
                 assert process.lost == (self.state[node] == LOST) and process.boot == f"b{self.boots[node]}"
-        assert self.core.statistics().refused == 0 and SUPERVISOR not in self.core.roster.by_name
+        assert self.core.statistics().refused == self.refused and SUPERVISOR not in self.core.roster.by_name
 
 
 TestMembership = Membership.TestCase
