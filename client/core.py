@@ -37,6 +37,7 @@ from foosim.protocol.messages import (
     Up,
 )
 from foosim.protocol.names import CHANNEL_ECHO
+from foosim.protocol.refusals import Refusals
 
 AGAIN_NS: Final = 200_000_000
 """After how long hello is said again; a Join's wait doubles from there, up to a second."""
@@ -84,6 +85,7 @@ class ClientCore:
         self.name = name
         self.boot = boot
         self.actions: list[Action] = []
+        self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.welcome: ClientWelcome | None = None
         self.deployment: Deployment | None = None
         self.refusal = ""
@@ -138,8 +140,7 @@ class ClientCore:
             reader(message)
         except Malformed as error:
             self._malformed += 1
-            if self._malformed <= 3:
-                self.actions.append(Say("warning", f"refused on {channel.name}: {error}"))
+            self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def wake(self, now_ns: int) -> None:
         """Say again what has not been answered, when it is due."""

@@ -18,6 +18,7 @@ from foosim.node.inputs import Inputs, check_near
 from foosim.node.step import Stepper, Work, moved_counters
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.asset_messages import Piece
 from foosim.protocol.assign import Assignment, Share, reach_of
 from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
@@ -44,6 +45,7 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.patience import Patience
+from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import initial_frame
 
 
@@ -76,6 +78,7 @@ class NodeCore:
     def __init__(self, name: str, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
         self.name = name
         self.actions: list[Action] = []
+        self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.work: Work | None = None
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
@@ -110,6 +113,7 @@ class NodeCore:
             channels.WANT.name: self._on_want,
             channels.RECALL.name: self._on_recall,
             channels.BUILD.name: self._on_build,
+            channels.PIECE.name: self._on_build,
             channels.PREPARE.name: self._on_prepare,
             channels.END.name: self._on_end,
         }
@@ -120,16 +124,14 @@ class NodeCore:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self._repeated += not self.member.refuse(payload)
+                self._repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
                 return
-            reader = self._readers.get(channel.name)
-            if reader is None:
+            if channel.name not in self._readers:
                 raise Malformed(f"a node does not read the channel {channel.name}")
-            reader(channels.read(channel, name, payload), payload, now_ns)
+            self._readers[channel.name](self.refusals.read(channel, name, payload, now_ns), payload, now_ns)
         except Malformed as error:
             self._refused += 1
-            if self._refused <= 3:
-                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+            self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Go on as far as the inputs allow; `work` is set when the engine has to solve."""
@@ -320,7 +322,7 @@ class NodeCore:
         if message.epoch == self.epoch and self._awaited_epoch is None:
             return False
         if message.epoch >= self.epoch and len(self._held) < limits.INBOX_MESSAGES_MAX:
-            self._held.append((channel, message.node if isinstance(message, Part) else "", payload))
+            self._held.append((channel, message.node if isinstance(message, Part) else channels.SUPERVISOR, payload))
         else:
             self._repeated += 1
         return True
@@ -386,9 +388,9 @@ class NodeCore:
 
     # --- epochs, layouts, start and end ------------------------------------------------------------------------------
 
-    def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
+    def _on_build(self, build: Build | Piece, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
-            self._repeated += 1
+            self._repeated += not self.member.is_fetching
             return
         self.deployment, layout = self.member.deployment, self.member.layout
         assert layout is not None
@@ -494,5 +496,5 @@ class NodeCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = self.frame.tick if self.frame is not None else 0
-        report = encode_json({"solved_ticks": self._solved_ticks})
+        report = encode_json({"solved_ticks": self._solved_ticks, "refused": self.refusals.by_sender()})
         return Heartbeat(self.name, tick, self.epoch, self.waiting_for, "", self.busy, report)

@@ -17,6 +17,7 @@ from foosim.node.engines.interface import Engine, EngineFactory
 from foosim.node.step import Stepper, Work
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.mesh import Mesh
 from foosim.protocol.start import initial_numbers
 
 FINGERPRINT_TICKS: Final = 32
@@ -120,7 +121,8 @@ class Solver:
 def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
     """Return the digest of a fixed small run: a kicked ball among turning rods, 32 ticks.
 
-    It is the same for every layout: what was added to the deployment's world stays parked.
+    It is the same for every layout: what was added to the deployment's world stays parked. The meshes of the scenery,
+    as they were read here, are part of it.
     """
     deployment: Deployment = stepper.deployment
     layout = stepper.layout
@@ -136,4 +138,5 @@ def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
         work = Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})
         stepper.solve(engine, work)
     content = [number for entity in declared for number in numbers[entity.start : entity.stop]]
-    return blake2b(np.array(content).tobytes(), digest_size=32).digest()
+    meshes = [shape.geometry.digest for shape in deployment.scenery_shapes() if isinstance(shape.geometry, Mesh)]
+    return blake2b(np.array(content).tobytes() + b"".join(meshes), digest_size=32).digest()

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, get_args
 
-from foosim.protocol import limits, messages
+from foosim.protocol import asset_messages, limits, messages
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import Malformed
 
@@ -72,6 +72,8 @@ _SMALL: Final = limits.SMALL_MESSAGE_BYTES_MAX
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL)
 RECALL: Final = _simulation("recall", messages.Recall, "supervisor", "node, vhub", "an unknown heartbeat", named=False)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
+FETCH: Final = _simulation("fetch", asset_messages.Fetch, "node, vhub", "supervisor", "a piece of a file")
+PIECE: Final = _simulation("piece", asset_messages.Piece, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation(
     "ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch", bytes_max=_SMALL
@@ -104,6 +106,8 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     HELLO,
     RECALL,
     BUILD,
+    FETCH,
+    PIECE,
     REFUSAL,
     READY,
     STANDING,
@@ -148,14 +152,14 @@ def read(channel: Channel, name: str, payload: bytes) -> Any:
     return message
 
 
-NODE_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
+NODE_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
     RECALL, PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
 )))  # fmt: skip
-VHUB_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
+VHUB_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
     RECALL, EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final = tuple((channel, False) for channel in (
-    HELLO, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
+    HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
 ))  # fmt: skip
 CLIENT_READS: Final = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
 OPERATOR_READS: Final = ((ANSWER, True),)

@@ -7,11 +7,12 @@ whose names end in `_ns` (see units.py). The table's parameters are in table.py.
 """
 
 import json
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
+from pydantic import BeforeValidator, Field, JsonValue, PrivateAttr, StringConstraints
 
 from foosim.protocol import limits, names, units
 from foosim.protocol.addresses import LOOPBACK
@@ -19,6 +20,8 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.hosts import Host, Listen, Name, Placed
 from foosim.protocol.names import LineName, Team
 from foosim.protocol.references import LINK_RULES_MAX, SELECTORS_MAX
+from foosim.protocol.scene import Shape
+from foosim.protocol.scenery import SCENERY_MAX, AssetFolder, Contents, Scenery, read_contents, scenery_shape
 from foosim.protocol.table import Part, Table
 from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks
 
@@ -222,6 +225,8 @@ class Deployment(Part):
     mixed_cpu: bool = False
     on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
     table: Table
+    assets: AssetFolder = "."
+    scenery: dict[Name, Scenery] = Field(default={}, max_length=SCENERY_MAX)
     robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     listen: Listen = LOOPBACK
     hosts: dict[Name, Host] = Field(default={}, max_length=limits.NODES_MAX)
@@ -233,6 +238,27 @@ class Deployment(Part):
     capture: Capture = Field(default_factory=Capture)
     access: AccessSpec = Field(default_factory=AccessSpec)
     deadlines: Deadlines = Field(default_factory=Deadlines)
+    _contents: Contents = PrivateAttr(default_factory=Contents)
+
+    def with_assets(self, files: Mapping[str, bytes]) -> "Deployment":
+        """The same with the contents of the files that its scenery names; raises AssetError."""
+        deployment = self.model_copy()
+        deployment._contents = read_contents(self.scenery, files)
+        return deployment
+
+    @property
+    def asset_files(self) -> Mapping[str, bytes]:
+        """The contents of the files that it was given, by path."""
+        return self._contents.files
+
+    def file_with(self, digest: str) -> bytes | None:
+        """The content of the file with this digest (hex), of those that it was given."""
+        return self._contents.by_digest.get(digest)
+
+    def scenery_shapes(self) -> list[Shape]:
+        """The scenery beside the table, in name order; files that its meshes are in were given."""
+        meshes = self._contents.meshes
+        return [scenery_shape(name, thing, meshes.get(name)) for name, thing in sorted(self.scenery.items())]
 
     def endpoints(self) -> list[str]:
         """The names that packets go from and to, sorted: robots, players and clients."""

@@ -12,6 +12,7 @@ line are placed in the same tree first: settings.py.
 import codecs
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Final
@@ -42,9 +43,13 @@ from foosim.protocol.yaml_tree import (
 PROBLEMS_MAX: Final = 100
 """How many problems are looked for and shown: a hostile file may hold many thousands, each with names to compare."""
 
+DEPLOYMENTS_KEPT: Final = 8
+"""Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time."""
+
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
 
 
+@lru_cache(maxsize=DEPLOYMENTS_KEPT)
 def load_deployment(text: str, name: str) -> Deployment:
     """The deployment in `text`; `name` is the file's in messages. Raises DeploymentError with all problems."""
     tree, problems = read_tree(text, locate_in(name))

@@ -32,6 +32,16 @@ PACKETS_PER_MESSAGE_MAX: Final = 65_536
 DEPLOYMENT_BYTES_MAX: Final = 64 * 1024
 TEXT_LENGTH_MAX: Final = 8 * 1024
 
+ASSET_BYTES_MAX: Final = 10 * 1024 * 1024
+"""One file that a deployment refers to."""
+ASSETS_BYTES_MAX: Final = 64 * 1024 * 1024
+"""All of them."""
+ASSET_PIECE_BYTES: Final = 1024 * 1024
+"""What one message carries of such a file."""
+MESH_TRIANGLES_MAX: Final = 200_000
+SCENERY_TRIANGLES_MAX: Final = 400_000
+"""All meshes of a world: a viewer is told of them in one message, and a capture's chunk holds it."""
+
 ROBOT_PACKETS_PER_TICK_MAX: Final = 1 << 16
 """A robot's sequence number is tick x 2^16 + index."""
 OUTBOX_PACKETS_MAX: Final = 64

@@ -12,11 +12,14 @@ from typing import Final, Literal
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
-from foosim.protocol.codec import decode, encode
+from foosim.protocol.asset_messages import Fetch, Piece
+from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
+from foosim.protocol.fetching import Fetching
 from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.mesh import AssetError
 from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Recall, Refusal
 
 AGAIN_NS: Final = 200_000_000
@@ -55,27 +58,66 @@ class Member:
         self._built: set[bytes] = set()
         """Digests of the layouts that were said to be ready."""
         self._entered = False
+        self._coming: tuple[Build, Deployment, Fetching] | None = None
+        """A build whose files are on their way."""
+        self._files: dict[str, bytes] = {}
+        """Files that an earlier build brought, by digest."""
         self._recalled_by = ""
         """Boot of a supervisor that has recalled this process and not answered its hello yet."""
         self.standing: Callable[[], Action] | None = None
         """Gives what is said before each ready (the vHub's)."""
 
-    def take_build(self, build: Build) -> bool:
-        """Take the supervisor's answer to hello; False when it is for another boot or a repeat."""
+    def take_build(self, build: Build | Piece) -> bool:
+        """Take the supervisor's answer to hello, and then the files that it refers to; True when all is there.
+
+        False also for what is for another boot, or a repeat.
+        """
         if build.boot != self.boot:
             return False
         if self.build is not None:
-            return self._take_again(self.build, build)
+            return isinstance(build, Build) and self._take_again(self.build, build)
+        if isinstance(build, Build):
+            if self._coming is None:
+                self._begin_build(build)
+        elif self._coming is not None and self._coming[2].take(build):
+            self.deadline_ns = 0  # the next one follows at once
+        if self._coming is None or self._coming[2].lacking is not None:
+            return False
+        self._end_build(*self._coming)
+        return True
+
+    @property
+    def is_fetching(self) -> bool:
+        """Whether files of the build are on their way."""
+        return self._coming is not None
+
+    def _begin_build(self, build: Build) -> None:
         try:
             deployment = load_deployment(build.deployment, build.deployment_name)
         except DeploymentError as error:
             raise Malformed(f"a build with a deployment that is not valid here:\n{error}") from None
+        build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
+        self._coming = build, deployment, Fetching(deployment, self._files)
+        self.deadline_ns = 0
+
+    def _end_build(self, build: Build, deployment: Deployment, fetching: Fetching) -> None:
+        self._coming, self._files = None, fetching.files
+        try:
+            deployment = deployment.with_assets(fetching.contents())
+        except AssetError as error:
+            raise Malformed(f"a build with a file that is not valid here: {error}") from None
         self.layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
         self.deployment = deployment
         self.build = build
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's says where clients find it
         self._world = deployment.world
-        return True
+
+    def _fetch(self, fetching: Fetching) -> None:
+        """Ask for what is lacking."""
+        assert fetching.lacking is not None
+        digest, offset = fetching.lacking
+        fetch = Fetch(self.name, self.boot, bytes.fromhex(digest), offset)
+        self._actions.append(Publish(channels.FETCH, self.name, encode(fetch)))
 
     @property
     def first_tick(self) -> int:
@@ -106,9 +148,8 @@ class Member:
         self.deadline_ns = 0
         return True
 
-    def refuse(self, payload: bytes) -> bool:
+    def refuse(self, refusal: Refusal) -> bool:
         """Take a refusal; False when it is meant for another boot."""
-        refusal = decode(Refusal, payload)
         if refusal.boot != self.boot:
             return False
         self.refusal = refusal.reason
@@ -152,7 +193,7 @@ class Member:
 
     def begin_anew(self) -> None:
         """The run goes on without this process: come back by the handshake. What is built stays."""
-        self.build = self.layout = self._said_ready = None
+        self.build = self.layout = self._said_ready = self._coming = None
         self.is_ready = self._entered = False
         self._recalled_by = ""
         self.deadline_ns = 0
@@ -162,6 +203,11 @@ class Member:
         if now_ns < self.deadline_ns:
             return
         if self.refusal:
+            self.deadline_ns = now_ns + AGAIN_NS
+            return
+        if self._coming is not None:
+            self._fetch(self._coming[2])
+            self._actions.append(Publish(channels.HEARTBEAT, self.name, encode(heartbeat())))
             self.deadline_ns = now_ns + AGAIN_NS
             return
         if self.build is None or self._recalled_by:

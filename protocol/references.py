@@ -39,7 +39,8 @@ class Finding:
 def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found as they are asked for."""
     view = _View(data)
-    for check in (_names, _hosts, _robots, _nodes, _players, _links, _rates, _clients, _deadlines, _lines, _shapes):
+    between = (_names, _hosts, _robots, _nodes, _players, _links, _rates, _clients, _deadlines)
+    for check in (*between, _lines, _shapes, _scenery):
         yield from check(view)
 
 
@@ -302,6 +303,14 @@ def _shapes(view: _View) -> Iterator[Finding]:
         least, most = view.length(*small), view.length(*big)
         if least is not None and most is not None and least >= most:
             yield Finding(("table", *small), what, view.get("table", *small))
+
+
+def _scenery(view: _View) -> Iterator[Finding]:
+    """The pure engine has no meshes."""
+    for name in view.mapping("scenery"):
+        if view.get("engine") == "pure" and view.get("scenery", name, "shape") == "mesh":
+            what = "the engine pure has no meshes (boxes it has, and the engine bullet has both)"
+            yield Finding(("scenery", name, "shape"), what, "mesh", "'box'")
 
 
 def _millimetres(length: Fraction) -> str | None:

@@ -8,12 +8,15 @@ in one spelling. Neighbours: `table_scene` makes the football table, `layout` ha
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import cos, sin, sqrt
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
-from foosim.protocol.layout import Entity
+from foosim.protocol.mesh import Mesh
+
+if TYPE_CHECKING:
+    from foosim.protocol.layout import Entity
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -51,7 +54,7 @@ class Cylinder:
 class Shape:
     """A geometry at a pose in its link (in the world for scenery), its surface (a key of the table's) and colour."""
 
-    geometry: Box | Sphere | Cylinder
+    geometry: Box | Sphere | Cylinder | Mesh
     surface: str
     colour: Colour
     position: Vector = ORIGIN
@@ -155,17 +158,33 @@ def place(shape: Shape, position: Vector, orientation: Quaternion) -> tuple[Vect
 def shape_box(shape: Shape) -> tuple[Vector, Vector]:
     """Return the least and greatest coordinates of a shape in its link's frame."""
     geometry = shape.geometry
+    middle = ORIGIN
     if isinstance(geometry, Sphere):
         extent = [geometry.radius] * 3
     else:
-        half = geometry.half if isinstance(geometry, Box) else (geometry.radius, geometry.radius, geometry.length / 2)
+        if isinstance(geometry, Cylinder):
+            half: Vector = (geometry.radius, geometry.radius, geometry.length / 2)
+        elif isinstance(geometry, Box):
+            half = geometry.half
+        else:
+            low, high = geometry.box
+            half = ((high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2)
+            middle = rotate(shape.orientation, _moved(low, half, 1.0))
         sides = [
             rotate(shape.orientation, side) for side in ((half[0], 0.0, 0.0), (0.0, half[1], 0.0), (0.0, 0.0, half[2]))
         ]
         extent = [sum(abs(side[axis]) for side in sides) for axis in range(3)]
-    x, y, z = shape.position
+    x, y, z = _moved(shape.position, middle, 1.0)
     low = (x - extent[0], y - extent[1], z - extent[2])
     return low, (x + extent[0], y + extent[1], z + extent[2])
+
+
+def in_pieces(shapes: Iterable[Shape], triangles_max: int) -> Iterator[Shape]:
+    """Yield shapes; a mesh of more than so many triangles as several, in the order of its triangles."""
+    for shape in shapes:
+        mesh = shape.geometry
+        for piece in mesh.pieces(triangles_max) if isinstance(mesh, Mesh) else (mesh,):
+            yield shape if piece is mesh else replace(shape, geometry=piece)
 
 
 def enclosing(boxes: Iterable[tuple[Vector, Vector]]) -> tuple[Vector, Vector]:

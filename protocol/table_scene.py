@@ -50,7 +50,7 @@ def build_scene(deployment: Deployment, layout: Layout) -> Scene:
             robot = deployment.robots[entity.name]
             assert isinstance(robot, RodRobot)
             bodies[entity.name] = _rod_body(table, entity.name, robot, line_x_m(deployment, robot))
-    return Scene(bodies, table_scenery(table))
+    return Scene(bodies, (*table_scenery(table), *deployment.scenery_shapes()))
 
 
 def ball_body(table: Table, name: str) -> Body:
@@ -141,7 +141,7 @@ def spin_inertia(link: Link) -> float:
 
 
 def table_scenery(table: Table) -> tuple[Shape, ...]:
-    """Return everything that never moves; boxes only, since a concave mesh lets balls through."""
+    """Return what the table itself has that never moves; boxes only, since a concave mesh lets fast balls through."""
     return (_floor(table), *_side_walls(table), *_end_walls(table), *_goals(table), *_ramps(table))
 
 

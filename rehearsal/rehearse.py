@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from foosim.node.engines.probation import check_models
+from foosim.protocol.assets import pin_assets
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.disk import Level
@@ -66,16 +68,21 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     pace: Pace | None = None,
     prepare: Callable[[System], None] | None = None,
     capture: Path | None = None,
+    folder: Path | None = None,
     start: Start | None = None,
 ) -> Rehearsed:
     """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on those that it declares).
 
     `start` is a frame of another run to begin with (`vhub.branching.read_branch`). `prepare` is called with the built
     system before it runs: a test's or notebook's place to ask for things at ticks.
-    Raises DeploymentError for a bad text, CaptureError when `capture` exists or cannot be written,
-    BadValue for a `start` that does not fit.
+    `folder` is the one that the text's file is in: where the files are that it refers to (None: the present one).
+    Raises DeploymentError for a bad text, AssetError for a bad file, CaptureError when `capture` exists or cannot be
+    written, BadValue for a `start` that does not fit.
     """
     text = apply_sets(text, name, sets) if nodes is None else with_nodes(text, name, nodes, sets)
+    text, files = pin_assets(text, name, folder or Path())
+    deployment = load_deployment(text, name).with_assets(files)
+    check_models(deployment, name, text)
     settings = settings or Settings()
     rehearsed = Rehearsed({})
     on_commit = settings.on_commit
@@ -87,8 +94,8 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
 
     settings.on_commit = committed
     pace = pace or Pace("fast")
-    run = RunSettings(settings.run, name, text, pace, ticks, start)
-    writer = None if capture is None else _open_capture(capture, text, name, settings, run)
+    run = RunSettings(settings.run, name, text, pace, ticks, start, files=files)
+    writer = None if capture is None else _open_capture(capture, deployment, text, name, settings, run)
     system = System(run, settings)
     if prepare is not None:
         prepare(system)
@@ -116,11 +123,13 @@ def _check_room(writer: CaptureWriter, worst: Level) -> None:
         raise CaptureError(f"the rehearsal ends, its capture is full: {writer.state.text}")
 
 
-def _open_capture(path: Path, text: str, name: str, settings: Settings, run: RunSettings) -> CaptureWriter:
+def _open_capture(
+    path: Path, deployment: Deployment, text: str, name: str, settings: Settings, run: RunSettings
+) -> CaptureWriter:
     """Open a capture that gets all closings and log lines of a rehearsal."""
     metadata = {"run": run.run, "pace": str(run.pace), "fingerprint": library_fingerprint().hex()}
     metadata |= origin_metadata(run.origin)
-    writer = CaptureWriter(path, load_deployment(text, name), name, text, metadata)
+    writer = CaptureWriter(path, deployment, name, text, metadata)
     on_closing, on_epoch, on_say = settings.on_closing, settings.on_epoch, settings.on_say
     tick = 0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -70,7 +70,8 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     settled = Settings(on_say=show)
     if plan.branch is not None and not json:
         typer.echo(plan.branch.text)
-    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settled, capture=capture, start=plan.start).json
+    inputs: dict[str, Any] = {"capture": capture, "start": plan.start, "folder": file.parent}
+    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settled, **inputs).json
     if json:
         typer.echo(encode_json(result).decode())
     else:

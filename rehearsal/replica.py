@@ -15,6 +15,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.fetching import piece_of
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame, layout_after
 from foosim.protocol.layout import Layout, build_layout
@@ -46,6 +47,7 @@ class Replica:
             core = NodeCore(node, "boot", library_fingerprint(), 0)
             self._nodes[node] = core, Solver(core, factory)
             self._bus.subscribe(node, channels.NODE_READS)
+        self._bus.subscribe(SOURCE, ((channels.FETCH, False),))
         for node in self._nodes:
             origin = None if start is None else start.origin
             build = Build(node, "boot", "first", SOURCE, name, text, "fast", self._added(self.frame.layout), origin)
@@ -101,8 +103,13 @@ class Replica:
         """Let the nodes take turns until nobody has anything to say."""
         while self._bus.next_ns() is not None:
             _, _, receiver, channel, name, payload = self._bus.pop()
+            if receiver == SOURCE:
+                piece = piece_of(self._deployment, channels.read(channel, name, payload))
+                self._say(channels.PIECE, piece.name, encode(piece))
+                continue
             core, solver = self._nodes[receiver]
             core.receive(channel, name, payload, 0)
+            core.wake(0)
             solver.build_wanted()
             core.advance(0)
             while core.work is not None:

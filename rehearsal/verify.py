@@ -7,10 +7,11 @@ Neighbours: `replica` computes, `vhub.capture_reader` reads.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from foosim.node.engines.probation import check_models
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.start import Start, added_to, first_chain, start_with
@@ -50,7 +51,8 @@ def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
     capture = open_capture(path)
     about = capture.about
     start = start_of(capture)
-    found = verify(about.deployment_text, about.deployment_name, capture.captured_ticks(), nodes, start)
+    text, name = about.deployment_text, about.deployment_name
+    found = verify(text, name, capture.captured_ticks(), nodes, start, about.files)
     kept = {epoch.arithmetic for epoch in capture.epochs}
     return replace(found, other_arithmetic=tuple(sorted(kept - {"", found.arithmetic})))
 
@@ -66,10 +68,22 @@ def start_of(capture: CaptureData) -> Start | None:
     return start_with(first, origin.source, origin.chain, added_to(capture.deployment, first.layout))
 
 
-def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1, start: Start | None = None) -> Verified:
-    """Simulate again what `ticks` (from 0, or from that of `start` on, in order) say, on `nodes` nodes, and compare."""
+def verify(
+    text: str,
+    name: str,
+    ticks: Iterable[CapturedTick],
+    nodes: int = 1,
+    start: Start | None = None,
+    files: Mapping[str, bytes] | None = None,
+) -> Verified:
+    """Simulate again what `ticks` (from 0, or from that of `start` on, in order) say, on `nodes` nodes, and compare.
+
+    `files` are those that the deployment refers to, by path. Raises AssetError for one that is not acceptable.
+    """
     text = with_nodes(text, name, nodes)
-    replica = Replica(text, name, load_deployment(text, name), start=start)
+    deployment = load_deployment(text, name).with_assets(files or {})
+    check_models(deployment, name, text)
+    replica = Replica(text, name, deployment, start=start)
     chain = first_chain(None if start is None else start.origin)
     try:
         first = replica.frame.tick

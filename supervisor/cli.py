@@ -13,7 +13,6 @@ import typer
 
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
-from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
 from foosim.protocol.probe import ProgressOption
@@ -298,7 +297,8 @@ def validate(file: File, json: Json = False) -> None:
 
     All problems are shown at once, one a line: file:line:column: what, value, nearest valid name.
     """
-    deployment = load_deployment(read_deployment_text(file), str(file))
+    plan = make_plan(RunOptions(file))
+    deployment = plan.deployment
     content = {
         "world": deployment.world,
         "robots": len(deployment.robots),

@@ -13,11 +13,10 @@ from typing import Any, Final
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
+from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, basis_of, chain_next, layout_after
 from foosim.protocol.layout import Layout, added_entities
@@ -41,6 +40,7 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.patience import Patience
+from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain, first_frame
 from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account
@@ -83,7 +83,8 @@ class SupervisorCore:
         self.boot = boot
         self.clock = clock
         self.actions: list[Action] = []
-        self.deployment: Deployment = load_deployment(settings.deployment_text, settings.deployment_name)
+        self.refusals = Refusals(self.actions.append, lambda: self.deployment)
+        self.deployment = settings.load_deployment()
         self.roster = Roster(self.deployment, fingerprint)
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
         self.watch = Watch(self.deployment, self.roster, now_ns)
@@ -94,8 +95,7 @@ class SupervisorCore:
         self.frame: Frame = first_frame(self.deployment, settings.start)
         self.chain = first_chain(settings.origin)
         self.first_tick = self.frame.tick
-        self.epoch = 0
-        self.is_open = False
+        self.epoch, self.is_open = 0, False
         """Whether an epoch of this supervisor has begun."""
         self.owners = self.deployment.owners()
         self.members: tuple[str, ...] = ()
@@ -120,6 +120,7 @@ class SupervisorCore:
         self._refused = self._repeated = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Hello: self.handshake.hello,
+            Fetch: self.handshake.fetch,
             Ready: self.handshake.ready,
             Standing: self._on_standing,
             Heartbeat: self.handshake.heartbeat,
@@ -139,15 +140,14 @@ class SupervisorCore:
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
-            message = channels.read(channel, name, payload)
+            message = self.refusals.read(channel, name, payload, now_ns)
             reader = self._readers.get(type(message))
             if reader is None:
                 raise Malformed(f"the supervisor does not read the channel {channel.name}")
             reader(message, payload, now_ns)
         except Malformed as error:
             self._refused += 1
-            if self._refused <= 3:
-                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+            self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Commit and release as far as parts, pace and clock allow."""

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
+from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.codec import decode_json, encode
+from foosim.protocol.fetching import piece_of
 from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Recall, Refusal
 
 if TYPE_CHECKING:
@@ -37,6 +39,11 @@ class Handshake:
         deployment = run.deployment_name, run.deployment_text
         build = Build(hello.name, hello.boot, core.boot, run.run, *deployment, pace, added, run.origin)
         core.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
+
+    def fetch(self, fetch: Fetch, payload: bytes, now_ns: int) -> None:
+        """Answer who lacks a file that the deployment refers to with the piece of it that is asked for."""
+        piece = piece_of(self._core.deployment, fetch)
+        self._core.actions.append(Publish(channels.PIECE, fetch.name, encode(piece)))
 
     def _has_ended(self) -> bool:
         """Whether the run is over; say it again to who comes late."""

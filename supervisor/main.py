@@ -51,7 +51,7 @@ class SupervisorProcess:
         history: History | None,
         progress: Path | None = None,
     ) -> None:
-        what = str(plan.options.file), plan.text, plan.pace, plan.ticks, plan.start, plan.options.balance
+        what = str(plan.options.file), plan.text, plan.pace, plan.ticks, plan.start, plan.options.balance, plan.files
         settings = RunSettings(folder.name, *what)
         start = time.monotonic_ns(), new_boot(), clock_name()
         self.core = SupervisorCore(settings, library_fingerprint(), *start, history)

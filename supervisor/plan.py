@@ -5,11 +5,14 @@ Neighbours: `up` and `main` carry it out, `cli` reads the options from a command
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from foosim.node.engines.probation import check_models
 from foosim.protocol import identity, wall
 from foosim.protocol.addresses import Address, check_listen
+from foosim.protocol.assets import pin_assets
 from foosim.protocol.certificates import load_credentials, operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
@@ -80,6 +83,12 @@ class RunSettings:
     start: Start | None = None
     balance: bool = False
     """Whether robots move by the nodes' measured load."""
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    """The contents of the files that the deployment refers to, by path."""
+
+    def load_deployment(self) -> Deployment:
+        """The deployment with its files; raises DeploymentError or AssetError."""
+        return load_deployment(self.deployment_text, self.deployment_name).with_assets(self.files)
 
     @property
     def origin(self) -> Origin | None:
@@ -105,6 +114,7 @@ class Plan:
     ticks: int
     address: Address
     branch: Branch | None = None
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
 
     @property
     def start(self) -> Start | None:
@@ -128,7 +138,9 @@ def make_plan(options: RunOptions) -> Plan:
     """Check everything that was asked for before anything is started; raises Refused."""
     name = str(options.file)
     text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
-    deployment = load_deployment(text, name)
+    text, files = pin_assets(text, name, options.file.parent)
+    deployment = load_deployment(text, name).with_assets(files)
+    check_models(deployment, name, text)
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
     pace = deployment.pace if options.pace is None else parse_pace(options.pace)
@@ -138,7 +150,7 @@ def make_plan(options: RunOptions) -> Plan:
         if ticks == 0:
             raise BadValue("a run has at least one tick", options.duration)
     branch = None if options.branch is None else read_branch(options.branch, deployment)
-    return Plan(options, text, deployment, pace, ticks, address, branch)
+    return Plan(options, text, deployment, pace, ticks, address, branch, files)
 
 
 def launch_of(options: RunOptions, capture: Path | None) -> Launch:

@@ -39,6 +39,10 @@ class NoRun(Failed):
     """There is no such run, or none that is live."""
 
 
+UNREADABLE: Final = (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+"""How a file of a run fails that is missing or spoiled."""
+
+
 class RunInfo(msgspec.Struct, frozen=True):
     """What a run file says. `radio` is empty until the vHub has told where it listens, `pki` without certificates."""
 
@@ -171,7 +175,7 @@ class RunFolder:
         """Return what the run file says, or None while there is none."""
         try:
             return msgspec.json.decode((self.path / RUN_FILE).read_bytes(), type=RunInfo)
-        except (OSError, msgspec.DecodeError):
+        except UNREADABLE:
             return None
 
     def write_result(self, result: dict[str, Any]) -> None:
@@ -183,7 +187,7 @@ class RunFolder:
         """Return how the run ended, or None when it did not end in order."""
         try:
             content = msgspec.json.decode((self.path / RESULT_FILE).read_bytes())
-        except (OSError, msgspec.DecodeError):
+        except UNREADABLE:
             return None
         return content if isinstance(content, dict) else None
 

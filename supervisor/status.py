@@ -110,11 +110,13 @@ def _processes(core: SupervisorCore, waiting_for: str) -> dict[str, Any]:
             "busy": 0.0 if process.heartbeat is None else round(process.heartbeat.busy, 3),
             "tick": 0 if process.heartbeat is None else process.heartbeat.tick,
             "waiting_for": "" if process.heartbeat is None else process.heartbeat.waiting_for,
+            "refused": process.report.get("refused", {}),
         }
         for name, process in sorted(core.roster.by_name.items())
     }
     own = {"role": SUPERVISOR, "host": "", "lost": False, "stopped": False, "busy": round(core.busy, 3)}
-    return {**processes, SUPERVISOR: {**own, "tick": core.frame.tick, "waiting_for": waiting_for}}
+    told = {"tick": core.frame.tick, "waiting_for": waiting_for, "refused": core.refusals.by_sender()}
+    return {**processes, SUPERVISOR: {**own, **told}}
 
 
 def _state(core: SupervisorCore) -> str:

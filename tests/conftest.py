@@ -16,10 +16,18 @@ settings.register_profile("search", settings.get_profile("foosim"), derandomize=
 settings.load_profile("foosim")
 
 
-def pytest_report_header() -> str:
-    """The settings under which hypothesis runs, in the first lines of the output."""
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """What `make fuzz` chooses; by default the share of it that `make test` has."""
+    parser.addoption("--fuzz-payloads", type=int, default=100, help="payloads for each target of the fuzz tests")
+    parser.addoption("--fuzz-seed", type=int, default=17, help="what the payloads are drawn from")
+    parser.addoption("--fuzz-block", type=int, default=-1, help="bring the payloads of this block alone")
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    """The settings under which hypothesis runs, and the fuzz tests' seed, in the first lines of the output."""
     current = settings()
-    return f"hypothesis: derandomize={current.derandomize}, deadline={current.deadline}"
+    seed, payloads = config.getoption("--fuzz-seed"), config.getoption("--fuzz-payloads")
+    return f"hypothesis: derandomize={current.derandomize}, deadline={current.deadline}; fuzz: {seed=}, {payloads=}"
 
 
 class WireTogether(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types

@@ -43,7 +43,9 @@ ONLY_IN = {"zenoh": "protocol/session.py", "pybullet": "node/engines/bullet.py"}
 SHELLS = {
     "client/client.py",
     "client/main.py",
+    "node/engines/probation.py",
     "node/main.py",
+    "protocol/assets.py",
     "protocol/certificates.py",
     "protocol/command.py",
     "protocol/deployment_file.py",

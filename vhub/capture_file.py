@@ -47,6 +47,8 @@ from foosim.vhub.viewing import LOG, POSES, SCENE, VIEW_TYPES, View
 METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 DEPLOYMENT: Final = "deployment.yaml"
+ASSETS: Final = "assets/"
+"""How the names of the files begin that the deployment refers to; their paths follow."""
 VERSIONS: Final = "versions.json"
 ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
 """Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
@@ -301,6 +303,8 @@ class CaptureFile:
         }
         self.mcap.add_metadata(METADATA, content)
         self.mcap.add_attachment(DEPLOYMENT, "application/yaml", described.text.encode())
+        for path, file in described.deployment.asset_files.items():
+            self.mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
         self.mcap.add_attachment(VERSIONS, "application/json", encode_json(library_versions()))
 
     # --- a file that was left unfinished -----------------------------------------------------------------------------

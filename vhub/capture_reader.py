@@ -33,6 +33,7 @@ from foosim.protocol.start import first_chain
 from foosim.protocol.table_scene import build_scene
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
+    ASSETS,
     DEPLOYMENT,
     END_METADATA,
     METADATA,
@@ -89,6 +90,8 @@ class About:
     metadata: dict[str, str] = field(default_factory=dict)
     end: dict[str, str] = field(default_factory=dict)
     deployment_text: str = ""
+    files: dict[str, bytes] = field(default_factory=dict)
+    """The files that the deployment refers to, by path."""
     versions: dict[str, str] = field(default_factory=dict)
     finished: bool = False
     unfinished_bytes: int = 0
@@ -159,6 +162,8 @@ class Scan:
         try:
             if content.name == DEPLOYMENT:
                 about.deployment_text = content.data.decode()
+            elif content.name.startswith(ASSETS):
+                about.files[content.name.removeprefix(ASSETS)] = content.data
             elif content.name == VERSIONS:
                 about.versions = msgspec.convert(decode_json(content.data), dict[str, str])
         except (Malformed, UnicodeDecodeError, msgspec.ValidationError) as error:
@@ -256,7 +261,7 @@ def read_about(path: Path) -> About:
 def deployment_of(about: About) -> Deployment:
     """Return the deployment that a capture has attached. Raises CaptureError when it is not valid here."""
     try:
-        return load_deployment(about.deployment_text, about.deployment_name)
+        return load_deployment(about.deployment_text, about.deployment_name).with_assets(about.files)
     except Refused as error:
         raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
+from foosim.protocol.asset_messages import Piece
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
@@ -44,6 +45,7 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.patience import Patience
+from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain
 from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
@@ -77,6 +79,7 @@ class HubCore:
 
     def __init__(self, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
         self.actions: list[HubAction] = []
+        self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
         self.door = Door(self)
@@ -107,6 +110,7 @@ class HubCore:
             Want: self._on_want,
             Recall: self._on_recall,
             Build: self._on_build,
+            Piece: self._on_build,
             Tempo: self._on_tempo,
             End: self._on_end,
             ClientHello: self.door.hello,
@@ -121,9 +125,9 @@ class HubCore:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self.repeated += not self.member.refuse(payload)
+                self.repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
                 return
-            message = channels.read(channel, name, payload)
+            message = self.refusals.read(channel, name, payload, now_ns)
             reader = self._readers.get(type(message))
             if reader is None:
                 raise Malformed(f"the vHub does not read the channel {channel.name}")
@@ -132,8 +136,7 @@ class HubCore:
             self._malformed += 1
             if channel.plane is channels.Plane.RADIO and self.state is not None:
                 self.state.refuse_at_door("malformed")
-            if self._malformed <= 3:
-                self.actions.append(Say("warning", f"refused from {name} on {channel.name}: {error}"))
+            self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Close ticks as far as the inputs allow."""
@@ -320,9 +323,9 @@ class HubCore:
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
-    def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
+    def _on_build(self, build: Build | Piece, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
-            self.repeated += 1
+            self.repeated += not self.member.is_fetching
             return
         self.deployment = self.member.deployment
         if self.state is not None:  # of a supervisor that has recalled us

@@ -40,11 +40,12 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
 def report(core: HubCore) -> bytes:
     """Return the account so far, where the radio plane and the capture are, and how the capture does.
 
-    `links` are [from, to, offered, delivered, dropped, mean delay in ns].
+    `links` are [from, to, offered, delivered, dropped, mean delay in ns]; `refused` counts messages by channel and
+    sender, `refusals` packets by reason.
     """
-    state = core.state
+    state, refused = core.state, core.refusals.by_sender()
     if state is None:
-        return encode_json({})
+        return encode_json({"refused": refused})
     packets = state.packets
     return encode_json(
         {
@@ -55,6 +56,7 @@ def report(core: HubCore) -> bytes:
                 "in_flight": packets.in_flight,
                 "refused": packets.refused,
             },
+            "refused": refused,
             "refusals": state.refusals,
             "links": [
                 [*pair, s.offered, s.delivered, s.dropped, s.delay_ns // s.delivered if s.delivered else 0]

@@ -15,7 +15,9 @@ from typing import Any
 import msgspec
 
 from foosim.protocol import limits
+from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Delivered, Deliveries, Received, RobotPacket, Sent
 from foosim.protocol.sampling import Sampling, are_answered
@@ -54,6 +56,22 @@ class Member:
     def release_tick(self, tick: int) -> int:
         """Return the first tick, from `tick` on, at which something can be released to the client."""
         return tick if self.period == 0 else -(-tick // self.period) * self.period
+
+
+_Flight = tuple[str, str, str, int, int, int, bytes, int, int, int, str, list[int]]
+
+
+class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The whole state as it is written, field by field as `HubState.snapshot` makes it."""
+
+    closed: int
+    packets: tuple[int, int, int, int]
+    refusals: list[tuple[str, int]]
+    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool]]
+    links: list[tuple[str, str, int, int, int, int, int]]
+    deliveries: list[tuple[int, list[Delivered]]]
+    final: tuple[int, bool]
+    flights: list[_Flight]
 
 
 @dataclass(slots=True)
@@ -338,21 +356,25 @@ class HubState:
 
     @classmethod
     def restore(cls, deployment: Deployment, snapshot: bytes) -> HubState:
-        """Return the state that `snapshot` holds."""
-        content: dict[str, Any] = msgspec.msgpack.decode(snapshot)
+        """Return the state that `snapshot` holds; raises Malformed when it holds none."""
+        content = decode_any(_Snapshot, snapshot)
         state = cls(deployment)
-        state.closed = content["closed"]
-        state.packets = Packets(*content["packets"])
-        state.refusals = dict(content["refusals"])
-        for name, period, subscriptions, *rest in content["members"]:
-            state.members[name] = Member(period, tuple((robot, channel) for robot, channel in subscriptions), *rest)
-        for source, destination, *values in content["links"]:
+        state.closed = content.closed
+        state.packets = Packets(*content.packets)
+        state.refusals = dict(content.refusals)
+        for name, period, subscriptions, *rest in content.members:
+            state.members[name] = Member(period, tuple(subscriptions), *rest)
+        for source, destination, *values in content.links:
             link = Link(source, destination, deployment.network, deployment.seed, LinkState(*values))
             state.links[source, destination] = link
-        state.deliveries = {tick: msgspec.convert(packets, list[Delivered]) for tick, packets in content["deliveries"]}
-        state.final, state.was_final = content["final"]
-        for packed in content["flights"]:
+        state.deliveries = dict(content.deliveries)
+        state.final, state.was_final = content.final
+        if not {state.closed, state.closed + 1} <= state.deliveries.keys():
+            raise Malformed(f"a state after tick {state.closed} without the deliveries of that tick and the next")
+        for packed in content.flights:
             flight = _unpack(packed)
+            if (flight.source, flight.destination) not in state.links:
+                raise Malformed(f"a packet in flight from {flight.source} to {flight.destination} without a link")
             state._flights.setdefault(flight.arrival_tick, []).append(flight)
         return state
 
@@ -384,10 +406,10 @@ def _pack(flight: Flight) -> list[Any]:
     ]
 
 
-def _unpack(packed: list[Any]) -> Flight:
+def _unpack(packed: _Flight) -> Flight:
     flight = Flight(*packed[:7])
-    flight.copy, flight.due_ns, flight.arrival_tick, flight.rule = packed[7:11]
-    flight.words = tuple(packed[11])
+    flight.copy, flight.due_ns, flight.arrival_tick, flight.rule, words = packed[7:]
+    flight.words = tuple(words)
     return flight
 
 

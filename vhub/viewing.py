@@ -18,6 +18,7 @@ from foxglove.messages import (
     FrameTransforms,
     Log,
     LogLevel,
+    Point3,
     Pose,
     Quaternion,
     SceneEntity,
@@ -26,12 +27,14 @@ from foxglove.messages import (
     SceneUpdate,
     SpherePrimitive,
     Timestamp,
+    TriangleListPrimitive,
     Vector3,
 )
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
+from foosim.protocol.mesh import Mesh
 from foosim.protocol.scene import Box, Scene, Shape, Sphere, Vector, forward_kinematics
 from foosim.protocol.scene import Quaternion as Turn
 from foosim.protocol.table_scene import build_scene
@@ -107,7 +110,7 @@ def _link_names(scene: Scene) -> set[str]:
 
 
 def _entity(at: Timestamp, name: str, frame: str, shapes: Iterable[Shape]) -> SceneEntity:
-    cubes, spheres, cylinders = [], [], []
+    cubes, spheres, cylinders, triangles = [], [], [], []
     for shape in shapes:
         pose = Pose(position=_vector(shape.position), orientation=_quaternion(shape.orientation))
         red, green, blue, alpha = shape.colour
@@ -118,6 +121,10 @@ def _entity(at: Timestamp, name: str, frame: str, shapes: Iterable[Shape]) -> Sc
         elif isinstance(geometry, Sphere):
             size = _doubled((geometry.radius, geometry.radius, geometry.radius))
             spheres.append(SpherePrimitive(pose=pose, size=_vector(size), color=colour))
+        elif isinstance(geometry, Mesh):
+            points = [Point3(x=x, y=y, z=z) for x, y, z in geometry.vertices.tolist()]
+            indices = geometry.triangles.ravel().tolist()
+            triangles.append(TriangleListPrimitive(pose=pose, points=points, indices=indices, color=colour))
         else:
             across = 2.0 * geometry.radius
             size = (across, across, geometry.length)
@@ -125,7 +132,14 @@ def _entity(at: Timestamp, name: str, frame: str, shapes: Iterable[Shape]) -> Sc
                 CylinderPrimitive(pose=pose, size=_vector(size), bottom_scale=1.0, top_scale=1.0, color=colour)
             )
     return SceneEntity(
-        timestamp=at, frame_id=frame, id=name, frame_locked=True, cubes=cubes, spheres=spheres, cylinders=cylinders
+        timestamp=at,
+        frame_id=frame,
+        id=name,
+        frame_locked=True,
+        cubes=cubes,
+        spheres=spheres,
+        cylinders=cylinders,
+        triangles=triangles,
     )
 
 

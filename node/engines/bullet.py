@@ -15,8 +15,9 @@ from typing import Any, Final
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.mesh import Mesh
 from foosim.protocol.quiet import without_lines
-from foosim.protocol.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector
+from foosim.protocol.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector, in_pieces
 from foosim.protocol.table_scene import build_scene
 
 with without_lines(b"pybullet build time:"):
@@ -29,6 +30,8 @@ ROD_GROUP: Final = 2
 SCENERY_GROUP: Final = 4
 
 SPARES_MAX: Final = 4
+MESH_PIECE: Final = 4096
+"""Triangles of one static body: Bullet takes 174,762 at most, and one of these is built in a few milliseconds."""
 PARKING_Z_M: Final = 100.0
 PARKING_STEP_M: Final = 10.0
 """Parked bodies stand this far apart, far above the table: no pair of theirs can touch."""
@@ -97,7 +100,7 @@ class BulletEngine:
         yield
         scene = build_scene(deployment, layout)
         self._scenery_ids: dict[int, str] = {}
-        for shape in scene.scenery:
+        for shape in in_pieces(scene.scenery, MESH_PIECE):
             self._scenery_ids[self._make_scenery(shape)] = shape.surface
             yield
         self._ids: dict[str, int] = {}
@@ -148,7 +151,7 @@ class BulletEngine:
         """Make a rigid static: a tilted static *multibody* has its quaternion renormalised at every step."""
         body: int = p.createMultiBody(
             baseMass=0.0,
-            baseCollisionShapeIndex=self._make_shape((shape,), placed=False),
+            baseCollisionShapeIndex=self._make_scenery_shape(shape),
             basePosition=shape.position,
             baseOrientation=shape.orientation,
             useMaximalCoordinates=rigid,
@@ -209,6 +212,20 @@ class BulletEngine:
                 )
         return rod
 
+    def _make_scenery_shape(self, shape: Shape) -> int:
+        """Make a collision shape; a mesh's triangles are handed over as numbers, never as the name of a file."""
+        mesh = shape.geometry
+        if not isinstance(mesh, Mesh):
+            return self._make_shape((shape,), placed=False)
+        made: int = p.createCollisionShape(
+            p.GEOM_MESH,
+            vertices=mesh.vertices.tolist(),
+            indices=mesh.triangles.ravel().tolist(),
+            physicsClientId=self._client,
+        )
+        assert made >= 0, shape
+        return made
+
     def _make_shape(self, shapes: Sequence[Shape], placed: bool) -> int:
         """Make one collision shape, compound if there are several; `placed`: at the shapes' own poses."""
         parts: dict[str, list[Any]] = {
@@ -216,6 +233,7 @@ class BulletEngine:
         }
         for shape in shapes:
             geometry = shape.geometry
+            assert not isinstance(geometry, Mesh), "meshes are scenery"
             kind = {Box: p.GEOM_BOX, Sphere: p.GEOM_SPHERE, Cylinder: p.GEOM_CYLINDER}[type(geometry)]
             parts["shapeTypes"].append(kind)
             parts["halfExtents"].append(geometry.half if isinstance(geometry, Box) else REST)

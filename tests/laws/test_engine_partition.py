@@ -7,6 +7,8 @@ engine (design, section 1) is then broken, and the same comparison must see it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import product
+from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +96,7 @@ class Comparison:
 
     def __init__(self, factory: EngineFactory, sets: Sequence[str] = (), balls: int = 1, parts: int = 3) -> None:
         text = apply_sets(TABLE.read_text(), "table.yaml", sets)
-        self.deployment = load_deployment(text, "table.yaml")
+        self.deployment = load_deployment(text, "table.yaml").with_assets(FILES)
         added = [(f"extra{index}", "ball") for index in range(balls - 1)]
         self.layout = build_layout(self.deployment, added)
         self.numbers = initial_numbers(self.deployment, self.layout)
@@ -184,6 +186,33 @@ class Comparison:
         self.outcome.ball_touches += sum(numbers[ball.offsets["contacts"]] for ball in self.layout.balls)
 
 
+def dome() -> bytes:
+    """A flat dome as an OBJ file, radius 1, height 0.5: 24 segments and 8 rings, and so many small triangles."""
+    lines = ["v 0 0 0.5"]
+    for ring, segment in product(range(1, 9), range(24)):
+        radius, angle = ring / 8, segment * pi / 12
+        lines.append(f"v {radius * cos(angle):.6f} {radius * sin(angle):.6f} {0.5 * (1 - radius * radius):.6f}")
+    for segment in range(24):
+        lines.append(f"f 1 {2 + segment} {2 + (segment + 1) % 24}")
+        for ring in range(7):
+            near, far = 2 + 24 * ring, 26 + 24 * ring
+            lines.append(f"f {near + segment} {far + segment} {far + (segment + 1) % 24} {near + (segment + 1) % 24}")
+    return "\n".join(lines).encode()
+
+
+FILES = {"dome.obj": dome()}
+DOMES = (
+    "scenery={"
+    + ", ".join(
+        f"d{x}{y}: {{shape: mesh, file: dome.obj, x: {x * 149 - 75} mm, y: {y * 180} mm, yaw: {17 * x} deg, "
+        "scale: 0.05, surface: walls}"
+        for x, y in product(range(-1, 3), range(-1, 2))
+    )
+    + "}"
+)
+"""Domes between the rods, as meshes."""
+
+
 PILE = ("tick=0.5 ms", "substeps=1", "table.ball.speed_limit=5 m/s")
 
 
@@ -205,6 +234,13 @@ def test_who_computes_what_changes_nothing(factory: EngineFactory, sets: Sequenc
     assert outcome.rod_touches >= 20 and outcome.ball_touches >= 40, outcome
     assert outcome.handovers >= 100 and outcome.rebuilt >= 30, outcome
     assert outcome.island_max == 4, "the ball and at most three rods"
+
+
+def test_meshes_change_nothing() -> None:
+    outcome = compare(BulletEngine, 3000, (DOMES,))
+    assert outcome.differing == []
+    assert outcome.rod_touches >= 20 and outcome.ball_touches >= 100, outcome
+    assert outcome.handovers >= 100 and outcome.rebuilt >= 30, outcome
 
 
 @pytest.mark.parametrize("factory", [BulletEngine, PureEngine])

@@ -7,17 +7,15 @@ message is believed, whoever forged it; then the run may end, in order and with 
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pytest
-from msgspec import inspect
 from msgspec.structs import replace
 
-from foosim.protocol import channels, limits
+from foosim.protocol import channels
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Add, Outbox, Part, Push
@@ -125,58 +123,10 @@ def test_a_part_with_another_basis_is_a_node_that_has_diverged_and_is_lost(distu
 
 # --- well-formed messages --------------------------------------------------------------------------------------------
 
-NAMES: Final = (
-    *("n1", "n2", *PLAYERS, VHUB, SUPERVISOR, "ball", "b2", "red.goal", "camera", "boot", "part", "commit", "order"),
-    *("position", "echo", "encoder", "fast", "2x", "node", "push", "x" * limits.NAME_LENGTH_MAX, ""),
-)
-
-
-class Talk:
-    """Well-formed messages made from the schema, with values near to what could matter."""
-
-    def __init__(self, seed: int) -> None:
-        self.rng = random.Random(seed)
-        self._tick = 0
-        self._makers: dict[type[inspect.Type], Callable[[Any], Any]] = {
-            inspect.IntType: self._number,
-            inspect.FloatType: lambda kind: self.rng.choice((0.0, -1.0, 1e308, NAN, INFINITE)),
-            inspect.BoolType: lambda kind: self.rng.random() < 0.5,
-            inspect.StrType: lambda kind: self.rng.choice(
-                [name for name in NAMES if len(name) >= (kind.min_length or 0)]
-            ),
-            inspect.BytesType: self._bytes,
-            inspect.ListType: lambda kind: [
-                self._value(kind.item_type) for _ in range(self.rng.choice((0, 0, 1, 2, 9)))
-            ],
-            inspect.TupleType: lambda kind: tuple(map(self._value, kind.item_types)),
-            inspect.UnionType: lambda kind: self._value(self.rng.choice(kind.types)),
-            inspect.StructType: lambda kind: kind.cls(**{f.name: self._value(f.type) for f in kind.fields}),
-        }
-
-    def about(self, channel: Channel, tick: int) -> Any:
-        """A message for this channel, while the run is at `tick`."""
-        self._tick = tick
-        return self._value(inspect.type_info(channel.message))
-
-    def _value(self, kind: inspect.Type) -> Any:
-        return self._makers[type(kind)](kind)
-
-    def _number(self, kind: inspect.IntType) -> int:
-        tick = self._tick
-        high = kind.le if kind.le is not None else (kind.lt or 1) - 1
-        number = self.rng.choice((0, 1, 2, 5, tick - 1, tick, tick + 1, tick + 5, 2**40, limits.COUNTER_MAX))
-        return min(max(kind.ge or 0, number), high)
-
-    def _bytes(self, kind: inspect.BytesType) -> bytes:
-        least = kind.min_length or 0
-        size = max(least, min(self.rng.choice((0, 8, 16, 32, 1592)), kind.max_length or 0))
-        return self.rng.choice((bytes(size), self.rng.randbytes(size), b"{}" if least <= 2 else bytes(size)))
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_strangers_on_the_radio_plane_change_nothing(disturbed: Disturbed, seed: int) -> None:
     """Well-formed messages from who is not let in, or who pretends to be a player without its boot."""
-    talk = Talk(seed)
+    talk = disturbed.talk(seed)
 
     def speak() -> None:
         channel = talk.rng.choice((channels.UP, channels.CLIENT_HELLO))
@@ -192,7 +142,7 @@ def test_strangers_on_the_radio_plane_change_nothing(disturbed: Disturbed, seed:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_whatever_well_formed_messages_come_the_run_ends_in_order(disturbed: Disturbed, seed: int) -> None:
-    talk = Talk(seed)
+    talk = disturbed.talk(seed)
 
     def speak() -> None:
         supervisor = disturbed.system.supervisor

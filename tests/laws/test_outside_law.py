@@ -19,6 +19,7 @@ from msgspec.structs import replace
 
 from foosim.client.core import ClientCore
 from foosim.protocol import channels, limits
+from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.errors import Malformed
@@ -74,29 +75,11 @@ Lie = tuple[str, Channel, str, msgspec.Struct]
 # --- bytes that are no message ---------------------------------------------------------------------------------------
 
 
-def mutated(rng: random.Random, raw: bytes) -> bytes:
-    """A message with some bytes flipped, put in or taken out; or cut, or with a tail."""
-    content = bytearray(raw)
-    for _ in range(rng.choice((1, 1, 2, 5))):
-        at = rng.randrange(len(content) + 1)
-        kind = rng.randrange(6)
-        if kind < 2 and at < len(content):
-            content[at] ^= 1 << rng.randrange(8)
-        elif kind == 2:
-            content[at : at + rng.randrange(4)] = b""
-        elif kind == 3:
-            content[at:at] = rng.randbytes(rng.randrange(1, 4))
-        elif kind == 4:
-            del content[at:]
-        else:
-            content += rng.randbytes(rng.randrange(1, 9))
-    return bytes(content)
-
-
-def no_message(rng: random.Random, channel: Channel, known: Sequence[bytes]) -> bytes:
+def no_message(disturbed: Disturbed, rng: random.Random, channel: Channel, known: Sequence[bytes]) -> bytes:
     """Random bytes, or a mutated message of this channel, that nobody can read as one of its messages."""
     while True:
-        payload = mutated(rng, rng.choice(known)) if known and rng.random() < 0.7 else rng.randbytes(rng.randrange(60))
+        is_near = bool(known) and rng.random() < 0.7
+        payload = disturbed.mutated(rng, rng.choice(known)) if is_near else rng.randbytes(rng.randrange(60))
         try:
             decode(channel.message, payload, channel.bytes_max)
         except Malformed:
@@ -113,7 +96,7 @@ def test_bytes_that_are_no_message_are_refused_counted_and_change_nothing(distur
     for channel in CHANNELS:
         for name in (*takes_part, NOBODY):
             for _ in range(4):
-                payload = no_message(rng, channel, said.get(channel.plane.name + channel.name, ()))
+                payload = no_message(disturbed, rng, channel, said.get(channel.plane.name + channel.name, ()))
                 tick = rng.randrange(disturbed.ticks - 20)
                 disturbed.at(tick, lambda c=channel, n=name, p=payload: disturbed.put(c, n, p))  # type: ignore[misc]
                 hearers = disturbed.hearers(channel, name)
@@ -167,6 +150,7 @@ def lies_to_nodes(system: System) -> list[Lie]:
         (channels.PREPARE, SUPERVISOR, Prepare([AddedEntity("red.goal", "ball")])),
         (channels.BUILD, "n1", Build("n1", "other", "first", "run", "t", "", "fast", [])),
         (channels.REFUSAL, "n1", Refusal("n1", "other", "go away")),
+        (channels.PIECE, "n1", Piece("n1", "boot-1", bytes(32), 0, 3, b"lie")),
         (channels.COMMIT, "n1", Commit(epoch, tick, frame.digest, frame.values.tobytes(), [], [], True)),
     ]
     if tick > 3:
@@ -197,6 +181,7 @@ def lies_to_the_hub(system: System) -> list[Lie]:
         (channels.TEMPO, SUPERVISOR, Tempo("1e999x", False)),
         (channels.BUILD, VHUB, Build(VHUB, "other", "first", "run", "t", "", "fast", [])),
         (channels.REFUSAL, VHUB, Refusal(VHUB, "other", "go away")),
+        (channels.PIECE, VHUB, Piece(VHUB, "boot", bytes(32), 0, 3, b"lie")),
         (channels.CLIENT_HELLO, "player-red", ClientHello("player-red", "other", limits.PROTOCOL_VERSION, "", 0)),
         (channels.CLIENT_HELLO, NOBODY, ClientHello(NOBODY, "other", 99, "", 0)),
         (channels.UP, "player-red", Up("player-red", "other", [command])),
@@ -229,6 +214,7 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
         (channels.HELLO, "n1", replace(hello, name="n2")),
         (channels.HELLO, NOBODY, replace(hello, name=NOBODY)),
         (channels.HELLO, "n1", replace(hello, role="dragon", boot="boot")),
+        (channels.FETCH, "n1", Fetch("n1", "boot-1", bytes(32), 0)),
         (channels.READY, "n1", Ready("n1", "other", bytes(32), bytes(32))),
         (channels.STANDING, VHUB, Standing(VHUB, FAR, b"", bytes(32), [])),
         (channels.HEARTBEAT, "n1", replace(beat, report=b"{")),

@@ -210,6 +210,8 @@ def _least(kind: Any) -> Any:
 
 
 def _least_value(kind: inspect.Type) -> object:
+    if isinstance(kind, inspect.UnionType):
+        return _least_value(kind.types[-1])
     if isinstance(kind, inspect.IntType):
         return kind.ge
     if isinstance(kind, inspect.StrType):

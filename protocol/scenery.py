@@ -1,0 +1,189 @@
+"""Fixed things that a deployment puts into its world beside the table: boxes, and meshes from files.
+
+This is their schema, and how they become shapes of the scene. A mesh's file is named by a path inside the deployment's
+asset folder; its digest is written beside it when a run is planned, so that the deployment's text alone says which
+world is meant, on every machine. Neighbours: `deployment` (which holds them), `assets` (reads the files), `mesh` (what
+is in them), `table_scene` (adds the shapes to the scene).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, Field
+
+from foosim.protocol import limits, units
+from foosim.protocol.errors import BadValue
+from foosim.protocol.mesh import MESH_READERS, AssetError, Mesh, check_digest, digest_of, read_mesh
+from foosim.protocol.scene import Box, Colour, Quaternion, Shape, Vector, multiply, turn
+from foosim.protocol.table import Length, Part, Position
+from foosim.protocol.units import Quantity, custom_error
+
+PATH_LENGTH_MAX: Final = 200
+PATH_DEPTH_MAX: Final = 8
+SCENERY_MAX: Final = 256
+
+_COMPONENT: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+_LETTERS: Final = "letters, digits, _, - and . (not at the beginning)"
+
+
+def path_problem(path: str) -> str:
+    """Return what keeps a text from being a path inside a folder, or an empty text. The file system is not asked."""
+    if len(path) > PATH_LENGTH_MAX:
+        return f"a path of more than {PATH_LENGTH_MAX} characters"
+    if ":" in path:
+        return "a path inside the asset folder has no scheme and no drive"
+    if path.startswith(("/", "\\", "~")):
+        return "a path inside the asset folder is relative"
+    components = path.split("/")
+    if any(component in ("", ".", "..") for component in components):
+        return "a path inside the asset folder has no empty component, no . and no .."
+    if len(components) > PATH_DEPTH_MAX:
+        return f"a path of more than {PATH_DEPTH_MAX} components"
+    if not all(_COMPONENT.fullmatch(component) for component in components):
+        return f"a path inside the asset folder has {_LETTERS} between its slashes"
+    return ""
+
+
+def _asset_path(path: str) -> str:
+    problem = path_problem(path)
+    if problem:
+        raise custom_error(BadValue(problem, path))
+    return path
+
+
+def _mesh_path(path: str) -> str:
+    _asset_path(path)
+    if path[path.rfind(".") :] not in MESH_READERS:
+        raise custom_error(BadValue(f"no format of a mesh, there are {', '.join(MESH_READERS)}", path))
+    return path
+
+
+def _folder(path: str) -> str:
+    return path if path == "." else _asset_path(path)
+
+
+def _digest(text: str) -> str:
+    if not re.fullmatch("[0-9a-f]{64}", text):
+        raise custom_error(BadValue("a digest is 64 hexadecimal digits", text))
+    return text
+
+
+AssetFolder = Annotated[str, AfterValidator(_folder)]
+MeshPath = Annotated[str, AfterValidator(_mesh_path)]
+Digest = Annotated[str, AfterValidator(_digest)]
+Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
+Share = Annotated[float, Field(ge=0, le=1)]
+SurfaceName = Literal["floor", "walls", "goal", "ramps"]
+
+
+def _default(text: str) -> Any:
+    """A field with a default that is written, checked and documented as in a file."""
+    return Field(default=text, validate_default=True)
+
+
+class Material(Part):
+    """How a thing looks, as shares of red, green and blue."""
+
+    red: Share = 0.6
+    green: Share = 0.6
+    blue: Share = 0.6
+
+    @property
+    def colour(self) -> Colour:
+        return self.red, self.green, self.blue, 1.0
+
+
+class Placed(Part):
+    """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw)."""
+
+    x: Position = _default("0 m")
+    y: Position = _default("0 m")
+    z: Position = _default("0 m")
+    roll: Turn = _default("0 deg")
+    pitch: Turn = _default("0 deg")
+    yaw: Turn = _default("0 deg")
+    surface: SurfaceName
+    material: Material = Field(default_factory=Material)
+
+    @property
+    def position(self) -> Vector:
+        return self.x, self.y, self.z
+
+    @property
+    def orientation(self) -> Quaternion:
+        about_x, about_y = turn((1.0, 0.0, 0.0), self.roll), turn((0.0, 1.0, 0.0), self.pitch)
+        return multiply(turn((0.0, 0.0, 1.0), self.yaw), multiply(about_y, about_x))
+
+
+class SceneryBox(Placed):
+    """A box, its origin in its middle."""
+
+    shape: Literal["box"]
+    length: Length
+    width: Length
+    height: Length
+
+
+class SceneryMesh(Placed):
+    """The triangles of a file. `scale` is metres per unit of the file; `digest` (BLAKE2b) says which file is meant."""
+
+    shape: Literal["mesh"]
+    file: MeshPath
+    scale: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
+    digest: Digest | None = None
+
+
+Scenery = Annotated[SceneryBox | SceneryMesh, Field(discriminator="shape")]
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """What is in the files that scenery is made of: by path, by digest (hex), and as meshes by the thing's name."""
+
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    by_digest: Mapping[str, bytes] = field(default_factory=dict)
+    meshes: Mapping[str, Mesh] = field(default_factory=dict)
+
+
+def read_contents(scenery: Mapping[str, SceneryBox | SceneryMesh], files: Mapping[str, bytes]) -> Contents:
+    """Read the files of all meshes; raises AssetError for one that is missing, not the one meant or not acceptable."""
+    meshes: dict[str, Mesh] = {}
+    known: dict[tuple[str, float], Mesh] = {}
+    triangles = 0
+    for name, thing in sorted(scenery.items()):
+        if not isinstance(thing, SceneryMesh):
+            continue
+        if thing.file not in files:
+            raise AssetError(f"{thing.file}: the file of scenery.{name} is missing")
+        if thing.digest is not None:
+            check_digest(thing.file, files[thing.file], thing.digest)
+        key = thing.file, thing.scale
+        if key not in known:
+            known[key] = read_mesh(thing.file, files[thing.file], thing.scale)
+        meshes[name] = known[key]
+        triangles += len(known[key].triangles)
+        if triangles > limits.SCENERY_TRIANGLES_MAX:
+            what = f"{triangles} triangles in the meshes up to scenery.{name}"
+            raise AssetError(f"{thing.file}: {what}, at most {limits.SCENERY_TRIANGLES_MAX} are allowed")
+    used = {path: files[path] for path in mesh_files(scenery)}
+    return Contents(used, {digest_of(content): content for content in used.values()}, meshes)
+
+
+def scenery_shape(name: str, thing: SceneryBox | SceneryMesh, mesh: Mesh | None) -> Shape:
+    """Return a thing as a shape in the world; a mesh's triangles are given, scaled."""
+    if isinstance(thing, SceneryBox):
+        geometry: Box | Mesh = Box((thing.length / 2, thing.width / 2, thing.height / 2))
+    else:
+        assert mesh is not None, f"the deployment was not given the file of scenery.{name}"
+        geometry = mesh
+    return Shape(geometry, thing.surface, thing.material.colour, thing.position, thing.orientation)
+
+
+def mesh_files(scenery: Mapping[str, SceneryBox | SceneryMesh]) -> dict[str, str | None]:
+    """Return the files that scenery is made of, in name order, each with the digest that is written beside it."""
+    meshes = [thing for thing in scenery.values() if isinstance(thing, SceneryMesh)]
+    return {mesh.file: mesh.digest for mesh in sorted(meshes, key=lambda mesh: mesh.file)}

@@ -1,0 +1,101 @@
+"""Scenery from files in a whole run: on any number of nodes, through late comers, into the capture and out of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from foosim.protocol import limits
+from foosim.protocol.mesh import AssetError
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings, System
+from foosim.rehearsal.verify import verify, verify_capture
+from foosim.vhub.capture_reader import open_capture
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TEXT: Final = TABLE.read_text()
+TICKS: Final = 100
+WEDGE: Final = b"""# A wedge: a ball that rolls along x goes up.
+v -2 -3 0
+v 2 -3 0
+v 2 3 0
+v -2 3 0
+v 2 -3 2
+v 2 3 2
+f 1 4 3 2
+f 1 2 5
+f 4 6 3
+f 2 3 6 5
+f 1 5 6 4
+"""
+SETS: Final = (
+    "table.rules.kickoff_delay=2 ms",
+    "table.rules.kickoff_speed=3 m/s",
+    "players={}",
+    "scenery={left: {shape: mesh, file: wedge.obj, scale: 0.02, x: -6 cm, yaw: 180 deg, surface: walls}, "
+    "right: {shape: mesh, file: wedge.obj, scale: 0.02, x: 6 cm, surface: walls, material: {red: 1}}}",
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "wedge.obj").write_bytes(WEDGE)
+    return tmp_path
+
+
+def test_a_world_with_meshes_is_one_world_on_any_number_of_nodes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A node is killed and comes back: it fetches the files again, in pieces."""
+    monkeypatch.setattr(limits, "ASSET_PIECE_BYTES", 64)
+    path = folder / "run.mcap"
+
+    def prepare(system: System) -> None:
+        system.at_tick(40, lambda: system.kill("n2"))
+        system.at_tick(60, lambda: system.start("n2"))
+
+    flat = rehearse(TEXT, "table.yaml", TICKS, 1, SETS[:-1])
+    one = rehearse(TEXT, "table.yaml", TICKS, 1, SETS, folder=folder)
+    three = rehearse(TEXT, "table.yaml", TICKS, 3, SETS, Settings(), prepare=prepare, capture=path, folder=folder)
+    assert one.digests == three.digests and len(one.digests) == TICKS
+    assert [lost["what"] for lost in three.json["recoveries"]][:1] == ["node"]
+    assert flat.digests[0] == one.digests[0] and flat.digests[-1] != one.digests[-1], "the ball met a wedge"
+    capture = open_capture(path)
+    heights = capture.frames.column("ball", "position", 3)[:, 2]
+    assert np.max(heights) > 0.02 and np.max(heights) < 0.5
+    assert capture.about.files == {"wedge.obj": WEDGE} and len(capture.deployment.scenery_shapes()) == 2
+    found = verify_capture(path, nodes=2)
+    assert found.equal and found.ticks == TICKS
+    with pytest.raises(AssetError, match=r"wedge\.obj: another file than the digest names"):
+        verify(capture.about.deployment_text, "t", capture.captured_ticks(), files={"wedge.obj": WEDGE + b"\n"})
+    assert drawn(path) == 2 * 8
+
+
+def drawn(path: Path) -> int:
+    """How many triangles of the scenery a viewer is told of."""
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        _, _, _, scene = next(reader.iter_decoded_messages(topics=["/scene"]))
+    (scenery,) = [entity for entity in scene.entities if entity.id == "scenery"]
+    return sum(len(part.indices) // 3 for part in scenery.triangles)
+
+
+def test_a_bad_file_ends_nothing_but_the_start(folder: Path) -> None:
+    (folder / "wedge.obj").write_bytes(WEDGE.replace(b"f 4 6 3", b"f 4 6 7"))
+    with pytest.raises(AssetError, match=r"^wedge\.obj:10: a face with vertex 7, there are 6$"):
+        rehearse(TEXT, "table.yaml", TICKS, 1, SETS, folder=folder)
+
+
+def test_boxes_are_scenery_on_both_engines(folder: Path) -> None:
+    box = json.dumps({"shape": "box", "length": "2 cm", "width": "40 cm", "height": "6 cm", "surface": "walls"})
+    walls = f"scenery={{left: {box[:-1]}, x: -20 cm}}, right: {box[:-1]}, x: 20 cm}}}}"
+    for engine in ("bullet", "pure"):
+        sets = (*SETS[:-1], walls, f"engine={engine}")
+        path = folder / f"{engine}.mcap"
+        rehearse(TEXT, "table.yaml", TICKS, 1, sets, capture=path)
+        along = open_capture(path).frames.column("ball", "position", 3)[:, 0]
+        assert np.max(np.abs(along)) < 0.2 and np.max(np.abs(along)) > 0.1, engine
