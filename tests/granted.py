@@ -15,10 +15,10 @@ def may_put(identity: str, key: str) -> bool:
     role, _, name = identity.partition(".")
     match role:
         case "node":
-            of_node = ("hello", "ready", "part", "samples", "want", "heartbeat", "farewell")
+            of_node = ("hello", "fetch", "ready", "part", "samples", "want", "heartbeat", "farewell")
             return key in {f"{S}/{what}/{name}" for what in of_node}
         case "vhub":
-            of_vhub = ("hello", "ready", "standing", "want", "heartbeat", "farewell")
+            of_vhub = ("hello", "fetch", "ready", "standing", "want", "heartbeat", "farewell")
             return key in {f"{S}/deliveries", *(f"{S}/{what}/vhub" for what in of_vhub)}
         case "operator":
             return key.startswith(f"{S}/request/{name}.") and "/" not in key[len(f"{S}/request/") :]
@@ -33,11 +33,11 @@ def may_hear(identity: str, key: str) -> bool:
     match role:
         case "node":
             to_all = {f"{S}/{what}" for what in ("recall", "prepare", "epoch", "order", "deliveries", "end")}
-            to_it = {f"{S}/{what}/{name}" for what in ("build", "refusal", "commit")}
+            to_it = {f"{S}/{what}/{name}" for what in ("build", "piece", "refusal", "commit")}
             return key in to_all | to_it or key.startswith((f"{S}/part/", f"{S}/want/"))
         case "vhub":
             to_all = {f"{S}/{what}" for what in ("recall", "epoch", "tempo", "end")}
-            to_it = {f"{S}/{what}/vhub" for what in ("build", "refusal", "commit")}
+            to_it = {f"{S}/{what}/vhub" for what in ("build", "piece", "refusal", "commit")}
             return key in to_all | to_it or key.startswith((f"{S}/samples/", f"{S}/want/"))
         case "operator":
             return key.startswith(f"{S}/answer/{name}.")
