@@ -76,6 +76,7 @@ SHELLS = {
     "supervisor/plan.py",
     "supervisor/run_folder.py",
     "supervisor/up.py",
+    "vhub/branching.py",
     "vhub/capture_file.py",
     "vhub/capture_reader.py",
     "vhub/capture_recovery.py",

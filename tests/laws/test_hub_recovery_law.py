@@ -214,3 +214,17 @@ class _Hasty(HubCore):
 def test_a_planted_fault_is_found(planted: type[HubCore]) -> None:
     with pytest.raises(AssertionError):
         assert_the_same(fly([(73, kill_hub("unsaid"))], hub=planted), undisturbed())
+
+
+@pytest.mark.parametrize(("hub_ms", "supervisor_ms"), [(50, 400), (400, 50)])
+def test_supervisor_and_vhub_are_lost_together(hub_ms: int, supervisor_ms: int) -> None:
+    """Each goes on from its own journal, whoever is back first."""
+
+    def both(system: System) -> None:
+        system.kill(channels.SUPERVISOR)
+        system.kill_hub("now", hub_ms * MS)
+        system.later(supervisor_ms * MS, partial(system.start, channels.SUPERVISOR))
+
+    seen = fly([(80, both), (160, both)], keeps_journals=True)
+    assert_the_same(seen, undisturbed())
+    assert {entry["what"] for entry in seen.run.json["recoveries"]} >= {"supervisor"}

@@ -13,6 +13,7 @@ import pytest
 from foosim.protocol import limits
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import CHAIN_START, chain_next
 from foosim.protocol.journal import Journal, journal_files, read_journal, read_records
 from foosim.protocol.messages import Deliveries, Down
 from foosim.vhub.keeping import Keep, KeepEpoch
@@ -32,7 +33,10 @@ def head_of(run: HubRun, tick: int) -> bytes:
     record = decode_any(HubRecord, run.records[tick + 1])
     assert isinstance(record, TickRecord)
     epoch = encode([epoch for epoch in run.epochs if epoch.tick <= tick][-1])
-    return encode(HeadRecord("run-1", run.snapshots[tick], added, record.commit, epoch))
+    chain = CHAIN_START
+    for closing in run.closings[1 : tick + 1]:
+        chain = chain_next(chain, closing.digest)
+    return encode(HeadRecord("run-1", run.snapshots[tick], added, record.commit, epoch, chain=chain))
 
 
 def without_wall(row: msgspec.Struct) -> dict[str, object]:
