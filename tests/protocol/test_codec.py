@@ -55,6 +55,7 @@ def strategy(kind: inspect.Type) -> st.SearchStrategy[Any]:
         inspect.IntType: lambda t: st.integers(t.ge or 0, t.le if t.le is not None else t.lt - 1),
         inspect.FloatType: lambda t: st.floats(allow_nan=False),
         inspect.BoolType: lambda t: st.booleans(),
+        inspect.NoneType: lambda t: st.none(),
         inspect.StrType: lambda t: st.text(TEXTS, min_size=t.min_length or 0, max_size=min(t.max_length, LONG)),
         inspect.BytesType: lambda t: st.binary(min_size=t.min_length or 0, max_size=_longest(t)),
         inspect.ListType: lambda t: st.lists(strategy(t.item_type), max_size=LONG),
