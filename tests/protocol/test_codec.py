@@ -216,6 +216,8 @@ def _least_value(kind: inspect.Type) -> object:
         return "x" * (kind.min_length or 0)
     if isinstance(kind, inspect.BytesType):
         return bytes(kind.min_length or 0)
+    if isinstance(kind, inspect.UnionType):
+        return None
     return {inspect.FloatType: 0.0, inspect.BoolType: False, inspect.ListType: []}[type(kind)]
 
 
