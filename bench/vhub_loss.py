@@ -55,7 +55,10 @@ def _kill(over: threading.Event) -> None:
     """Kill the vHub whenever it has lived for a while beside players."""
     left, known = KILLS, 0
     while left and not over.wait(0.1):
-        pids = {name_of(command): pid for pid, command in children().items()}
+        try:
+            pids = {name_of(command): pid for pid, command in children().items()}
+        except OSError:  # a thread of this process has ended meanwhile
+            continue
         if VHUB not in pids or "player-red" not in pids or pids[VHUB] == known:
             continue
         known = pids[VHUB]

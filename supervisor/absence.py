@@ -28,6 +28,8 @@ class Absence:
         self._core = core
         self._since_ns = 0
         self._reason = ""
+        self._lost_at = 0, 0
+        """The epoch and the tick at which it went."""
         self._gap_ns = 0
         """The longest time between two commits since it is gone."""
         self._entry: Recovered | None = None
@@ -48,7 +50,7 @@ class Absence:
         if not core.is_open:
             core.say("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
             return
-        self._reason = reason
+        self._reason, self._lost_at = reason, (core.epoch, core.frame.tick)
         core.say("warning", f"lost the vHub: {reason}; the run waits for it at tick {core.frame.tick}")
 
     def hear(self, now_ns: int) -> None:
@@ -93,4 +95,4 @@ class Absence:
         """Put it into the account, when it is over: the world stood still until now."""
         core = self._core
         if core.is_open:
-            self._entry = core.recovery.note("vhub", channels.VHUB, self._reason, core.epoch)
+            self._entry = core.recovery.note("vhub", channels.VHUB, self._reason, *self._lost_at)

@@ -141,10 +141,11 @@ class Recovery:
         deployment = self._core.deployment
         return deployment.nodes[name].required or deployment.on_node_loss == "stop"
 
-    def note(self, what: str, name: str, reason: str, epoch: int | None = None) -> Recovered:
-        """Note a loss or a return, from the next epoch on unless another one is named."""
+    def note(self, what: str, name: str, reason: str, epoch: int | None = None, tick: int | None = None) -> Recovered:
+        """Note a loss or a return: at the last commit, from the next epoch on, unless others are named."""
         core = self._core
-        entry = Recovered(what, name, reason, core.frame.tick, core.epoch + 1 if epoch is None else epoch)
+        at = core.frame.tick if tick is None else tick
+        entry = Recovered(what, name, reason, at, core.epoch + 1 if epoch is None else epoch)
         self.recovered.append(entry)
         core.actions.append(Journal(encode(RecoveredRecord(entry))))
         return entry

@@ -159,7 +159,7 @@ class HubCore:
         self.door.wake(now_ns)
         if self.state is not None and self._epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
-        if self._patience.is_over(now_ns) and self._epoch > 0 and self.ended is None:
+        if self._patience.is_over(now_ns) and self._epoch > 0 and not self.finished:
             self._ask_again(now_ns)
         self._release(now_ns)
         if self.ended is not None and not self.finished and now_ns >= self._end_ns:
@@ -169,7 +169,7 @@ class HubCore:
         """When `wake` has something to do next."""
         deadline = self.member.deadline_ns
         if self._epoch > 0 and not self.finished:
-            deadline = min(deadline, self._patience.at_ns if self.ended is None else self._end_ns)
+            deadline = min(deadline, self._patience.at_ns, limits.COUNTER_MAX if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
         if self._world is not None and self._world.waited:

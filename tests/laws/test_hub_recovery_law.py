@@ -85,13 +85,16 @@ def kill_hub(ending: Ending = "now", back_ns: int = 300 * MS) -> Callable[[Syste
     return lambda system: system.kill_hub(ending, back_ns)
 
 
-def assert_the_same(seen: Seen, usual: Seen) -> None:
-    """Equal frames, fates and deliveries; each tick was captured once; each player was told everything once."""
+def assert_the_same(seen: Seen, usual: Seen, is_calm: bool = True) -> None:
+    """Equal frames, fates and deliveries; each tick was captured once; each player was told everything once.
+
+    The result has the packets as the vHub's farewell tells them, which bad weather may lose.
+    """
     assert seen.run.json["reason"] == "done" and not seen.run.json["failed"]
     assert seen.run.digests == usual.run.digests
     assert [c.frame.tick for c in seen.closings] == [c.frame.tick for c in usual.closings]
     assert seen.rows() == usual.rows(), "every packet with its fate, every delivery, every join"
-    assert seen.run.json["packets"] == usual.run.json["packets"]
+    assert not is_calm or seen.run.json["packets"] == usual.run.json["packets"]
     for tick, payloads in seen.deliveries.items():
         assert len(payloads) == 1, f"deliveries {tick} are said in {len(payloads)} ways"
     assert seen.told == usual.told, "the same Gos with the same numbers, byte for byte"
@@ -180,7 +183,7 @@ KILLS: Final = st.lists(
 )
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(kills=KILLS, weather=st.sampled_from([None, 1, 2]))
 @example(kills=[(5, "unsaid", 1), (6, "torn", 1), (9, "now", 40)], weather=3)
 def test_whenever_it_is_killed_the_world_is_the_same(kills: list[Any], weather: int | None) -> None:
@@ -188,7 +191,7 @@ def test_whenever_it_is_killed_the_world_is_the_same(kills: list[Any], weather: 
     bad = Weather(weather, 100_000, 2 * MS, loss=0.02, repeat=0.05) if weather is not None else Weather()
     planned = [(tick, kill_hub(ending, back_ms * MS)) for tick, ending, back_ms in kills]
     seen = fly(planned, sets=(*SETS, "deadlines.lockstep_fast=1 h", "deadlines.client_back=1 h"), weather=bad)
-    assert_the_same(seen, undisturbed())
+    assert_the_same(seen, undisturbed(), is_calm=weather is None)
 
 
 class _Forgetful(HubCore):
@@ -214,3 +217,17 @@ class _Hasty(HubCore):
 def test_a_planted_fault_is_found(planted: type[HubCore]) -> None:
     with pytest.raises(AssertionError):
         assert_the_same(fly([(73, kill_hub("unsaid"))], hub=planted), undisturbed())
+
+
+@pytest.mark.parametrize(("hub_ms", "supervisor_ms"), [(50, 400), (400, 50)])
+def test_supervisor_and_vhub_are_lost_together(hub_ms: int, supervisor_ms: int) -> None:
+    """Each goes on from its own journal, whoever is back first."""
+
+    def both(system: System) -> None:
+        system.kill(channels.SUPERVISOR)
+        system.kill_hub("now", hub_ms * MS)
+        system.later(supervisor_ms * MS, partial(system.start, channels.SUPERVISOR))
+
+    seen = fly([(80, both), (160, both)], keeps_journals=True)
+    assert_the_same(seen, undisturbed())
+    assert {entry["what"] for entry in seen.run.json["recoveries"]} >= {"supervisor"}

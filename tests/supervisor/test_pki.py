@@ -223,9 +223,7 @@ def test_passwords_are_kept_beside_certificates(folder: Path) -> None:
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert not path.exists()
     pki.issue(folder, ["client.hand"])
-    with pytest.raises(
-        CertificateError, match=r"a certificate and a password of client\.hand: remove"
-    ):
+    with pytest.raises(CertificateError, match=r"a certificate and a password of client\.hand: remove"):
         load_credentials(folder, "client.hand")
     with pytest.raises(CertificateError, match="needs the root certificate"):
         load_credentials(None, "client.hand", "s3cret")

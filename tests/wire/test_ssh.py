@@ -185,7 +185,7 @@ def test_a_capture_comes_home_whole_or_stays(there: There, tmp_path: Path) -> No
     (folder / CAPTURE).write_bytes(content)
     damaging = there.bin / "foosim-guard"
     for damage in ("head -c 2999999", "tr a b"):
-        damaging.write_text(f"#!/bin/sh\n{command_path('foosim-guard')} \"$@\" | {damage}\n")
+        damaging.write_text(f'#!/bin/sh\n{command_path("foosim-guard")} "$@" | {damage}\n')
         damaging.chmod(0o755)
         with pytest.raises(Failed, match="it came damaged"):
             fetch_capture(there.remote(commands=None), RUN, home)
