@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from foosim.protocol import limits
 from foosim.protocol.channels import Channel
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 
@@ -91,13 +92,13 @@ class Bus:
             at_ns += weather.delay_ns + int(unit_interval(words[1]) * weather.spread_ns)
         heapq.heappush(self._heap, (at_ns, self.sent, reader, channel, name, payload))
 
-    def hold(self, message: Message, until_ns: int) -> None:
-        """Put a message back for a receiver that is busy; it keeps its place among what waits."""
-        heapq.heappush(self._heap, (until_ns, message[1], *message[2:]))
+    def next_ns(self) -> int:
+        """Return when the next message arrives; far beyond any run when none is on its way."""
+        return self._heap[0][0] if self._heap else limits.COUNTER_MAX
 
-    def next_ns(self) -> int | None:
-        """Return when the next message arrives, or None."""
-        return self._heap[0][0] if self._heap else None
+    @property
+    def is_empty(self) -> bool:
+        return not self._heap
 
     def pop(self) -> Message:
         return heapq.heappop(self._heap)

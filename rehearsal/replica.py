@@ -86,7 +86,7 @@ class Replica:
 
     def _settle(self) -> None:
         """Let the nodes take turns until nobody has anything to say."""
-        while self._bus.next_ns() is not None:
+        while not self._bus.is_empty:
             _, _, receiver, channel, name, payload = self._bus.pop()
             core, solver = self._nodes[receiver]
             core.receive(channel, name, payload, 0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Final, TypeVar
 
 from foosim.protocol import channels
@@ -26,11 +26,15 @@ from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.vhub.records import Closing, HubRecord, TickRecord
 
-TICKS: Final = 320
-HEALED_TICK: Final = 240
+TICKS: Final = 240
+HEALED_TICK: Final = 200
 """From here on nothing new happens, and what is down comes up."""
 FAULTS: Final = (8, 20)
-NODES: Final = (3, 6)
+NODES: Final = (3, 3, 3, 4, 4, 5)
+WORLDS: Final = 4
+"""How many worlds there are: seeds differ in what happens to the processes, and take the next of these in turn."""
+SMALL: Final = ("engine=pure", "substeps=1", "table.rules.kickoff_delay=20 ms")
+"""What is computed is the same, with fewer steps to it; the ball rolls from the start."""
 PATIENT: Final = ("deadlines.tick_lost=5 s", "deadlines.lockstep_fast=1 h")
 """A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
 MS: Final = 1_000_000
@@ -87,13 +91,13 @@ class Plan:
 def plan_of(seed: int) -> Plan:
     """Return the plan of a seed: nodes, weather, and from 8 to 20 faults, of three kinds at least."""
     dice = Dice(seed)
-    nodes = dice.between(*NODES)
+    nodes = dice.one_of(NODES)
     names = [f"n{number}" for number in range(1, nodes + 1)]
     bad = dice.unit() < 0.7
     weather = Weather(
         seed,
-        delay_ns=dice.between(0, 2 * MS) if bad else 0,
-        spread_ns=dice.between(0, 5 * MS) if bad else 0,
+        delay_ns=dice.between(0, MS) if bad else 0,
+        spread_ns=dice.between(0, 3 * MS) if bad else 0,
         loss=dice.one_of((0.0, 0.02, 0.1)) if bad else 0.0,
         repeat=dice.one_of((0.0, 0.05, 0.3)) if bad else 0.0,
     )
@@ -120,12 +124,17 @@ def _kill(dice: Dice, names: Sequence[str]) -> Fault:
     name, back = dice.one_of(names), dice.between(1, 40)
 
     def do(system: System) -> None:
-        system.kill(name)
+        _end(system, name, names)
         system.at_tick(system.supervisor.frame.tick + back, partial(_revive, system, name))
-        if not any(other in system.processes for other in names):
-            system.start(name)  # no further tick would be committed
 
     return Fault(_tick(dice), "kill", f"kill {name}", _here(name, do))
+
+
+def _end(system: System, name: str, names: Sequence[str]) -> None:
+    """Kill a node; one is started at once if none is left, since no further tick would be committed."""
+    system.kill(name)
+    if not any(other in system.processes for other in names):
+        system.start(name)
 
 
 def _revive(system: System, name: str) -> None:
@@ -154,7 +163,7 @@ def _cut(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _slow(dice: Dice, names: Sequence[str]) -> Fault:
-    name, slow_ns = dice.one_of([*names, channels.VHUB]), dice.between(0, 20 * MS)
+    name, slow_ns = dice.one_of([*names, channels.VHUB]), dice.between(0, 8 * MS)
 
     def do(system: System) -> None:
         system.processes[name].slow_ns = slow_ns
@@ -174,7 +183,7 @@ def _stop(dice: Dice, names: Sequence[str]) -> Fault:
     def do(system: System) -> None:
         system.request("stop", node=node)
         tick = system.supervisor.frame.tick
-        system.at_tick(tick + 10, partial(_here(node, lambda found: found.kill(node)), system))
+        system.at_tick(tick + 10, partial(_here(node, lambda found: _end(found, node, names)), system))
         system.at_tick(tick + 15, partial(system.request, "start", node=node))
         system.at_tick(tick + 20, partial(_revive, system, node))
 
@@ -295,11 +304,17 @@ class Flown:
     chain: str = ""
 
 
+@lru_cache(maxsize=4 * WORLDS)
+def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
+    """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
+    text = with_nodes(text, name, nodes, [f"seed={seed}", *SMALL, *PATIENT])
+    return text, with_nodes(text, name, 1, ["players={}"])
+
+
 def fly(text: str, name: str, seed: int, settings: Settings | None = None) -> Flown:
     """Rehearse a deployment under the faults of a seed, on the pure engine. `settings` may plant faulty cores."""
     plan = plan_of(seed)
-    text = with_nodes(text, name, plan.nodes, [f"seed={seed}", "engine=pure", *PATIENT])
-    alone = with_nodes(text, name, 1, ["players={}"])
+    text, alone = worlds(text, name, plan.nodes, seed % WORLDS)
     replica = Replica(alone, name, load_deployment(alone, name))
     laws = Laws(replica)
     chosen = replace(
@@ -307,6 +322,7 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None) -> Fl
         weather=plan.weather,
         restart_ns=RESTART_NS,
         observer=laws.see,
+        observes=("journal", "publish"),
         on_closing=laws.close,
     )
     system = System(RunSettings(f"swarm-{seed}", name, text, Pace("fast"), TICKS), chosen)

@@ -7,7 +7,8 @@ the virtual clock (`slow_ns`), may have its engines rebuilt, may be asked someth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -16,14 +17,14 @@ from foosim.client.player import PlayerLoop, load_player
 from foosim.node.core import NodeCore
 from foosim.node.engines.interface import EngineFactory
 from foosim.node.solver import Solver
-from foosim.protocol import channels
+from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Epoch, Request
-from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
+from foosim.rehearsal.bus import CALM, Bus, Message, Observer, Traced, Weather
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
 from foosim.vhub.core import HubCore
@@ -31,6 +32,7 @@ from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
 
 OPERATOR: Final = "operator"
+NEVER_NS: Final = limits.COUNTER_MAX
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
 
@@ -49,6 +51,10 @@ class Process:
     slow_ns: int = 0
     """Virtual time that each of its turns takes which says something."""
     busy_until_ns: int = 0
+    wake_ns: int = 0
+    """When it is woken next, if nothing comes before."""
+    inbox: deque[Message] = field(default_factory=deque)
+    """What came while it was busy, in order of arrival."""
     took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
     """Told how long its turns took, as a shell tells."""
 
@@ -69,6 +75,8 @@ class Settings:
     restart_ns: int = 0
     """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
     observer: Observer | None = None
+    observes: Collection[str] = ("journal", "publish", "receive")
+    """What the observer is told of."""
     on_commit: Callable[[Frame], None] | None = None
     on_closing: Callable[[Closing], None] | None = None
     on_epoch: Callable[[Epoch], None] | None = None
@@ -86,10 +94,15 @@ class System:
         self.solvers: dict[str, Solver] = {}
         self.players: dict[str, PlayerLoop] = {}
         self.answers: dict[str, Answer] = {}
+        self._traces_receive = rehearsal.observer is not None and "receive" in rehearsal.observes
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
         self._boots = 0
+        self._soonest_ns = 0
+        """No process is woken before, as far as is known without looking at each."""
+        self._behind: dict[str, Process] = {}
+        """Processes with something in their inbox."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
         self.supervisor.on_commit = self._committed
@@ -113,7 +126,8 @@ class System:
         self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
     ) -> None:
         self.bus.subscribe(name, reads)
-        self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
+        process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
+        process.wake_ns = self._soonest_ns = self.bus.now_ns
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -136,76 +150,101 @@ class System:
     def run(self) -> None:
         """Run until the supervisor has finished."""
         bus = self.bus
-        self._wake_all()
+        self._wake_due()
         while not self.supervisor.finished:
             while self._next:
                 self._next.pop(0)()
             arrival_ns = bus.next_ns()
-            if arrival_ns is not None and arrival_ns <= bus.now_ns:
+            free_ns = min([process.busy_until_ns for process in self._behind.values()]) if self._behind else NEVER_NS
+            if free_ns <= arrival_ns and free_ns <= self._soonest_ns:
+                bus.now_ns = max(bus.now_ns, free_ns)
+                self._catch_up()
+            elif arrival_ns <= self._soonest_ns:
+                bus.now_ns = max(bus.now_ns, arrival_ns)
                 self._deliver()
-                continue
-            deadline_ns = self._deadline_ns()
-            if arrival_ns is not None and arrival_ns <= deadline_ns:
-                bus.now_ns = arrival_ns
-                self._deliver()
-                continue
-            bus.now_ns = max(bus.now_ns, deadline_ns)
-            self._wake_all()
-            self._check_deadlines()
-            if bus.now_ns - self._last_commit_ns > IDLE_NS_MAX and not self.supervisor.pacer.paused:
-                raise Stuck(self._where())
+            elif self._is_soonest_known():
+                bus.now_ns = max(bus.now_ns, self._soonest_ns)
+                self._wake_due()
+                if bus.now_ns - self._last_commit_ns > IDLE_NS_MAX and not self.supervisor.pacer.paused:
+                    raise Stuck(self._where())
 
     def close(self) -> None:
         """Free the engines."""
         for solver in self.solvers.values():
             solver.close()
 
+    def _is_soonest_known(self) -> bool:
+        """Look when the next process is to be woken; False when it is later than was thought."""
+        soonest_ns = min([process.wake_ns for process in self.processes.values()])
+        known, self._soonest_ns = soonest_ns == self._soonest_ns, soonest_ns
+        return known
+
     def _deliver(self) -> None:
+        """Hand the next message of the bus to its receiver, or put it behind what waits there already."""
         message = self.bus.pop()
-        _, _, receiver, channel, name, payload = message
-        process = self.processes.get(receiver)
-        now_ns = self.bus.now_ns
+        process = self.processes.get(message[2])
         if process is None:
-            if receiver == OPERATOR:
-                self._answered(payload)
-            return
-        if process.busy_until_ns > now_ns:
-            self.bus.hold(message, process.busy_until_ns)
-            return
-        self._trace(now_ns, process, "receive", channel.name, payload)
+            if message[2] == OPERATOR:
+                self._answered(message[5])
+        elif process.inbox or process.busy_until_ns > self.bus.now_ns:
+            process.inbox.append(message)
+            self._behind[process.name] = process
+        else:
+            self._hand(process, message)
+
+    def _catch_up(self) -> None:
+        """Hand the oldest message that waits to a process that is free again."""
+        process = min(self._behind.values(), key=lambda process: process.busy_until_ns)
+        message = process.inbox.popleft()
+        if not process.inbox:
+            self._behind.pop(process.name)
+        self._hand(process, message)
+
+    def _hand(self, process: Process, message: Message) -> None:
+        """Let a process take one message and do what follows from it."""
+        _, _, _, channel, name, payload = message
+        now_ns = self.bus.now_ns
+        if self._traces_receive:
+            self._trace(now_ns, process, "receive", channel.name, payload)
         process.core.receive(channel, name, payload, now_ns)
         process.turn(now_ns)
         if process.slow_ns and self._core_deadline_ns(process) <= now_ns:  # no backlog keeps it from its heartbeat
             process.core.wake(now_ns)
             process.turn(now_ns)
         self._perform(process)
+        self._plan_wake(process)
 
-    def _wake_all(self) -> None:
+    def _wake_due(self) -> None:
+        """Wake all processes whose time has come."""
         now_ns = self.bus.now_ns
         for process in list(self.processes.values()):
-            if process.busy_until_ns <= now_ns:
+            if max(process.wake_ns, process.busy_until_ns) <= now_ns:
                 self._wake(process)
 
     def _wake(self, process: Process) -> None:
-        process.core.wake(self.bus.now_ns)
-        process.turn(self.bus.now_ns)
+        now_ns = self.bus.now_ns
+        process.core.wake(now_ns)
+        process.turn(now_ns)
         self._perform(process)
+        process.wake_ns = NEVER_NS
+        self._plan_wake(process)
+        assert process.wake_ns > now_ns, f"{process.name} has a deadline that waking did not move"
 
     def _core_deadline_ns(self, process: Process) -> int:
         core = process.core
         deadline: int = core.deadline_ns(self.bus.now_ns) if core is self.supervisor else core.deadline_ns()
         return deadline
 
-    def _deadline_of(self, process: Process) -> int:
-        return max(self._core_deadline_ns(process), process.busy_until_ns)
+    def _plan_wake(self, process: Process) -> None:
+        """After a turn: see when the process has something to do by time, as its loop does.
 
-    def _deadline_ns(self) -> int:
-        return min(self._deadline_of(process) for process in self.processes.values())
-
-    def _check_deadlines(self) -> None:
-        """A core that was just woken has its next deadline in the future; else its process would never sleep."""
-        late = [name for name, process in self.processes.items() if self._deadline_of(process) <= self.bus.now_ns]
-        assert not late, f"{late} have deadlines that waking did not move"
+        The supervisor's deadline counts from now: it may come sooner by what happens, and never later.
+        """
+        wake_ns = self._core_deadline_ns(process)
+        if process.core is self.supervisor:
+            wake_ns = min(wake_ns, process.wake_ns)
+        process.wake_ns = max(wake_ns, process.busy_until_ns)
+        self._soonest_ns = min(self._soonest_ns, process.wake_ns)
 
     def _perform(self, process: Process) -> None:
         """Perform what a core asked for, in order."""
@@ -227,7 +266,12 @@ class System:
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             farewell = self.hub.farewell()
             self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
-            self.processes.pop(process.name)
+            self._leave(process.name)
+
+    def _leave(self, name: str) -> None:
+        """A process has ended: what is on its way to it is lost."""
+        self.processes.pop(name)
+        self._behind.pop(name, None)
 
     def _keep(self, now_ns: int, process: Process, action: Any) -> None:
         """Hand what is written or said to those who asked for it."""
@@ -246,7 +290,7 @@ class System:
             settings.on_say(process.name, action.level, action.text)
 
     def _trace(self, now_ns: int, process: Process, what: str, channel: str, payload: bytes) -> None:
-        if self.settings.observer is not None:
+        if self.settings.observer is not None and what in self.settings.observes:
             self.settings.observer(Traced(now_ns, process.name, what, channel, payload))
 
     def _committed(self, frame: Frame) -> None:
@@ -267,12 +311,13 @@ class System:
 
     def kill(self, name: str) -> None:
         """End a node's process at once: what is on its way to it is lost, the supervisor sees the connection close."""
-        self.processes.pop(name)
+        self._leave(name)
         self.solvers.pop(name).close()
         supervisor = self.processes[channels.SUPERVISOR]
         self.supervisor.process_gone(name, self.bus.now_ns)
         supervisor.turn(self.bus.now_ns)
         self._perform(supervisor)
+        self._plan_wake(supervisor)
 
     def start(self, name: str) -> None:
         """Start a node's process again, with a new boot."""
@@ -284,7 +329,7 @@ class System:
         """A process that is refused ends; its launcher starts another one after a while."""
         if self.solvers.get(name) is not refused:
             return
-        self.processes.pop(name)
+        self._leave(name)
         self.solvers.pop(name).close()
         self._enter_node(name, library_fingerprint())
         self.pause(name, self.settings.restart_ns)
@@ -293,6 +338,7 @@ class System:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""
         process = self.processes[name]
         process.busy_until_ns = max(process.busy_until_ns, self.bus.now_ns + for_ns)
+        process.wake_ns = max(process.wake_ns, process.busy_until_ns)
 
     def request(self, verb: str, **arguments: Any) -> str:
         """Ask the supervisor for something; return the request's id."""
