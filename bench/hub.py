@@ -96,7 +96,7 @@ def _measure(way: str, text: str, deployment: Deployment, said: list[list[Messag
 
 def _start(core: HubCore, text: str, journal: Journal | None) -> None:
     """Build the hub, let the clients join, begin."""
-    build = Build(channels.VHUB, "boot", "bench", TABLE.name, text, "fast", [])
+    build = Build(channels.VHUB, "boot", "first", "bench", TABLE.name, text, "fast", [])
     core.receive(channels.BUILD, channels.VHUB, encode(build), 0)
     for name in CLIENTS:
         hello = ClientHello(name, "boot", limits.PROTOCOL_VERSION, "", 0)

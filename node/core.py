@@ -39,6 +39,7 @@ from foosim.protocol.messages import (
     Outbox,
     Part,
     Prepare,
+    Recall,
     Samples,
     Want,
 )
@@ -107,6 +108,7 @@ class NodeCore:
             channels.EPOCH.name: self._on_epoch,
             channels.COMMIT.name: self._on_commit,
             channels.WANT.name: self._on_want,
+            channels.RECALL.name: self._on_recall,
             channels.BUILD.name: self._on_build,
             channels.PREPARE.name: self._on_prepare,
             channels.END.name: self._on_end,
@@ -392,6 +394,9 @@ class NodeCore:
         assert layout is not None
         self.member.want_layout(layout)
 
+    def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
+        self._repeated += not self.member.recall(recall)
+
     def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
         if self.deployment is not None:
             self.member.want_layout(self._layout_with(prepare.added))
@@ -403,6 +408,7 @@ class NodeCore:
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self.epoch or self.deployment is None:
             self._repeated += 1
+            self.member.repeated(epoch.epoch == self.epoch)
             return
         self.member.check_epoch(epoch)
         if self.name not in epoch.roster:

@@ -61,9 +61,11 @@ def _radio(name: str, message: Any, writers: str, readers: str, rate: str) -> Ch
 
 
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered")
+RECALL: Final = _simulation("recall", messages.Recall, "supervisor", "node, vhub", "an unknown heartbeat", named=False)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation("ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch")
+STANDING: Final = _simulation("standing", messages.Standing, "vhub", "supervisor", "with each ready")
 PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
 EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
 ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False)
@@ -87,9 +89,11 @@ DOWN: Final = _radio("down", messages.Go | messages.Down, "vhub", "the named one
 
 CHANNELS: Final[tuple[Channel, ...]] = (
     HELLO,
+    RECALL,
     BUILD,
     REFUSAL,
     READY,
+    STANDING,
     PREPARE,
     EPOCH,
     ORDER,
@@ -132,13 +136,13 @@ def read(channel: Channel, name: str, payload: bytes) -> Any:
 
 
 NODE_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
-    PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
+    RECALL, PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
 )))  # fmt: skip
 VHUB_READS: Final = ((BUILD, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
-    EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
+    RECALL, EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final = tuple((channel, False) for channel in (
-    HELLO, READY, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
+    HELLO, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
 ))  # fmt: skip
 CLIENT_READS: Final = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
 OPERATOR_READS: Final = ((ANSWER, True),)

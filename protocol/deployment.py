@@ -177,6 +177,8 @@ class Deadlines(Part):
     lockstep_fast_ns: Deadline = _default("10 s", "lockstep_fast")
     lockstep_realtime_ns: Deadline = _default("1 s", "lockstep_realtime")
     start_ns: Deadline = _default("60 s", "start")
+    orphan_ns: Deadline = _default("30 s", "orphan")
+    """Nodes and vHub end when their supervisor has been gone for so long."""
 
 
 def _int_only(value: object) -> object:

@@ -17,6 +17,7 @@ from typing import Final
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
+from foosim.protocol.messages import AddedEntity
 
 WORLD: Final = "world"
 """Name of the entity that has no body: score and the rules' memory."""
@@ -143,3 +144,9 @@ def build_layout(deployment: Deployment, added: Iterable[tuple[str, str]] = ()) 
             raise Malformed(f"{model} {name} cannot be added: {' or '.join(sorted(ADDABLE))} with a free name can be")
         models[name] = model
     return Layout(models, sensors)
+
+
+def added_entities(deployment: Deployment, layout: Layout) -> list[AddedEntity]:
+    """Return the entities of a layout beside the deployment's."""
+    base = build_layout(deployment)
+    return [AddedEntity(entity.name, entity.model) for entity in layout.entities if entity.name not in base]

@@ -1,7 +1,8 @@
 """The handshake of a process with the supervisor, as the process sees it: hello, build, ready, and the heartbeat.
 
 Hello and ready are said again until they are answered, since declaring a subscriber does not mean that the other side
-knows of it. Shared by node and vHub. Neighbours: `supervisor.roster` is the other side.
+knows of it. A supervisor that was started again recalls who takes part: hello, build and ready once more, while all
+that the process has computed stays. Shared by node and vHub. Neighbours: `supervisor.roster` is the other side.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Refusal
+from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Recall, Refusal
 
 AGAIN_NS: Final = 200_000_000
 
@@ -54,12 +55,17 @@ class Member:
         self._built: set[bytes] = set()
         """Digests of the layouts that were said to be ready."""
         self._entered = False
-        self._heartbeat_ns = now_ns
+        self._recalled_by = ""
+        """Boot of a supervisor that has recalled this process and not answered its hello yet."""
+        self.standing: Callable[[], Action] | None = None
+        """Gives what is said before each ready (the vHub's)."""
 
     def take_build(self, build: Build) -> bool:
         """Take the supervisor's answer to hello; False when it is for another boot or a repeat."""
-        if build.boot != self.boot or self.build is not None:
+        if build.boot != self.boot:
             return False
+        if self.build is not None:
+            return self._take_again(self.build, build)
         try:
             deployment = load_deployment(build.deployment, build.deployment_name)
         except DeploymentError as error:
@@ -69,6 +75,30 @@ class Member:
         self.build = build
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's says where clients find it
         self._world = deployment.world
+        return True
+
+    def _take_again(self, known: Build, build: Build) -> bool:
+        """Take the answer of the supervisor that has recalled this process, if it is about the same run."""
+        if not self._recalled_by or self.deployment is None:
+            return False
+        if (build.run, build.deployment) != (known.run, known.deployment):
+            self.refusal = f"the supervisor is that of another run, {build.run}, this takes part in {known.run}"
+            self._actions.append(Say("error", self.refusal))
+            return False
+        self._recalled_by = ""
+        self.layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in build.added])
+        self.build = build
+        self.deadline_ns = 0
+        return True
+
+    def recall(self, recall: Recall) -> bool:
+        """A supervisor does not know this process: say hello to it, unless it is the one that is known."""
+        if self.build is None or recall.boot in (self.build.supervisor, self._recalled_by):
+            return False
+        self._actions.append(Say("warning", "recalled by a supervisor that was started again"))
+        self._recalled_by = recall.boot
+        self._entered = False
+        self.deadline_ns = 0
         return True
 
     def refuse(self, payload: bytes) -> bool:
@@ -102,6 +132,8 @@ class Member:
         self.is_ready = True
         self._said_ready = layout
         self._built.add(layout.digest)
+        if self.standing is not None:
+            self._actions.append(self.standing())
         ready = Ready(self.name, self.boot, layout.digest, self.simulation or self._fingerprint)
         self._actions.append(Publish(channels.READY, self.name, encode(ready)))
 
@@ -109,10 +141,15 @@ class Member:
         """An epoch with this process in it has begun: nothing is to be said again."""
         self._entered = True
 
+    def repeated(self, is_present: bool) -> None:
+        """An epoch came again; the present one answers a ready that was said again."""
+        self._entered = self._entered or is_present
+
     def begin_anew(self) -> None:
         """The run goes on without this process: come back by the handshake. What is built stays."""
         self.build = self.layout = self._said_ready = None
         self.is_ready = self._entered = False
+        self._recalled_by = ""
         self.deadline_ns = 0
 
     def wake(self, now_ns: int, heartbeat: Callable[[], Heartbeat]) -> None:
@@ -122,12 +159,13 @@ class Member:
         if self.refusal:
             self.deadline_ns = now_ns + AGAIN_NS
             return
-        if self.build is None:
+        if self.build is None or self._recalled_by:
             hello = Hello(self.role, self.name, self.boot, limits.PROTOCOL_VERSION, self._world, self._fingerprint)
             self._actions.append(Publish(channels.HELLO, self.name, encode(hello)))
             self.deadline_ns = now_ns + AGAIN_NS
-            return
-        if not self._entered and self._said_ready is not None:
+            if self.build is None:
+                return
+        elif not self._entered and self._said_ready is not None:
             self.ready(self._said_ready)
         self._actions.append(Publish(channels.HEARTBEAT, self.name, encode(heartbeat())))
         self.deadline_ns = now_ns + limits.HEARTBEAT_NS

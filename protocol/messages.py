@@ -229,11 +229,21 @@ class AddedEntity(Item, frozen=True):
 Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
 
 
+class Recall(Message, frozen=True):
+    """The supervisor, started as `boot`, does not know a process that takes part: who knows another one says hello."""
+
+    boot: Name
+
+
 class Build(Message, frozen=True):
-    """Everything that a process needs to build the world: one address was all that it had to know."""
+    """Everything that a process needs to build the world: one address was all that it had to know.
+
+    `supervisor` is the boot of the supervisor that says it.
+    """
 
     name: Name
     boot: Name
+    supervisor: Name
     run: Name
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
@@ -259,6 +269,17 @@ class Ready(Message, frozen=True):
     boot: Name
     layout: Digest
     fingerprint: Digest
+
+
+class Standing(Message, frozen=True):
+    """How far the vHub has come, for a supervisor that takes over: the highest epoch that it knows, its last commit as
+    it came (empty before the first), the chain over the frames up to it, and its layout beside the deployment's."""
+
+    name: Name
+    epoch: Counter
+    commit: Numbers
+    chain: Digest
+    added: Added
 
 
 class Prepare(Message, frozen=True):

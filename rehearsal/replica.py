@@ -40,7 +40,7 @@ class Replica:
             self._nodes[node] = core, Solver(core, factory)
             self._bus.subscribe(node, channels.NODE_READS)
         for node in self._nodes:
-            build = Build(node, "boot", SOURCE, name, text, "fast", [])
+            build = Build(node, "boot", "first", SOURCE, name, text, "fast", [])
             self._say(channels.BUILD, node, encode(build))
         self._settle()
         owners = sorted(deployment.owners().items())

@@ -23,6 +23,7 @@ from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.records import CommitRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.vhub.records import Closing, HubRecord, TickRecord
 
@@ -246,16 +247,21 @@ class Laws:
                 self._closed = record.tick
             return
         record = decode_any(SupervisorRecord, traced.payload)
-        if isinstance(record, Commit) and record.tick > 0:
-            _hold(record.tick == self._committed + 1, f"commit {record.tick} after {self._committed}")
-            self._committed = record.tick
-            solved = sorted(index for each in self._solved.pop((record.epoch, record.tick)).values() for index in each)
-            _hold(solved == list(range(len(solved))), f"tick {record.tick}: entities {solved} are solved")
+        if isinstance(record, CommitRecord):
+            self._committed_one(decode(Commit, record.commit))
+            self._written[channels.SUPERVISOR].add(record.commit)
         elif isinstance(record, Epoch):
             _hold(record.epoch == self._epoch + 1, f"epoch {record.epoch} after {self._epoch}")
             _hold(record.tick == self._committed, f"epoch {record.epoch} does not start at the last commit")
             self._epoch = record.epoch
         self._written[channels.SUPERVISOR].add(traced.payload)
+
+    def _committed_one(self, commit: Commit) -> None:
+        if commit.tick > 0:
+            _hold(commit.tick == self._committed + 1, f"commit {commit.tick} after {self._committed}")
+            self._committed = commit.tick
+            solved = sorted(index for each in self._solved.pop((commit.epoch, commit.tick)).values() for index in each)
+            _hold(solved == list(range(len(solved))), f"tick {commit.tick}: entities {solved} are solved")
 
     def _said(self, traced: Traced) -> None:
         if traced.channel == channels.PART.name:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from heapq import heappop, heappush
 from typing import Any, Final
 
 from foosim.client.core import ClientCore
@@ -27,6 +28,7 @@ from foosim.protocol.messages import Answer, Epoch, Request
 from foosim.rehearsal.bus import CALM, Bus, Message, Observer, Traced, Weather
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.records import fold
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
@@ -72,6 +74,8 @@ class Settings:
     supervisor: type[SupervisorCore] = SupervisorCore
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
+    keeps_journals: bool = False
+    """Whether the supervisor's journal is kept, so that it can be started again."""
     restart_ns: int = 0
     """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
     observer: Observer | None = None
@@ -98,19 +102,21 @@ class System:
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
+        self._timers: list[tuple[int, int, Callable[[], object]]] = []
         self._boots = 0
         self._soonest_ns = 0
         """No process is woken before, as far as is known without looking at each."""
         self._behind: dict[str, Process] = {}
         """Processes with something in their inbox."""
+        self._run = settings
+        self._journal: list[bytes] = []
+        """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
-        self.supervisor.on_commit = self._committed
         self.hub = rehearsal.hub("boot", fingerprint, 0)
         deployment = self.supervisor.deployment
-        self._enter(channels.SUPERVISOR, self.supervisor, self.supervisor.advance, channels.SUPERVISOR_READS)
+        self._enter_supervisor()
         self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
-        self.processes[channels.SUPERVISOR].took = self.supervisor.watch.took
         self.processes[channels.VHUB].took = self.hub.waits.took
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
@@ -128,6 +134,12 @@ class System:
         self.bus.subscribe(name, reads)
         process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
         process.wake_ns = self._soonest_ns = self.bus.now_ns
+
+    def _enter_supervisor(self) -> None:
+        core = self.supervisor
+        core.on_commit = self._committed
+        self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
+        self.processes[channels.SUPERVISOR].took = core.watch.took
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -156,7 +168,9 @@ class System:
                 self._next.pop(0)()
             arrival_ns = bus.next_ns()
             free_ns = min([process.busy_until_ns for process in self._behind.values()]) if self._behind else NEVER_NS
-            if free_ns <= arrival_ns and free_ns <= self._soonest_ns:
+            if self._timers and self._timers[0][0] <= min(free_ns, arrival_ns, self._soonest_ns):
+                self._go_off()
+            elif free_ns <= arrival_ns and free_ns <= self._soonest_ns:
                 bus.now_ns = max(bus.now_ns, free_ns)
                 self._catch_up()
             elif arrival_ns <= self._soonest_ns:
@@ -278,6 +292,8 @@ class System:
         settings = self.settings
         if isinstance(action, Journal):
             self._trace(now_ns, process, "journal", "", action.record)
+            if settings.keeps_journals and process.core is self.supervisor:
+                self._journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
         elif isinstance(action, Keep):
@@ -309,20 +325,46 @@ class System:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
 
+    def later(self, after_ns: int, action: Callable[[], object]) -> None:
+        """Call `action` when some virtual time has passed."""
+        self._boots += 1
+        heappush(self._timers, (self.bus.now_ns + after_ns, self._boots, action))
+
+    def _go_off(self) -> None:
+        due_ns, _, action = heappop(self._timers)
+        self.bus.now_ns = max(self.bus.now_ns, due_ns)
+        self._next.append(action)
+
     def kill(self, name: str) -> None:
-        """End a node's process at once: what is on its way to it is lost, the supervisor sees the connection close."""
+        """End a node or the supervisor at once: what is on its way to it is lost, the supervisor sees that a node goes.
+
+        What a supervisor has not written by then it has not said either.
+        """
         self._leave(name)
+        if name == channels.SUPERVISOR:
+            return
         self.solvers.pop(name).close()
-        supervisor = self.processes[channels.SUPERVISOR]
+        supervisor = self.processes.get(channels.SUPERVISOR)
+        if supervisor is None:
+            return
         self.supervisor.process_gone(name, self.bus.now_ns)
         supervisor.turn(self.bus.now_ns)
         self._perform(supervisor)
         self._plan_wake(supervisor)
 
     def start(self, name: str) -> None:
-        """Start a node's process again, with a new boot."""
+        """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""
         assert name not in self.processes, f"{name} is running"
-        self._enter_node(name, library_fingerprint())
+        if name == channels.SUPERVISOR:
+            self._boots += 1
+            history = fold(self.supervisor.deployment, self._journal)
+            boot = f"boot-{self._boots}"
+            self.supervisor = self.settings.supervisor(
+                self._run, library_fingerprint(), self.bus.now_ns, boot, history=history
+            )
+            self._enter_supervisor()
+        else:
+            self._enter_node(name, library_fingerprint())
         self._wake(self.processes[name])
 
     def _start_again(self, name: str, refused: Solver) -> None:

@@ -1,15 +1,13 @@
-"""The account of who solved what: what a run's result says of its nodes and of the ball's way between them.
+"""The account of a run: who solved what, and who was lost and came back.
 
-Neighbours: `core` counts every committed frame, `status` shows it.
+What a run's result says of its nodes, of the ball's way between them and of its recoveries. Neighbours: `core` counts
+every committed frame, `recovery` notes losses, `records` keeps both in the journal, `status` shows them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-
-from foosim.protocol.barrier import Barrier
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import BALL
 
 
 @dataclass(slots=True)
@@ -22,13 +20,30 @@ class Account:
     moves: int = 0
     ball_solver: str = ""
 
-    def count(self, barrier: Barrier, frame: Frame) -> None:
-        """Count what led to a committed frame."""
-        entities = frame.layout.entities
-        for name, part in barrier.parts.items():
-            if any(entities[index].has_body for index in part.solved):
-                self.solved_ticks[name] = self.solved_ticks.get(name, 0) + 1
-        solver = barrier.solver_of(frame.layout[BALL].index)
-        if self.ball_solver and solver != self.ball_solver:
+    def count(self, solved: Iterable[str], ball_solver: str) -> None:
+        """Count a committed frame: the nodes that solved a body for it, and who solved the ball."""
+        for name in solved:
+            self.solved_ticks[name] = self.solved_ticks.get(name, 0) + 1
+        if self.ball_solver and ball_solver != self.ball_solver:
             self.handovers += 1
-        self.ball_solver = solver
+        self.ball_solver = ball_solver
+
+
+@dataclass(slots=True)
+class Recovered:
+    """One loss or return. `outage_ns` is the wall time without a commit, -1 while there is none behind it."""
+
+    what: str
+    name: str
+    reason: str
+    tick: int
+    epoch: int
+    outage_ns: int = -1
+
+
+def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int) -> None:
+    """A frame is committed at `now_ns`, the one before it was at `before_ns`: what was out goes on."""
+    for entry in reversed(recovered):
+        if entry.outage_ns >= 0:
+            return
+        entry.outage_ns = max(0, now_ns - before_ns)

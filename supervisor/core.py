@@ -2,7 +2,8 @@
 
 It computes nothing of the world: it knows who computes what (epochs), what changes the world (orders), and puts the
 nodes' parts together. It journals, then speaks. A committed tick never changes. Neighbours: `roster` (who takes part),
-`pacing` (when orders are released), `requests` (what people ask), `watch` (who is waited for), `records` (journal).
+`pacing` (when orders are released), `requests` (what people ask), `watch` (who is waited for), `records` (journal),
+`take_over` (the start of a supervisor that goes on with a run).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, layout_after
-from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.layout import Layout, added_entities
 from foosim.protocol.messages import (
     AddedEntity,
     Commit,
@@ -35,20 +36,24 @@ from foosim.protocol.messages import (
     Prepare,
     Ready,
     Request,
+    Standing,
     Tempo,
     Want,
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.start import initial_frame
 from foosim.supervisor.account import Account
+from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.handshake import Handshake
+from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.plan import RunSettings
-from foosim.supervisor.records import HeadRecord, RunRecord
+from foosim.supervisor.records import CommitRecord, Control, History, RunRecord, solved_by
 from foosim.supervisor.recovery import Recovery
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.status import SupervisorStatistics
+from foosim.supervisor.take_over import TakeOver
 from foosim.supervisor.watch import Watch
 
 FAREWELL_NS: Final = 10_000_000_000
@@ -62,8 +67,19 @@ PREPARE_NS: Final = 200_000_000
 class SupervisorCore:
     """The supervisor's state machine. `actions` is what the shell performs next."""
 
-    def __init__(self, settings: RunSettings, fingerprint: bytes, now_ns: int) -> None:
+    def __init__(
+        self,
+        settings: RunSettings,
+        fingerprint: bytes,
+        now_ns: int,
+        boot: str = "first",
+        clock: str = "",
+        history: History | None = None,
+    ) -> None:
+        """`boot` names this start of the supervisor, `clock` the clock of `now_ns`; with a history it goes on."""
         self.settings = settings
+        self.boot = boot
+        self.clock = clock
         self.actions: list[Action] = []
         self.deployment: Deployment = load_deployment(settings.deployment_text, settings.deployment_name)
         self.roster = Roster(self.deployment, fingerprint)
@@ -75,6 +91,8 @@ class SupervisorCore:
         self.frame: Frame = initial_frame(self.deployment)
         self.chain = CHAIN_START
         self.epoch = 0
+        self.is_open = False
+        """Whether an epoch of this supervisor has begun."""
         self.owners = self.deployment.owners()
         self.members: tuple[str, ...] = ()
         self.released = 0
@@ -87,20 +105,19 @@ class SupervisorCore:
         self.started_ns = self.committed_ns = 0
         self.on_commit: Callable[[Frame], None] | None = None
         """Told of every committed frame: a rehearsal's window on the run."""
+        self.arrivals = Arrivals()
+        self.epoch_payload = b""
+        self.orders: dict[int, list[Edit]] = {}
+        self.commits: dict[int, bytes] = {}
+        """The last ones, as they were published."""
         self._slots = Slots(self.frame.layout, self.owners)
-        self._epoch_payload = b""
-        self._orders: dict[int, list[Edit]] = {}
-        self._deliveries: dict[int, bytes] = {}
-        self._delivered = 0
-        """The last tick whose deliveries are here."""
-        self._parts: dict[int, list[Part]] = {}
-        self._commits: dict[int, bytes] = {}
         self._prepare_ns = now_ns
         self._patience = Patience(now_ns)
         self._refused = self._repeated = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Hello: self.handshake.hello,
             Ready: self.handshake.ready,
+            Standing: self._on_standing,
             Heartbeat: self.handshake.heartbeat,
             Part: self._on_part,
             Deliveries: self._on_deliveries,
@@ -108,8 +125,10 @@ class SupervisorCore:
             Request: self.requests.take,
             Farewell: self.handshake.farewell,
         }
-        self._run = RunRecord(settings.run, settings.deployment_name, settings.deployment_text)
-        self.actions.append(Journal(encode(self._run)))
+        text = settings.deployment_name, settings.deployment_text
+        self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.ticks, clock)
+        self.take_over = TakeOver(self, history, now_ns) if history is not None and history.epoch is not None else None
+        self.actions.append(Journal(encode(self.run_record) if history is None else self.head()))
 
     # --- what the shell calls --------------------------------------------------------------------------------------
 
@@ -128,7 +147,7 @@ class SupervisorCore:
 
     def advance(self, now_ns: int) -> None:
         """Commit and release as far as parts, pace and clock allow."""
-        if self.epoch == 0 or self.end is not None:
+        if not self.is_open or self.end is not None:
             return
         self._release(now_ns)
         while self._commit_next(now_ns):
@@ -144,6 +163,8 @@ class SupervisorCore:
                 self.finish(_losses(lost), failed=True)
             elif lost:
                 self._lose(lost, now_ns)
+            if self.take_over is not None:
+                self.take_over.wake(now_ns)
             if self._lacks and self._patience.is_over(now_ns):
                 self._ask_again(now_ns)
             if now_ns >= self._prepare_ns:
@@ -162,9 +183,9 @@ class SupervisorCore:
         Commits wait for each other as long as nodes can go on without them, less a tick for what a commit takes.
         """
         tick = self.frame.tick
-        reach = min(self.released, self._delivered + 1)
+        reach = min(self.released, self.arrivals.delivered + 1)
         ticks = range(tick + 1, max(tick + 2, reach))
-        missing = sum(len(self.members) - len(self._parts.get(ahead, ())) for ahead in ticks)
+        missing = sum(len(self.members) - len(self.arrivals.parts.get(ahead, ())) for ahead in ticks)
         return (channels.PART, missing) if missing > 0 else (channels.DELIVERIES, 1)
 
     def deadline_ns(self, now_ns: int) -> int:
@@ -172,7 +193,7 @@ class SupervisorCore:
         deadline = now_ns + limits.HEARTBEAT_NS
         if self._lacks:
             deadline = min(deadline, self._patience.at_ns)
-        if self.epoch > 0 and self.end is None and self.released <= self.frame.tick + limits.RELEASE_AHEAD:
+        if self.is_open and self.end is None and self.released <= self.frame.tick + limits.RELEASE_AHEAD:
             release_ns = self.pacer.release_ns(self.released)
             if release_ns is not None and (not self.stop_at or self.released < self.stop_at):
                 deadline = min(deadline, release_ns)
@@ -200,7 +221,7 @@ class SupervisorCore:
     def hold(self) -> None:
         """No node is left: nothing is computed until one joins."""
         self.members = ()
-        self._parts.clear()
+        self.arrivals.parts.clear()
 
     def finish(self, reason: str, failed: bool) -> None:
         """End the run in order at the last committed tick; say it once."""
@@ -209,7 +230,8 @@ class SupervisorCore:
         self.end = End(self.frame.tick, reason, failed)
         self.watch.ended_ns = self.watch.now_ns
         self.actions.append(Say("error" if failed else "info", f"run ends at tick {self.frame.tick}: {reason}"))
-        self.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(self.end)))
+        end = encode(self.end)
+        self.actions += [Journal(end), Publish(channels.END, channels.SUPERVISOR, end)]
         self.requests.end()
 
     def stop(self) -> int:
@@ -217,13 +239,14 @@ class SupervisorCore:
 
         The last commit says that it is the last, so that the vHub does not close its tick: no other may be.
         """
-        if self.epoch == 0 or self.end is not None:
+        if not self.is_open or self.end is not None:
             self.finish("stopped", failed=False)
             return self.frame.tick
         last = max(self.released, self.frame.tick + 1)
         self.stop_at = min(self.stop_at or last, last)
         if self.pacer.paused and self.released < self.stop_at:
             self.pacer.step(self.released, self.stop_at - self.released)
+        self.actions.append(Journal(encode(self.control())))
         return self.stop_at
 
     def statistics(self) -> SupervisorStatistics:
@@ -236,19 +259,17 @@ class SupervisorCore:
 
     def ordered_edits(self) -> list[Edit]:
         """Return the edits of released ticks that are not committed yet, and of those still to be released."""
-        released = [edit for tick in range(self.frame.tick, self.released) for edit in self._orders[tick]]
+        released = [edit for tick in range(self.frame.tick, self.released) for edit in self.orders[tick]]
         return released + self.requests.coming_edits()
 
     def added_to(self, layout: Layout) -> list[AddedEntity]:
         """Return the entities of a layout beside the deployment's."""
-        base = build_layout(self.deployment)
-        return [AddedEntity(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
+        return added_entities(self.deployment, layout)
 
     @property
     def missing_nodes(self) -> list[str]:
         """Return the nodes without whose parts the next frame cannot be put together."""
-        known = {part.node for part in self._parts.get(self.frame.tick + 1, ())}
-        return [node for node in self.members if node not in known]
+        return self.arrivals.missing(self.frame.tick + 1, self.members)
 
     def unready_nodes(self, layout: bytes) -> list[str]:
         """Return the nodes that have no engine for a layout yet."""
@@ -256,12 +277,26 @@ class SupervisorCore:
 
     def head(self) -> bytes:
         """Return the record with which a further journal file starts: what those before say and is still needed."""
-        coming, answers = self.requests.journalled()
-        orders = {tick: self._orders[tick] for tick in range(self.frame.tick, self.released)}
-        edits = sorted((tick, edits) for tick, edits in {**orders, **coming}.items() if edits)
-        added = self.added_to(self.frame.layout)
-        commit = self._commits.get(self.frame.tick, b"")
-        return encode(HeadRecord(self._run, added, self._epoch_payload, commit, edits, answers))
+        return head_of(self)
+
+    def control(self) -> Control:
+        """Return what people have set, for the journal."""
+        return control_of(self)
+
+    def take_commit(self, frame: Frame, chain: bytes, commit: bytes) -> None:
+        """Stand at a frame that is committed and not in the journal, which begins anew with it."""
+        self.frame, self.chain = frame, chain
+        self.released, self.arrivals.delivered = frame.tick, frame.tick - 1
+        self.commits = {frame.tick: commit}
+        self.actions.append(Journal(self.head()))
+
+    def say_last_commit(self, now_ns: int) -> None:
+        """Say the last commit again: it may have been written and not said."""
+        payload = self.commits.get(self.frame.tick)
+        if payload is None:
+            self._say_commit([], ([], ""), now_ns)
+        else:
+            self.actions.append(Publish(channels.COMMIT, channels.VHUB, payload))
 
     # --- release and commit ------------------------------------------------------------------------------------------
 
@@ -282,8 +317,8 @@ class SupervisorCore:
             if edits and tick > first:
                 self._say_orders(first, tick)
                 first = tick
-            self._orders[tick] = edits
-            self._orders.pop(tick - limits.KEPT_TICKS, None)
+            self.orders[tick] = edits
+            self.orders.pop(tick - limits.KEPT_TICKS, None)
             if tick == self.frame.tick:
                 self._patience.progress(self.deployment.tick_ns, now_ns)
             if tick == 0:
@@ -294,18 +329,18 @@ class SupervisorCore:
     def _say_orders(self, first: int, end: int) -> None:
         """Publish the orders of `first` to `end` - 1, of which only the first has edits."""
         if first < end:
-            order = Order(self.epoch, first, self._orders[first], end - 1 - first)
+            order = Order(self.epoch, first, self.orders[first], end - 1 - first)
             self.actions.append(Publish(channels.ORDER, channels.SUPERVISOR, encode(order)))
 
     def _commit_next(self, now_ns: int) -> bool:
         """Assemble and commit the next frame when all its parts are there; False when something is missing."""
         tick = self.frame.tick
-        parts = self._parts.get(tick + 1)
-        deliveries = self._deliveries.get(tick)
-        if parts is None or deliveries is None or len(parts) < len(self.members) or tick not in self._orders:
+        parts = self.arrivals.parts.get(tick + 1)
+        deliveries = self.arrivals.deliveries.get(tick)
+        if parts is None or deliveries is None or len(parts) < len(self.members) or tick not in self.orders:
             return False
         assert self.members, "parts of nobody"
-        edits = self._orders[tick]
+        edits = self.orders[tick]
         layout = layout_after(self.frame.layout, edits)
         slots = self._slots if layout is self.frame.layout else Slots(layout, self.owners)
         barrier = Barrier(tick + 1, self.members, slots)
@@ -325,57 +360,55 @@ class SupervisorCore:
         except BadParts as bad:
             self._refused += len(bad.nodes)
             self.say("error", f"{bad}: asked for again")
-            self._parts[tick + 1] = [part for part in parts if part.node not in bad.nodes]
+            self.arrivals.drop(tick + 1, bad.nodes)
             return False
         self._slots = slots
-        self._parts.pop(tick + 1)
-        self._deliveries.pop(tick - limits.KEPT_TICKS, None)
-        self.account.count(barrier, frame)
-        self._take_frame(frame, edits, now_ns)
+        self.arrivals.committed(tick)
+        self._take_frame(frame, edits, solved_by(barrier, frame), now_ns)
         return True
 
-    def _take_frame(self, frame: Frame, edits: list[Edit], now_ns: int) -> None:
+    def _take_frame(self, frame: Frame, edits: list[Edit], solved: tuple[list[str], str], now_ns: int) -> None:
         self.frame = frame
+        self.account.count(*solved)
         self.chain = chain_next(self.chain, frame.digest)
         self.recovery.committed(self.committed_ns, now_ns)
         self.committed_ns = now_ns
         self._patience.progress(self.deployment.tick_ns, now_ns)
-        self._say_commit(edits)
-        if self.on_commit is not None:
-            self.on_commit(frame)
         due_ns = self.pacer.release_ns(frame.tick - 1) or 0
         moved_ns = self.pacer.committed(frame.tick, now_ns)
+        self._say_commit(edits, solved, now_ns)
+        if self.on_commit is not None:
+            self.on_commit(frame)
         late = self.watch.committed(frame.tick, self.pacer.last_lag_ns, due_ns, now_ns)
         if moved_ns:
             self.say("warning", f"tick {frame.tick}: lag {moved_ns / 1e6:.1f} ms, waited for {self.watch.late}")
         elif late:
             self.say("info", late)
 
-    def _say_commit(self, edits: list[Edit]) -> None:
-        """Journal a frame, then publish it to the vHub."""
+    def _say_commit(self, edits: list[Edit], solved: tuple[list[str], str], now_ns: int) -> None:
+        """Journal a frame and who solved it, then publish it to the vHub."""
         frame = self.frame
         last = self.stop_at > 0 and frame.tick >= self.stop_at
         commit = Commit(self.epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, edits, last)
         payload = encode(commit)
-        self._commits[frame.tick] = payload
-        self._commits.pop(frame.tick - limits.KEPT_TICKS, None)
-        self.actions.append(Journal(payload))
+        self.commits[frame.tick] = payload
+        self.commits.pop(frame.tick - limits.KEPT_TICKS, None)
+        lag_ns = self.pacer.last_lag_ns if self.pacer.counts_lags else -1
+        self.actions.append(Journal(encode(CommitRecord(payload, *solved, now_ns, lag_ns))))
         self.actions.append(Publish(channels.COMMIT, channels.VHUB, payload))
 
     @property
     def _lacks(self) -> bool:
         """Whether a released tick waits for parts or deliveries."""
-        return self.epoch > 0 and self.end is None and self.frame.tick < self.released
+        return self.is_open and self.end is None and self.frame.tick < self.released
 
     def _ask_again(self, now_ns: int) -> None:
         """Ask for what the next commit lacks, the wait doubling."""
         tick = self.frame.tick
-        wants = (
-            [] if tick in self._deliveries else [Want(channels.SUPERVISOR, channels.DELIVERIES.name, tick, self.epoch)]
-        )
-        if len(self._parts.get(tick + 1, ())) < len(self.members):
-            wants.append(Want(channels.SUPERVISOR, channels.PART.name, tick + 1, self.epoch))
-        for want in wants:
+        wants = [] if tick in self.arrivals.deliveries else [(channels.DELIVERIES, tick)]
+        wants += [(channels.PART, tick + 1)] if self.missing_nodes else []
+        for channel, wanted in wants:
+            want = Want(channels.SUPERVISOR, channel.name, wanted, self.epoch)
             self.actions.append(Publish(channels.WANT, channels.SUPERVISOR, encode(want)))
         self._patience.asked(now_ns)
 
@@ -387,9 +420,10 @@ class SupervisorCore:
         `members` are the nodes that take part from now on; without them they stay.
         """
         self.epoch += 1
+        self.is_open = True
         self.owners = owners
         self.members = self.members if members is None else tuple(sorted(members))
-        self._parts.clear()
+        self.arrivals.parts.clear()
         self._slots = Slots(self.frame.layout, owners)
         frame, added = self.frame, self.added_to(self.frame.layout)
         who = list(self.members), sorted(owners.items()), added, self.roster.arithmetic
@@ -397,7 +431,7 @@ class SupervisorCore:
         payload = encode(epoch)
         self.actions.append(Journal(payload))
         self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, payload))
-        self._epoch_payload = payload
+        self.epoch_payload = payload
         for tick in range(self.frame.tick, self.released):
             self._say_orders(tick, tick + 1)
         self.watch.begun(now_ns)
@@ -405,16 +439,17 @@ class SupervisorCore:
 
     def start_if_ready(self, now_ns: int) -> None:
         """Open the first epoch when every declared process has built the world."""
-        if self.epoch > 0 or self.end is not None or self.roster.missing(self.frame.layout.digest):
+        if self.is_open or self.end is not None or self.roster.missing(self.frame.layout.digest):
             return
         self.pacer.start(now_ns)
         self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
         self.open_epoch(self.owners, now_ns, self.deployment.nodes)
-        self._say_commit([])
+        self.committed_ns = now_ns
+        self._say_commit([], ([], ""), now_ns)
 
     def say_epoch(self) -> None:
         """Say the present epoch again."""
-        self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self._epoch_payload))
+        self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, self.epoch_payload))
 
     def count_repeat(self) -> None:
         """A message came twice, or for somebody who is not here any more."""
@@ -431,36 +466,27 @@ class SupervisorCore:
     # --- messages ----------------------------------------------------------------------------------------------------
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
-        if part.epoch != self.epoch or part.tick <= self.frame.tick or part.tick > self.frame.tick + limits.KEPT_TICKS:
+        if part.epoch == self.epoch and self.arrivals.take_part(part, self.frame.tick, self.members):
+            self.watch.part(part.tick - 1, part.node, now_ns)
+        else:
             self._repeated += 1
-            return
-        if part.node not in self.members:
-            raise Malformed(f"a part of {part.node}, the roster is {', '.join(self.members)}")
-        parts = self._parts.setdefault(part.tick, [])
-        if any(known.node == part.node for known in parts):
-            self._repeated += 1
-            return
-        parts.append(part)
-        self.watch.part(part.tick - 1, part.node, now_ns)
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
-        if deliveries.tick in self._deliveries or deliveries.tick < self.frame.tick:
+        if not self.arrivals.take_deliveries(deliveries, payload, self.frame.tick):
             self._repeated += 1
             return
-        if deliveries.last > self.frame.tick + limits.KEPT_TICKS:
-            raise Malformed(f"deliveries of tick {deliveries.last}, the last commit is {self.frame.tick}")
-        self._deliveries[deliveries.tick] = payload
-        self._delivered = max(self._delivered, deliveries.last)
-        for tick in range(deliveries.tick + 1, deliveries.last + 1):
-            self._deliveries.setdefault(tick, encode(Deliveries(tick, [])))
         for tick in range(deliveries.tick, deliveries.last + 1):
             self.watch.delivered(tick, now_ns)
 
+    def _on_standing(self, standing: Standing, payload: bytes, now_ns: int) -> None:
+        if self.take_over is None or not self.take_over.standing(standing):
+            self._repeated += 1
+
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
-        if want.kind == channels.ORDER.name and want.tick in self._orders and want.epoch == self.epoch:
+        if want.kind == channels.ORDER.name and want.tick in self.orders and want.epoch == self.epoch:
             self._say_orders(want.tick, want.tick + 1)
-        elif want.kind == channels.COMMIT.name and want.tick in self._commits:
-            self.actions.append(Publish(channels.COMMIT, want.sender, self._commits[want.tick]))
+        elif want.kind == channels.COMMIT.name and want.tick in self.commits:
+            self.actions.append(Publish(channels.COMMIT, want.sender, self.commits[want.tick]))
 
 
 def _losses(lost: Mapping[str, str]) -> str:

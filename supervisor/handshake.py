@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
 from foosim.protocol.codec import decode_json, encode
-from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Refusal
+from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Recall, Refusal
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -35,7 +35,7 @@ class Handshake:
         core.roster.take(hello, now_ns)
         run, pace, added = core.settings, str(core.pacer.pace), core.added_to(core.frame.layout)
         deployment = run.deployment_name, run.deployment_text
-        build = Build(hello.name, hello.boot, run.run, *deployment, pace, added)
+        build = Build(hello.name, hello.boot, core.boot, run.run, *deployment, pace, added)
         core.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
 
     def _has_ended(self) -> bool:
@@ -64,7 +64,9 @@ class Handshake:
         if reason:
             self.refuse(process.role, process.name, process.boot, reason)
             return
-        if core.epoch == 0:
+        if core.take_over is not None:
+            core.take_over.wake(now_ns)
+        elif not core.is_open:
             core.start_if_ready(now_ns)
         elif process.name in (*core.members, channels.VHUB):
             if ready.layout == core.frame.layout.digest:
@@ -80,6 +82,8 @@ class Handshake:
         core = self._core
         process = core.roster.by_name.get(heartbeat.sender)
         if process is None:
+            if heartbeat.sender in core.roster.expected:
+                core.actions.append(Publish(channels.RECALL, channels.SUPERVISOR, encode(Recall(core.boot))))
             core.count_repeat()
             return
         process.heard_ns = now_ns
@@ -93,7 +97,7 @@ class Handshake:
         process.report = report if isinstance(report, dict) else {}
         if core.end is not None:
             core.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(core.end)))
-        elif core.epoch > 0 and heartbeat.epoch < core.epoch:
+        elif core.is_open and heartbeat.epoch < core.epoch:
             core.say_epoch()
             if heartbeat.sender == channels.VHUB:
                 core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))

@@ -49,11 +49,17 @@ class Pacer:
         self.anchor_ns = 0
         """Wall time of tick 0 at this pace."""
         self.moved_ns = 0
-        self._granted = 0
+        self.granted = 0
+        """The tick up to which `step` allows while paused."""
 
     @property
     def is_fast(self) -> bool:
         return self.pace.kind == "fast"
+
+    @property
+    def counts_lags(self) -> bool:
+        """Whether ticks can be late at all."""
+        return not self.is_fast and not self.paused
 
     def _span_ns(self, ticks: int) -> int:
         """Return the wall time that `ticks` take at this pace."""
@@ -69,7 +75,7 @@ class Pacer:
         if tick > committed + limits.RELEASE_AHEAD:
             return False
         if self.paused:
-            return tick < self._granted
+            return tick < self.granted
         return self.is_fast or now_ns >= self.anchor_ns + self._span_ns(tick)
 
     def release_ns(self, tick: int) -> int | None:
@@ -80,7 +86,7 @@ class Pacer:
 
     def committed(self, tick: int, now_ns: int) -> int:
         """Note that frame `tick` is committed; return how far a large lag moved the anchor, in ns."""
-        if self.is_fast or self.paused:
+        if not self.counts_lags:
             self.last_lag_ns = 0
             return 0
         lag_ns = max(0, now_ns - (self.anchor_ns + self._span_ns(tick)))
@@ -95,7 +101,7 @@ class Pacer:
     def pause(self, next_tick: int) -> None:
         """Release nothing from `next_tick` on."""
         self.paused = True
-        self._granted = next_tick
+        self.granted = next_tick
 
     def resume(self, next_tick: int, now_ns: int) -> None:
         """Go on with `next_tick` now."""
@@ -104,7 +110,7 @@ class Pacer:
 
     def step(self, next_tick: int, count: int) -> None:
         """Grant `count` ticks from `next_tick` on, and stay paused behind them."""
-        self._granted = max(self._granted, next_tick) + count if self.paused else next_tick + count
+        self.granted = max(self.granted, next_tick) + count if self.paused else next_tick + count
         self.paused = True
 
     def set_pace(self, pace: Pace, next_tick: int, now_ns: int) -> None:

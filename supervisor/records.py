@@ -1,6 +1,8 @@
 """The supervisor's journal: epochs, requests and commits, each written before it is spoken.
 
-A fold gives the run's last committed frame, its epoch, owners and the answers to requests. Neighbours: `core` writes,
+A fold gives everything that a supervisor needs which was started again: the last committed frames, the epoch, the edits
+of ticks that are not committed, answers, pace, and the account of the run. What belongs together is one record, so that
+a journal never ends between a request and what it did. Neighbours: `core` writes, `take_over` goes on from a fold,
 `protocol.journal` frames the records in files.
 """
 
@@ -11,45 +13,99 @@ from dataclasses import dataclass, field
 
 import msgspec
 
+from foosim.protocol import limits
+from foosim.protocol.barrier import Barrier
 from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
-from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, Epoch
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
+from foosim.protocol.layout import BALL, build_layout
+from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, End, Epoch
 from foosim.protocol.start import initial_frame
+from foosim.supervisor.account import Account, Recovered, close_outages
+from foosim.supervisor.pacing import Lags
 
 
 class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_unknown_fields=True):
-    """The first record of a journal: the run and its deployment."""
+    """The first record of a journal: the run, its deployment, pace and end (0: none).
+
+    `clock` names the monotonic clock whose times the records have: a machine's, since it was started.
+    """
 
     run: str
     deployment_name: str
     deployment: str
+    pace: str
+    ticks: int
+    clock: str
+
+
+class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbid_unknown_fields=True):
+    """What people have set, as it is now; `granted` is the tick up to which `step` allows, `returns` says which node
+    gets a robot back that was adopted."""
+
+    pace: str
+    paused: bool
+    granted: int
+    stop_at: int
+    stopped: list[str]
+    returns: dict[str, str]
 
 
 class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request", forbid_unknown_fields=True):
-    """A request whose tick is chosen: what it adds to that tick's order, and its answer."""
+    """A request whose tick is chosen: what it adds to that tick's order, its answer, and what it changes beside.
+
+    `owners` is who owns what by it, from the epoch on that follows.
+    """
 
     tick: int
     edits: list[Edit]
     answer: Answer
+    control: Control
+    owners: dict[str, str]
+
+
+class CommitRecord(msgspec.Struct, frozen=True, array_like=True, tag="commit", forbid_unknown_fields=True):
+    """A commit as it is published, with what the account counts: the nodes that solved a body, the ball's solver (empty
+    for frame 0), and when it was committed, how late, by the supervisor's clock."""
+
+    commit: bytes
+    solved: list[str]
+    ball_solver: str
+    now_ns: int
+    lag_ns: int
+
+
+class RecoveredRecord(msgspec.Struct, frozen=True, array_like=True, tag="recovered", forbid_unknown_fields=True):
+    """Somebody was lost or came; who owns what by it is in the epoch that follows."""
+
+    entry: Recovered
 
 
 class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
     """Where a further file of a journal starts: what the files before say and is still needed, so that they can go.
 
-    `added` is the layout of the last commit beside the deployment's; epoch and commit are as they were published.
+    `added` is the layout of the last commit beside the deployment's; epoch and commits are as they were published.
     """
 
     run: RunRecord
     added: list[AddedEntity]
     epoch: bytes
-    commit: bytes
+    commits: list[bytes]
+    chain: bytes
     edits: list[tuple[int, list[Edit]]]
     answers: list[Answer]
+    owners: dict[str, str]
+    control: Control
+    account: Account
+    lags: Lags
+    recovered: list[Recovered]
+    started_ns: int
+    committed_ns: int
+    end: End | None
 
 
-Record = RunRecord | HeadRecord | RequestRecord | Epoch | Commit
+Record = RunRecord | HeadRecord | RequestRecord | Control | CommitRecord | RecoveredRecord | Epoch | End
 
 
 @dataclass(slots=True)
@@ -58,45 +114,118 @@ class History:
 
     run: RunRecord
     frame: Frame
+    owners: dict[str, str]
+    control: Control
+    account: Account
     epoch: Epoch | None = None
+    commits: dict[int, bytes] = field(default_factory=dict)
+    """The last ones, by tick, as they were published."""
+    chain: bytes = CHAIN_START
     edits: dict[int, list[Edit]] = field(default_factory=dict)
     """Edits of ticks that are not committed yet."""
     answers: dict[tuple[str, str], Answer] = field(default_factory=dict)
     """By sender and id of the request."""
+    lags: Lags = field(default_factory=Lags)
+    recovered: list[Recovered] = field(default_factory=list)
+    started_ns: int = 0
+    committed_ns: int = 0
+    end: End | None = None
+
+
+def solved_by(barrier: Barrier, frame: Frame) -> tuple[list[str], str]:
+    """Return the nodes that solved a body on the way to a frame, and who solved the ball."""
+    entities = frame.layout.entities
+    names = [name for name, part in barrier.parts.items() if any(entities[index].has_body for index in part.solved)]
+    return sorted(names), barrier.solver_of(frame.layout[BALL].index)
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
-    """Return what the records of a journal, in order and from the start of one of its files, say about the run."""
-    iterator = iter(records)
-    history = _begin(deployment, decode_any(Record, next(iterator)))
-    layout = history.frame.layout
-    for raw in iterator:
+    """Return what the records of a journal, in order and from the start of one of its files, say about the run.
+
+    Raises Malformed when they are not those of a run of this version.
+    """
+    history: History | None = None
+    for raw in records:
         record = decode_any(Record, raw)
-        if isinstance(record, Commit):
-            layout = layout_after(layout, record.edits)
-            history.frame = frame_from_bytes(record.tick, layout, record.values, record.outboxes)
-            history.edits.pop(record.tick - 1, None)
-        elif isinstance(record, Epoch):
-            history.epoch = record
-        elif isinstance(record, RequestRecord):
-            history.answers[record.answer.sender, record.answer.id] = record.answer
-            if record.edits:
-                history.edits.setdefault(record.tick, []).extend(record.edits)
+        if isinstance(record, RunRecord | HeadRecord):
+            history = _begin(deployment, record)
+        elif history is None:
+            raise Malformed("a journal of the supervisor that does not start with its run")
+        else:
+            _apply(history, record)
+    if history is None:
+        raise Malformed("a journal of the supervisor without a record")
     return history
 
 
-def _begin(deployment: Deployment, first: object) -> History:
+def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
     """Return the history that a file's first record stands for."""
     if isinstance(first, RunRecord):
-        return History(first, initial_frame(deployment))
-    assert isinstance(first, HeadRecord), "a file starts with the run or with what was before it"
-    history = History(first.run, initial_frame(deployment))
-    if first.commit:
-        commit = decode(Commit, first.commit)
+        control = Control(first.pace, False, 0, first.ticks, [], {})
+        account = Account(dict.fromkeys(sorted(deployment.nodes), 0))
+        return History(first, initial_frame(deployment), deployment.owners(), control, account)
+    frame = initial_frame(deployment)
+    commits = {commit.tick: raw for raw in first.commits for commit in (decode(Commit, raw),)}
+    if commits:
+        commit = decode(Commit, commits[max(commits)])
         layout = build_layout(deployment, [(entity.name, entity.model) for entity in first.added])
-        history.frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
-    if first.epoch:
-        history.epoch = decode(Epoch, first.epoch)
-    history.edits = {tick: list(edits) for tick, edits in first.edits}
-    history.answers = {(answer.sender, answer.id): answer for answer in first.answers}
-    return history
+        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+    return History(
+        first.run,
+        frame,
+        first.owners,
+        first.control,
+        first.account,
+        epoch=decode(Epoch, first.epoch) if first.epoch else None,
+        commits=commits,
+        chain=first.chain,
+        edits={tick: list(edits) for tick, edits in first.edits},
+        answers={(answer.sender, answer.id): answer for answer in first.answers},
+        lags=first.lags,
+        recovered=first.recovered,
+        started_ns=first.started_ns,
+        committed_ns=first.committed_ns,
+        end=first.end,
+    )
+
+
+def _apply(history: History, record: RequestRecord | Control | CommitRecord | RecoveredRecord | Epoch | End) -> None:
+    """Take one more record into a history."""
+    if isinstance(record, CommitRecord):
+        _commit(history, record)
+    elif isinstance(record, Epoch):
+        owners = dict(record.owners)
+        before = dict(history.owners if history.epoch is None else history.epoch.owners)
+        history.account.moves += sum(before[robot] != owner for robot, owner in owners.items())
+        history.epoch, history.owners = record, owners
+    elif isinstance(record, RequestRecord):
+        history.answers[record.answer.sender, record.answer.id] = record.answer
+        history.control, history.owners = record.control, record.owners
+        if record.edits:
+            history.edits.setdefault(record.tick, []).extend(record.edits)
+    elif isinstance(record, RecoveredRecord):
+        history.recovered.append(record.entry)
+    elif isinstance(record, Control):
+        history.control = record
+    else:
+        history.end = record
+
+
+def _commit(history: History, record: CommitRecord) -> None:
+    commit = decode(Commit, record.commit)
+    layout = layout_after(history.frame.layout, commit.edits)
+    history.frame = frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+    if frame.digest != commit.digest:
+        raise Malformed(f"commit {commit.tick} of the supervisor's journal has another digest than its frame")
+    history.commits[commit.tick] = record.commit
+    history.commits.pop(commit.tick - limits.KEPT_TICKS, None)
+    history.edits.pop(commit.tick - 1, None)
+    if commit.tick == 0:
+        history.started_ns = history.committed_ns = record.now_ns
+        return
+    history.chain = chain_next(history.chain, frame.digest)
+    history.account.count(record.solved, record.ball_solver)
+    if record.lag_ns >= 0:
+        history.lags.add(record.lag_ns)
+    close_outages(history.recovered, history.committed_ns, record.now_ns)
+    history.committed_ns = record.now_ns

@@ -8,25 +8,16 @@ Neighbours: `watch` finds who is lost, `roster` knows who is here, `core` opens 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from foosim.protocol.actions import Journal
+from foosim.protocol.codec import encode
+from foosim.supervisor.account import Recovered, close_outages
+from foosim.supervisor.records import RecoveredRecord
 from foosim.supervisor.roster import Process
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
-
-
-@dataclass(slots=True)
-class Recovered:
-    """One loss or return. `outage_ns` is the wall time without a commit, -1 while there is none behind it."""
-
-    what: str
-    name: str
-    reason: str
-    tick: int
-    epoch: int
-    outage_ns: int = -1
 
 
 class Recovery:
@@ -35,7 +26,7 @@ class Recovery:
     def __init__(self, core: SupervisorCore) -> None:
         self.recovered: list[Recovered] = []
         self._core = core
-        self._returns: dict[str, str] = {}
+        self.returns: dict[str, str] = {}
         """Robots that were adopted: the node that they go back to."""
 
     def lose(self, name: str, reason: str, now_ns: int) -> None:
@@ -44,31 +35,43 @@ class Recovery:
         process = core.roster.by_name.get(name)
         if process is not None:
             core.roster.lose(process)
-        if core.epoch == 0:
-            core.say("warning", f"lost node {name}: {reason}; the run has not started, and waits for it")
+        if not core.is_open:
+            core.say("warning", f"lost node {name}: {reason}; the run waits for it")
             return
-        deployment = core.deployment
-        if deployment.nodes[name].required or deployment.on_node_loss == "stop":
+        if self._ends_run(name):
             core.finish(f"lost {name}: {reason}", failed=True)
             return
         if name not in core.members:
             return
         members = [member for member in core.members if member != name]
-        self._note("node", name, reason)
+        self.note("node", name, reason)
         if members:
-            self._open(self._adopted(name, members), members, now_ns)
+            self.open(self.adopted([name], members), members, now_ns)
             core.say("warning", f"lost node {name}: {reason}; goes on from tick {core.frame.tick} without it")
         else:
             core.hold()
             core.say("error", f"lost node {name}: {reason}; no node is left, the run waits for one")
 
+    def begin(self, here: Collection[str], missing: Collection[str], now_ns: int) -> None:
+        """A supervisor that was started again begins with the nodes that are here; the missing ones are lost."""
+        core = self._core
+        for name in missing:
+            reason = "it has not come back to the supervisor"
+            if self._ends_run(name):
+                core.finish(f"lost {name}: {reason}", failed=True)
+                return
+            self.note("node", name, reason)
+        if here:
+            self.open(self.adopted({*core.owners.values()} - {*here}, here), here, now_ns)
+        else:
+            core.hold()
+
     def stop(self, name: str, now_ns: int) -> None:
         """Somebody stops a node: its robots move away, then it is told."""
         core = self._core
-        core.roster.stopped.add(name)
         if name in core.members:
             members = [member for member in core.members if member != name]
-            self._open(self._adopted(name, members), members, now_ns)
+            self.open(self.adopted([name], members), members, now_ns)
         process = core.roster.by_name.get(name)
         if process is not None:
             core.roster.lose(process)
@@ -79,12 +82,12 @@ class Recovery:
         core, name = self._core, process.name
         owners = dict(core.owners)
         if not core.members:  # nobody else is here: what is theirs is adopted until they return
-            self._returns = {**owners, **self._returns}
+            self.returns = {**owners, **self.returns}
             owners = dict.fromkeys(owners, name)
-        owners.update((robot, name) for robot, node in self._returns.items() if node == name)
-        self._returns = {robot: node for robot, node in self._returns.items() if node != name}
-        self._note("join", name, "back" if self._was_lost(name) else "started")
-        self._open(owners, [*core.members, name], now_ns)
+        owners.update((robot, name) for robot, node in self.returns.items() if node == name)
+        self.returns = {robot: node for robot, node in self.returns.items() if node != name}
+        self.note("join", name, "back" if self._was_lost(name) else "started")
+        self.open(owners, [*core.members, name], now_ns)
         core.say("info", f"node {name} takes part from tick {core.frame.tick}")
 
     def hear(self, process: Process, now_ns: int) -> None:
@@ -93,21 +96,18 @@ class Recovery:
         Then it goes on in the next one, if it had built the world and its arithmetic was compared.
         """
         core = self._core
-        runs = core.epoch > 0 and core.end is None
+        runs = core.is_open and core.end is None
         if runs and not core.members and process.ready and process.name not in core.roster.stopped:
             process.lost = False
             self.join(process, now_ns)
 
     def moved(self, robot: str) -> None:
         """Somebody chose an owner for a robot: that one stays."""
-        self._returns.pop(robot, None)
+        self.returns.pop(robot, None)
 
     def committed(self, before_ns: int, now_ns: int) -> None:
         """A frame is committed, the one before it was at `before_ns`: the world goes on again."""
-        for entry in reversed(self.recovered):
-            if entry.outage_ns >= 0:
-                return
-            entry.outage_ns = max(0, now_ns - before_ns)
+        close_outages(self.recovered, before_ns, now_ns)
 
     def as_json(self) -> list[dict[str, object]]:
         """Return the account for people and scripts; the outage of what is not over is null."""
@@ -123,25 +123,36 @@ class Recovery:
             for entry in self.recovered
         ]
 
-    def _note(self, what: str, name: str, reason: str) -> None:
+    def _ends_run(self, name: str) -> bool:
+        """Whether the run cannot go on without a node."""
+        deployment = self._core.deployment
+        return deployment.nodes[name].required or deployment.on_node_loss == "stop"
+
+    def note(self, what: str, name: str, reason: str) -> None:
         core = self._core
-        self.recovered.append(Recovered(what, name, reason, core.frame.tick, core.epoch + 1))
+        entry = Recovered(what, name, reason, core.frame.tick, core.epoch + 1)
+        self.recovered.append(entry)
+        core.actions.append(Journal(encode(RecoveredRecord(entry))))
 
     def _was_lost(self, name: str) -> bool:
         return any(entry.what == "node" and entry.name == name for entry in self.recovered)
 
-    def _open(self, owners: dict[str, str], members: Collection[str], now_ns: int) -> None:
+    def open(self, owners: dict[str, str], members: Collection[str], now_ns: int) -> None:
         core = self._core
         core.account.moves += sum(core.owners[robot] != owner for robot, owner in owners.items())
+        core.actions.append(Journal(encode(core.control())))
         core.open_epoch(owners, now_ns, members)
         core.requests.layout_ready(now_ns)
 
-    def _adopted(self, lost: str, members: Collection[str]) -> dict[str, str]:
-        """Return the owners without a node: each of its robots goes to whoever then has the fewest, ties by name."""
+    def adopted(self, lost: Collection[str], members: Collection[str]) -> dict[str, str]:
+        """Return the owners without some nodes: each of their robots goes to whoever then has the fewest, ties by name.
+
+        It is noted that they go back to their nodes.
+        """
         owners = dict(self._core.owners)
         for robot in sorted(owners):
-            if owners[robot] == lost:
-                self._returns.setdefault(robot, lost)
+            if owners[robot] in lost:
+                self.returns.setdefault(robot, owners[robot])
                 owners[robot] = fewest(owners, members)
         return owners
 

@@ -90,7 +90,9 @@ class Requests:
                 raise Refused(f"no verb {show(request.verb)}; there are {', '.join(self._verbs)}")
             if self._core.end is not None and request.verb not in ("status", "down"):
                 raise Refused("the run has ended")
-            if self._core.epoch == 0 and request.verb not in ("status", "down"):
+            if not self._core.is_open and request.verb not in ("status", "down"):
+                if self._core.take_over is not None:
+                    return None  # whoever asks asks again
                 raise Refused("the run has not started yet")
             arguments = decode_json(request.arguments)
             if not isinstance(arguments, dict):
@@ -118,10 +120,19 @@ class Requests:
         for waiting in pending:
             self._say(self._refuse(waiting.request, "the run has ended"))
 
-    def _accept(self, request: Request, tick: int, text: str, edits: list[Edit] | None = None) -> Answer:
-        """Journal a request whose tick is chosen, with what it adds to that tick's order, and keep its answer."""
+    def _accept(
+        self,
+        request: Request,
+        tick: int,
+        text: str,
+        edits: list[Edit] | None = None,
+        owners: dict[str, str] | None = None,
+    ) -> Answer:
+        """Journal a request whose tick is chosen, with all that it does, and keep its answer."""
         answer = Answer(request.sender, request.id, True, tick, text, b"{}")
-        self._core.actions.append(Journal(encode(RequestRecord(tick, edits or [], answer))))
+        core = self._core
+        record = RequestRecord(tick, edits or [], answer, core.control(), owners or core.owners)
+        core.actions.append(Journal(encode(record)))
         if edits:
             self._edits.setdefault(tick, []).extend(edits)
         return self._keep(answer)
@@ -133,6 +144,10 @@ class Requests:
     def coming_edits(self) -> list[Edit]:
         """Return what requests add to ticks that are not released yet."""
         return [edit for tick in sorted(self._edits) for edit in self._edits[tick]]
+
+    def resume(self, edits: dict[int, list[Edit]], answers: dict[tuple[str, str], Answer]) -> None:
+        """Take what a journal says of requests."""
+        self._edits, self._answers = edits, answers
 
     def journalled(self) -> tuple[dict[int, list[Edit]], list[Answer]]:
         """Return what of the requests a further journal file has to say again: edits to come by tick, answers."""
@@ -250,10 +265,11 @@ class Requests:
         tick = core.frame.tick
         if core.owners[robot] == node:
             return self._accept(request, tick, f"{robot} is on {node} already, at tick {tick}")
-        answer = self._accept(request, tick, f"{robot} moved to {node} at tick {tick}")
-        core.account.moves += 1
+        owners = {**core.owners, robot: node}
         core.recovery.moved(robot)
-        core.open_epoch({**core.owners, robot: node}, now_ns)
+        answer = self._accept(request, tick, f"{robot} moved to {node} at tick {tick}", owners=owners)
+        core.account.moves += 1
+        core.open_epoch(owners, now_ns)
         return answer
 
     def _stop_node(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
@@ -266,6 +282,7 @@ class Requests:
             raise Refused(f"{node} is required by the deployment: the run cannot do without it")
         if core.members == (node,):
             raise Refused(f"{node} is the only node that is left")
+        core.roster.stopped.add(node)
         answer = self._accept(request, tick, f"{node} stopped at tick {tick}")
         core.recovery.stop(node, now_ns)
         return answer

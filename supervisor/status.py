@@ -112,6 +112,6 @@ def _processes(core: SupervisorCore, waiting_for: str) -> dict[str, Any]:
 def _state(core: SupervisorCore) -> str:
     if core.end is not None:
         return "failed" if core.end.failed else "ended"
-    if core.epoch == 0:
-        return "starting"
+    if not core.is_open:
+        return "starting" if core.take_over is None else "recovering"
     return "paused" if core.pacer.paused else "running"

@@ -119,7 +119,7 @@ class Watch:
 
     def waiting_for(self, core: SupervisorCore) -> list[str]:
         """Return who is being waited for: processes and lockstep clients, in name order."""
-        if core.epoch == 0:
+        if not core.is_open:
             missing = self.roster.missing(core.frame.layout.digest)
             clients = self._hub_waits_for() if missing == [VHUB] else []
             return clients or missing
@@ -139,6 +139,8 @@ class Watch:
         """Return who is lost, and why."""
         self.now_ns = now_ns
         deadlines = self.deployment.deadlines
+        if core.take_over is not None:
+            return {}
         if core.epoch == 0:
             return self._late_to_start(core, now_ns)
         silent = self.roster.silent(now_ns, deadlines.heartbeat_ns)

@@ -1,16 +1,19 @@
 """The commits that the vHub has: frames in order, and what came before its turn.
 
 A layout is what the commits before say, so they are read in order; one that comes early waits for those before it.
-Neighbours: `core` closes the ticks of these frames.
+What is committed last is what a supervisor that takes over may have lost. Neighbours: `core` closes the ticks of these
+frames.
 """
 
 from __future__ import annotations
 
 from foosim.protocol import limits
+from foosim.protocol.channels import VHUB
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
-from foosim.protocol.layout import Layout
-from foosim.protocol.messages import Commit
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
+from foosim.protocol.layout import Layout, added_entities
+from foosim.protocol.messages import Commit, Standing
 
 Committed = tuple[bytes, Commit, Frame]
 """A commit as it came, read, and its frame."""
@@ -22,6 +25,8 @@ class Commits:
     def __init__(self) -> None:
         self.layout: Layout | None = None
         self.next_tick = 0
+        self.chain = CHAIN_START
+        """Over the digests of the frames from 1 on."""
         self._frames: dict[int, Committed] = {}
         self._early: dict[int, tuple[bytes, Commit]] = {}
 
@@ -49,6 +54,13 @@ class Commits:
     def __contains__(self, tick: int) -> bool:
         return tick in self._frames
 
+    def standing(self, deployment: Deployment, epoch: int) -> Standing:
+        """Return how far the world has come here."""
+        assert self.layout is not None
+        last = self._frames.get(self.next_tick - 1)
+        added = added_entities(deployment, self.layout)
+        return Standing(VHUB, epoch, b"" if last is None else last[0], self.chain, added)
+
     def forget(self, tick: int) -> None:
         """Nobody asks for this tick any more."""
         self._frames.pop(tick, None)
@@ -61,5 +73,7 @@ class Commits:
             raise Malformed(f"commit {commit.tick} whose frame has another digest")
         self.layout = layout
         self.next_tick += 1
+        if commit.tick > 0:
+            self.chain = chain_next(self.chain, commit.digest)
         self._frames[commit.tick] = payload, commit, frame
         return commit.tick

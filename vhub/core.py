@@ -19,7 +19,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
+from foosim.protocol.layout import added_entities
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
     DONE_OF,
@@ -35,6 +35,7 @@ from foosim.protocol.messages import (
     Farewell,
     Heartbeat,
     Join,
+    Recall,
     Samples,
     Tempo,
     Up,
@@ -97,6 +98,7 @@ class HubCore:
             Samples: self._on_samples,
             Epoch: self._on_epoch,
             Want: self._on_want,
+            Recall: self._on_recall,
             Build: self._on_build,
             Tempo: self._on_tempo,
             End: self._on_end,
@@ -309,8 +311,7 @@ class HubCore:
         committed = self._commits.get(self.state.closed)
         layout = self._commits.layout if committed is None else committed[2].layout
         assert layout is not None
-        base = build_layout(self.state.deployment)
-        added = [(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
+        added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
         return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added))
 
     def _release(self, now_ns: int) -> None:
@@ -334,11 +335,24 @@ class HubCore:
             return
         deployment = self.deployment = self.member.deployment
         assert deployment is not None
+        if self.state is not None:
+            self.member.is_ready = False
+            self._ready_if_complete()
+            return
         self._commits.layout = self.member.layout
         self.state = HubState(deployment)
         self.releases = Releases(deployment.tick_ns)
+        self.member.standing = self._standing
         self.actions.append(Journal(self.head()))
         self._ready_if_complete()
+
+    def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
+        self._repeated += not self.member.recall(recall)
+
+    def _standing(self) -> Publish:
+        """Say how far the world has come here: a supervisor that was started again may have lost more."""
+        assert self.deployment is not None
+        return Publish(channels.STANDING, channels.VHUB, encode(self._commits.standing(self.deployment, self._epoch)))
 
     def _ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined."""
@@ -351,6 +365,7 @@ class HubCore:
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self._epoch or self.state is None:
             self._repeated += 1
+            self.member.repeated(epoch.epoch == self._epoch)
             return
         self.member.check_epoch(epoch)
         first = self._epoch == 0

@@ -62,7 +62,7 @@ class Air:
         self.hub = HubCore("boot", bytes(32), 0)
         self.deliveries: list[Deliveries] = []
         self._said: list[Publish] = []
-        self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot", "run-1", NAME, TEXT, "fast", [])))
+        self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot", "first", "run-1", NAME, TEXT, "fast", [])))
 
     def tell(self, channel: channels.Channel, name: str, payload: bytes) -> None:
         """Give the hub one message."""

@@ -26,7 +26,7 @@ ZERO = bytes(32)
 def core() -> NodeCore:
     """A node that was told what to build."""
     made = NodeCore("red", "b1", ZERO, 0)
-    build = Build("red", "b1", "run", "table.yaml", TEXT, "fast", [])
+    build = Build("red", "b1", "first", "run", "table.yaml", TEXT, "fast", [])
     made.receive(channels.BUILD, "red", encode(build), 0)
     return made
 

@@ -216,7 +216,7 @@ def test_a_twin_of_a_node_that_takes_part_is_refused_and_the_first_stays() -> No
 def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> None:
     processes: dict[str, NodeCore | HubCore] = {"red": node("red"), "vhub": HubCore("boot-red", PRINT, 0)}
     for name, process in processes.items():
-        right = Build(name, "boot-red", "run", "t", TEXT, "fast", [])
+        right = Build(name, "boot-red", "first", "run", "t", TEXT, "fast", [])
         wrong = [
             msgspec.structs.replace(right, deployment="world: ["),
             msgspec.structs.replace(right, deployment=TEXT.replace("seed: 1", "seed: -1")),

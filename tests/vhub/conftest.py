@@ -129,7 +129,7 @@ class Driver:
                     self._done(action.name, message.tick)
 
     def start(self) -> None:
-        build = Build("vhub", "boot", "run-1", NAME, self.run.text, "fast", [])
+        build = Build("vhub", "boot", "first", "run-1", NAME, self.run.text, "fast", [])
         self.say(channels.BUILD, "vhub", encode(build))
         for name, player in self.deployment.players.items():
             wanted = [Subscription(robot, heard) for robot, names in player.robots.items() for heard in names]

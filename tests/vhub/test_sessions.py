@@ -54,7 +54,7 @@ OWNERS: Final = [(robot, "n1") for robot in DEPLOYMENT.robots]
 MS: Final = 1_000_000
 PERIODS: Final = {"hand": 5, "knee": 10}
 HELLO: Final = ClientHello("ear", "boot-1", limits.PROTOCOL_VERSION, "", 0)
-BUILD: Final = Build("vhub", "boot", "run", "table.yaml", TEXT, "fast", [])
+BUILD: Final = Build("vhub", "boot", "first", "run", "table.yaml", TEXT, "fast", [])
 
 
 class Hub:

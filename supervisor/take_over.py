@@ -1,0 +1,95 @@
+"""A supervisor that was started again goes on with a run whose nodes and vHub live.
+
+It stands where its journal ends. Who takes part finds it by the address that it had before, is recalled, and says hello
+and ready once more. The vHub tells its last commit, which is the later one when the supervisor's machine was lost. Then
+a new epoch begins at the last commit, without the nodes that have not come in time, and the same ticks are computed
+again from the same inputs. Neighbours: `records` folds the journal, `handshake` hears who comes, `recovery` has the
+robots of those who do not, `core` opens the epoch.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from foosim.protocol import channels
+from foosim.protocol.actions import Publish
+from foosim.protocol.codec import decode
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import frame_from_bytes
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import Commit, Standing
+from foosim.supervisor.head import stand_on
+from foosim.supervisor.records import History
+
+if TYPE_CHECKING:
+    from foosim.supervisor.core import SupervisorCore
+
+REJOIN_NS: Final = 1_000_000_000
+"""How long, beside the deadline of heartbeats, nodes have to find the supervisor again."""
+
+
+class TakeOver:
+    """The time between the start of such a supervisor and its first epoch."""
+
+    def __init__(self, core: SupervisorCore, history: History, now_ns: int) -> None:
+        """Let `core` stand where the journal ends. Times of another clock are moved to that of `now_ns`."""
+        deadlines = core.deployment.deadlines
+        self._core = core
+        self._standing: Standing | None = None
+        self._nodes_ns = now_ns + deadlines.heartbeat_ns + REJOIN_NS
+        self._hub_ns = now_ns + deadlines.orphan_ns
+        self._roster = [] if history.epoch is None else list(history.epoch.roster)
+        self._owners = history.owners
+        """Who owns what by the last request, also if no epoch has begun with it."""
+        if history.run.clock != core.clock:
+            history.started_ns += now_ns - history.committed_ns
+            history.committed_ns = now_ns
+        stand_on(core, history)
+        core.say("warning", f"started again: the journal ends at tick {core.frame.tick}, epoch {core.epoch}")
+
+    def standing(self, standing: Standing) -> bool:
+        """The vHub tells how far it has come: go on from its last commit when the journal has lost that."""
+        core = self._core
+        if self._standing is not None:
+            return False
+        if standing.commit:
+            commit = decode(Commit, standing.commit)
+            if commit.tick > core.frame.tick:
+                layout = build_layout(core.deployment, [(entity.name, entity.model) for entity in standing.added])
+                frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+                if frame.digest != commit.digest:
+                    raise Malformed(f"commit {commit.tick} of the vHub has another digest than its frame")
+                core.say("warning", f"goes on from the vHub's commit {commit.tick}, the journal lost what led to it")
+                core.take_commit(frame, standing.chain, standing.commit)
+        core.epoch = max(core.epoch, standing.epoch)
+        self._standing = standing
+        return True
+
+    def wake(self, now_ns: int) -> None:
+        """Begin the epoch when everybody is here, or when those who are not have had their time."""
+        core = self._core
+        if core.end is not None:
+            return
+        if self._standing is None:
+            if now_ns > self._hub_ns:
+                core.finish(f"lost {channels.VHUB}: it has not come back to the supervisor", failed=True)
+            return
+        layout, known = core.frame.layout.digest, core.roster.by_name
+        expected = [name for name in self._roster if name not in core.roster.stopped]
+        here = [name for name in expected if name in known and layout in known[name].ready and not known[name].lost]
+        if len(here) == len(expected) or now_ns >= self._nodes_ns:
+            self._open(here, [name for name in expected if name not in here], now_ns)
+
+    def _open(self, here: list[str], missing: list[str], now_ns: int) -> None:
+        core = self._core
+        core.take_over = None
+        core.is_open = True
+        core.pacer.start(now_ns, core.frame.tick)
+        core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))
+        core.recovery.note(channels.SUPERVISOR, channels.SUPERVISOR, "started again")
+        core.account.moves += sum(core.owners[robot] != owner for robot, owner in self._owners.items())
+        core.owners = dict(self._owners)
+        core.members = tuple(here)
+        core.recovery.begin(here, missing, now_ns)
+        core.say_last_commit(now_ns)
+        core.say("info", f"goes on from tick {core.frame.tick} with {', '.join(here) or 'no node yet'}")
