@@ -18,16 +18,21 @@ from foosim.protocol.draws import draw_key, draw_words, unit_interval
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`."""
+    """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`.
+
+    With `repeat` it comes twice, with `late` once more after up to `LATE_NS`, when hardly anybody expects it.
+    """
 
     seed: int = 0
     delay_ns: int = 0
     spread_ns: int = 0
     loss: float = 0.0
     repeat: float = 0.0
+    late: float = 0.0
 
 
 CALM: Final = Weather()
+LATE_NS: Final = 2_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +59,10 @@ class Bus:
         self._key = draw_key(weather.seed, "bus")
         self._heap: list[Message] = []
         self._readers: dict[tuple[str, str], list[str]] = {}
-        self._cut: dict[str, int] = {}
+        self._mute: dict[str, int] = {}
+        self._deaf: dict[str, int] = {}
+        self._clogged: dict[str, int] = {}
+        """Until when nobody hears a process, it hears nobody, and what goes either way waits."""
 
     def subscribe(self, process: str, reads: Iterable[tuple[Channel, bool]]) -> None:
         """Let a process read channels: all that comes on them, or only what is addressed to it."""
@@ -63,20 +71,35 @@ class Bus:
             if process not in readers:
                 readers.append(process)
 
-    def cut_off(self, process: str, until_ns: int) -> None:
-        """Lose all that a process says and is told until a virtual time."""
-        self._cut[process] = max(until_ns, self._cut.get(process, 0))
+    def cut_off(self, process: str, until_ns: int, *, says: bool = True, hears: bool = True) -> None:
+        """Lose all that a process says, all that it is told, or both, until a virtual time."""
+        for ways, cut in ((self._mute, says), (self._deaf, hears)):
+            if cut:
+                ways[process] = max(until_ns, ways.get(process, 0))
 
-    def _is_cut(self, process: str, at_ns: int) -> bool:
-        return bool(self._cut) and at_ns < self._cut.get(process, 0)
+    def clog(self, process: str, until_ns: int) -> None:
+        """Keep all that a process says and is told until a virtual time; nothing is lost."""
+        self._clogged[process] = max(until_ns, self._clogged.get(process, 0))
+
+    def heal(self) -> None:
+        """From now on nothing is lost, late, cut or clogged."""
+        self.weather = CALM
+        for ways in (self._mute, self._deaf, self._clogged):
+            ways.clear()
 
     def put(self, sender: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
         """Send a message at `at_ns`; every reader but the sender gets it."""
+        if self._mute and at_ns < self._mute.get(sender, 0):
+            return
+        if self._clogged:
+            at_ns = max(at_ns, self._clogged.get(sender, 0))
         plane = channel.plane.name
         for key in ((channel.name, plane), (channel.name, plane + name)):
             for reader in self._readers.get(key, ()):
-                if reader != sender and not self._is_cut(sender, at_ns) and not self._is_cut(reader, at_ns):
-                    self._push(reader, channel, name, payload, at_ns)
+                if reader == sender or (self._deaf and at_ns < self._deaf.get(reader, 0)):
+                    continue
+                arrives_ns = max(at_ns, self._clogged.get(reader, 0)) if self._clogged else at_ns
+                self._push(reader, channel, name, payload, arrives_ns)
 
     def _push(self, reader: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
         self.sent += 1
@@ -87,6 +110,10 @@ class Bus:
                 return
             if unit_interval(words[3]) < weather.repeat:
                 late_ns = at_ns + weather.delay_ns + int(unit_interval(words[2]) * weather.spread_ns)
+                heapq.heappush(self._heap, (late_ns, self.sent, reader, channel, name, payload))
+                self.sent += 1
+            if unit_interval(words[4]) < weather.late:
+                late_ns = at_ns + int(unit_interval(words[5]) * LATE_NS)
                 heapq.heappush(self._heap, (late_ns, self.sent, reader, channel, name, payload))
                 self.sent += 1
             at_ns += weather.delay_ns + int(unit_interval(words[1]) * weather.spread_ns)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
 from typing import Any, Final
 
@@ -26,6 +26,7 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Epoch, Request
 from foosim.rehearsal.bus import CALM, Bus, Message, Observer, Traced, Weather
+from foosim.rehearsal.clock import Clock
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
@@ -59,6 +60,7 @@ class Process:
     """What came while it was busy, in order of arrival."""
     took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
     """Told how long its turns took, as a shell tells."""
+    clock: Clock = field(default_factory=Clock)
 
 
 @dataclass(slots=True)
@@ -69,6 +71,10 @@ class Settings:
     ticks: int = 0
     weather: Weather = CALM
     slow_ns: Mapping[str, int] = field(default_factory=dict)
+    clocks: Mapping[str, Clock] = field(default_factory=dict)
+    """By process; who has none here goes by virtual time."""
+    clients: Mapping[str, Callable[[ClientCore], Callable[[int], None]]] = field(default_factory=dict)
+    """Lockstep clients beside the players, by name: each gets its core and gives its turn."""
     factory: EngineFactory | None = None
     hub: type[HubCore] = HubCore
     supervisor: type[SupervisorCore] = SupervisorCore
@@ -106,14 +112,15 @@ class System:
         self._boots = 0
         self._soonest_ns = 0
         """No process is woken before, as far as is known without looking at each."""
+        self._clocks = {name: replace(clock) for name, clock in rehearsal.clocks.items()}
         self._behind: dict[str, Process] = {}
         """Processes with something in their inbox."""
         self._run = settings
         self._journal: list[bytes] = []
         """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
-        self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
-        self.hub = rehearsal.hub("boot", fingerprint, 0)
+        self.supervisor = rehearsal.supervisor(settings, fingerprint, self._clock(channels.SUPERVISOR).at(0))
+        self.hub = rehearsal.hub("boot", fingerprint, self._clock(channels.VHUB).at(0))
         deployment = self.supervisor.deployment
         self._enter_supervisor()
         self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
@@ -122,9 +129,12 @@ class System:
             self._enter_node(name, fingerprint)
         for name, player in sorted(deployment.players.items()):
             assert player.lockstep, "a rehearsal has lockstep players only"
-            core = ClientCore(name, "boot", 0)
+            core = ClientCore(name, "boot", self._clock(name).at(0))
             loop = self.players[name] = PlayerLoop(core, load_player)
             self._enter(name, core, loop.step, channels.CLIENT_READS)
+        for name, client in sorted(rehearsal.clients.items()):
+            core = ClientCore(name, "boot", self._clock(name).at(0))
+            self._enter(name, core, client(core), channels.CLIENT_READS)
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
         self._last_commit_ns = 0
 
@@ -133,7 +143,11 @@ class System:
     ) -> None:
         self.bus.subscribe(name, reads)
         process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
+        process.clock = self._clock(name)
         process.wake_ns = self._soonest_ns = self.bus.now_ns
+
+    def _clock(self, name: str) -> Clock:
+        return self._clocks.setdefault(name, Clock())
 
     def _enter_supervisor(self) -> None:
         core = self.supervisor
@@ -143,7 +157,7 @@ class System:
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
-        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.bus.now_ns)
+        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self._clock(name).at(self.bus.now_ns))
         solver = self.solvers[name] = Solver(core, self.settings.factory)
 
         def turn(now_ns: int) -> None:
@@ -217,12 +231,12 @@ class System:
     def _hand(self, process: Process, message: Message) -> None:
         """Let a process take one message and do what follows from it."""
         _, _, _, channel, name, payload = message
-        now_ns = self.bus.now_ns
         if self._traces_receive:
-            self._trace(now_ns, process, "receive", channel.name, payload)
+            self._trace(self.bus.now_ns, process, "receive", channel.name, payload)
+        now_ns = process.clock.at(self.bus.now_ns)
         process.core.receive(channel, name, payload, now_ns)
         process.turn(now_ns)
-        if process.slow_ns and self._core_deadline_ns(process) <= now_ns:  # no backlog keeps it from its heartbeat
+        if process.slow_ns and self._core_deadline_ns(process) <= self.bus.now_ns:  # no backlog keeps it from its heartbeat
             process.core.wake(now_ns)
             process.turn(now_ns)
         self._perform(process)
@@ -236,18 +250,19 @@ class System:
                 self._wake(process)
 
     def _wake(self, process: Process) -> None:
-        now_ns = self.bus.now_ns
+        now_ns = process.clock.at(self.bus.now_ns)
         process.core.wake(now_ns)
         process.turn(now_ns)
         self._perform(process)
         process.wake_ns = NEVER_NS
         self._plan_wake(process)
-        assert process.wake_ns > now_ns, f"{process.name} has a deadline that waking did not move"
+        assert process.wake_ns > self.bus.now_ns, f"{process.name} has a deadline that waking did not move"
 
     def _core_deadline_ns(self, process: Process) -> int:
-        core = process.core
-        deadline: int = core.deadline_ns(self.bus.now_ns) if core is self.supervisor else core.deadline_ns()
-        return deadline
+        """Return when a core has something to do next, in virtual time."""
+        core, clock = process.core, process.clock
+        now_ns = clock.at(self.bus.now_ns)
+        return clock.when(core.deadline_ns(now_ns) if core is self.supervisor else core.deadline_ns())
 
     def _plan_wake(self, process: Process) -> None:
         """After a turn: see when the process has something to do by time, as its loop does.
@@ -269,7 +284,7 @@ class System:
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
             process.busy_until_ns = leaves_ns
-            process.took(self.bus.now_ns, leaves_ns)
+            process.took(process.clock.at(self.bus.now_ns), process.clock.at(leaves_ns))
         for action in actions:
             if type(action) is Publish:
                 self._trace(leaves_ns, process, "publish", action.channel.name, action.payload)
@@ -347,8 +362,9 @@ class System:
         supervisor = self.processes.get(channels.SUPERVISOR)
         if supervisor is None:
             return
-        self.supervisor.process_gone(name, self.bus.now_ns)
-        supervisor.turn(self.bus.now_ns)
+        now_ns = supervisor.clock.at(self.bus.now_ns)
+        self.supervisor.process_gone(name, now_ns)
+        supervisor.turn(now_ns)
         self._perform(supervisor)
         self._plan_wake(supervisor)
 
@@ -359,8 +375,9 @@ class System:
             self._boots += 1
             history = fold(self.supervisor.deployment, self._journal)
             boot = f"boot-{self._boots}"
+            now_ns = self._clock(name).at(self.bus.now_ns)
             self.supervisor = self.settings.supervisor(
-                self._run, library_fingerprint(), self.bus.now_ns, boot, history=history
+                self._run, library_fingerprint(), now_ns, boot, history=history
             )
             self._enter_supervisor()
         else:
@@ -382,13 +399,32 @@ class System:
         process.busy_until_ns = max(process.busy_until_ns, self.bus.now_ns + for_ns)
         process.wake_ns = max(process.wake_ns, process.busy_until_ns)
 
-    def request(self, verb: str, **arguments: Any) -> str:
-        """Ask the supervisor for something; return the request's id."""
+    def resume(self, name: str) -> None:
+        """Let a process go on that was stopped."""
+        process = self.processes[name]
+        process.busy_until_ns = process.wake_ns = self._soonest_ns = self.bus.now_ns
+
+    def set_forward(self, name: str, by_ns: int) -> None:
+        """Let a process's clock jump, as when its machine slept."""
+        self._clock(name).offset_ns += by_ns
+        process = self.processes.get(name)
+        if process is not None:
+            self._plan_wake(process)
+
+    def request(self, verb: str, *, again_ns: int = 0, **arguments: Any) -> str:
+        """Ask the supervisor for something, every `again_ns` until it answers (0: once); return the request's id."""
         self._requests += 1
         identity = f"request-{self._requests}"
-        request = Request(OPERATOR, identity, verb, encode_json(arguments))
-        self.bus.put(OPERATOR, channels.REQUEST, OPERATOR, encode(request), self.bus.now_ns)
+        payload = encode(Request(OPERATOR, identity, verb, encode_json(arguments)))
+        self._ask(identity, payload, again_ns)
         return identity
+
+    def _ask(self, identity: str, payload: bytes, again_ns: int) -> None:
+        if identity in self.answers:
+            return
+        self.bus.put(OPERATOR, channels.REQUEST, OPERATOR, payload, self.bus.now_ns)
+        if again_ns:
+            self.later(again_ns, lambda: self._ask(identity, payload, again_ns))
 
     def _answered(self, payload: bytes) -> None:
         answer = decode(Answer, payload)
