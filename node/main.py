@@ -22,6 +22,7 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
+from foosim.protocol.orphan import Orphan
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
 
@@ -29,11 +30,12 @@ CONNECT_S = 60.0
 
 
 class NodeProcess:
-    """One node on one session, until the run ends, the supervisor is gone, or `stop`."""
+    """One node on one session, until the run ends, the supervisor is gone for too long, or `stop`."""
 
     def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
         self.stopped = False
+        self._orphan = Orphan()
         self._solver = Solver(self.core)
         self._wire = Wire(session, Plane.SIMULATION, inbox, name)
         self._inbox = inbox
@@ -70,6 +72,9 @@ class NodeProcess:
         if core.member.build is not None and not self._is_present:
             self._is_present = True
             self._wire.declare_alive()
+        if self._orphan.is_over(core.deployment, now_ns) and not self._is_over():
+            core.actions.append(Say("error", "lost the supervisor, and it has not come back"))
+            self.stop()
         core.advance(now_ns)
         while core.work is not None:
             self._loop.perform()
@@ -84,9 +89,11 @@ class NodeProcess:
         return now_ns if self._solver.is_building else self.core.deadline_ns()
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
-        if not is_alive and name == SUPERVISOR and self.core.ended is None:
-            self.core.actions.append(Say("error", "lost the supervisor"))
-            self.stop()
+        if name != SUPERVISOR or self.core.ended is not None:
+            return
+        if not is_alive:
+            self.core.actions.append(Say("warning", "lost the supervisor: holds until it is back"))
+        self._orphan.hear(is_alive, time.monotonic_ns())
 
 
 def run_node(name: str, connect: str, world: str = "") -> int:
@@ -115,7 +122,8 @@ def node(
     """Take part in a run as a node.
 
     One address is enough: deployment and models come from the supervisor. The process ends with the run; it exits with
-    0 when the run ended, with 1 when it lost the supervisor, and with 3 when the supervisor would not have it.
+    0 when the run ended, with 1 when the supervisor was lost for longer than the deployment's `deadlines.orphan`, and
+    with 3 when the supervisor would not have it.
     """
     die_with_parent()
     raise typer.Exit(run_node(name, connect, world))

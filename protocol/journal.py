@@ -124,6 +124,17 @@ def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
         yield from read_records(path)
 
 
+def read_newest(folder: Path, stem: str) -> Iterator[bytes]:
+    """Yield the records of a journal's newest file that has any: its head stands for the files before it."""
+    for path in reversed(journal_files(folder, stem)):
+        records = read_records(path)
+        first = next(records, None)
+        if first is not None:
+            yield first
+            yield from records
+            return
+
+
 def _checksum(payload: bytes) -> int:
     """CRC of length and payload: a run of zeros, as some file systems leave after a crash, is no record."""
     return crc32(payload, crc32(_LENGTH.pack(len(payload))))

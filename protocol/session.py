@@ -166,7 +166,7 @@ class Session:
                 "connect/endpoints": [str(address)],
                 "connect/timeout_ms": max(1, int(1000 * min(left_s, ATTEMPT_S))),
                 "connect/exit_on_failure": True,
-                "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2.0},
+                "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 2.0},
                 "adminspace/enabled": False,
             }
             try:

@@ -203,6 +203,26 @@ def _push(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "push", "push the ball", partial(System.request, verb="push", impulse=impulse))
 
 
+def _supervisor(dice: Dice, names: Sequence[str]) -> Fault:
+    amid, down_ms = dice.between(0, 3), dice.one_of((0, 1, 30, 600))
+
+    def do(system: System) -> None:
+        if channels.SUPERVISOR not in system.processes or system.is_dying(channels.SUPERVISOR):
+            return
+        system.end_amid(channels.SUPERVISOR, amid)
+        system.later(down_ms * MS, partial(_revive_supervisor, system, down_ms))
+
+    return Fault(_tick(dice), "supervisor", f"end the supervisor, {amid} actions into a turn, for {down_ms} ms", do)
+
+
+def _revive_supervisor(system: System, down_ms: int) -> None:
+    """Start the supervisor when it has ended; it has not while it had nothing to do since."""
+    if channels.SUPERVISOR in system.processes:
+        system.later((down_ms + 1) * MS, partial(_revive_supervisor, system, down_ms))
+    else:
+        system.start(channels.SUPERVISOR)
+
+
 FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "kill": _kill,
     "pause": _pause,
@@ -212,6 +232,7 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "stop": _stop,
     "slow": _slow,
     "push": _push,
+    "supervisor": _supervisor,
 }
 KINDS: Final = list(FAULT_OF)
 
@@ -327,6 +348,7 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None) -> Fl
         settings or Settings(),
         weather=plan.weather,
         restart_ns=RESTART_NS,
+        keeps_journals=True,
         observer=laws.see,
         observes=("journal", "publish"),
         on_closing=laws.close,

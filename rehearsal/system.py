@@ -109,6 +109,8 @@ class System:
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
         self._timers: list[tuple[int, int, Callable[[], object]]] = []
+        self._dying: dict[str, int] = {}
+        """Processes that end amid their next actions: how many of these they still perform."""
         self._boots = 0
         self._soonest_ns = 0
         """No process is woken before, as far as is known without looking at each."""
@@ -280,6 +282,10 @@ class System:
         actions = process.core.actions
         if not actions:
             return
+        left = self._dying.pop(process.name, None)
+        if left is not None:
+            del actions[left:]
+            self._leave(process.name)
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
@@ -351,10 +357,7 @@ class System:
         self._next.append(action)
 
     def kill(self, name: str) -> None:
-        """End a node or the supervisor at once: what is on its way to it is lost, the supervisor sees that a node goes.
-
-        What a supervisor has not written by then it has not said either.
-        """
+        """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
         self._leave(name)
         if name == channels.SUPERVISOR:
             return
@@ -367,6 +370,14 @@ class System:
         supervisor.turn(now_ns)
         self._perform(supervisor)
         self._plan_wake(supervisor)
+
+    def end_amid(self, name: str, actions: int) -> None:
+        """End the supervisor amid its next turn, when it has performed so many of its actions."""
+        self._dying[name] = actions
+
+    def is_dying(self, name: str) -> bool:
+        """Whether a process ends amid its next turn."""
+        return name in self._dying
 
     def start(self, name: str) -> None:
         """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""

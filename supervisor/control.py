@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -27,7 +27,7 @@ from foosim.supervisor.run_folder import find_run
 
 ANSWER_S: Final = 30.0
 """How long an answer is waited for: adding waits until every node has built an engine."""
-AGAIN_S: Final = 0.3
+AGAIN_S: Final = 0.1
 CONNECT_S: Final = 5.0
 WAITING_MAX: Final = 256
 
@@ -61,13 +61,18 @@ class Control:
     def close(self) -> None:
         self._session.close()
 
-    def ask(self, verb: str, timeout_s: float = ANSWER_S, **arguments: Any) -> Answer:
-        """Ask for something and return the answer. Raises RequestRefused or NoAnswer."""
+    def ask(
+        self, verb: str, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False, **arguments: Any
+    ) -> Answer:
+        """Ask for something and return the answer. Raises RequestRefused, or NoAnswer at the timeout or at `give_up`.
+
+        A supervisor that is started again meanwhile gets the same request, and gives the same answer.
+        """
         self._requests += 1
         identity = f"{self._name[9:]}-{self._requests}"
         payload = encode(Request(self._name, identity, verb, encode_json(arguments)))
         deadline_s = time.monotonic() + timeout_s
-        while (left_s := deadline_s - time.monotonic()) > 0:
+        while (left_s := deadline_s - time.monotonic()) > 0 and not give_up():
             self._wire.put(channels.REQUEST, self._name, payload)
             answer = self._wait(identity, min(left_s, AGAIN_S))
             if answer is None:
@@ -77,9 +82,9 @@ class Control:
             return answer
         raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s")
 
-    def status(self, timeout_s: float = ANSWER_S) -> dict[str, Any]:
+    def status(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
         """Return the state of the run. Raises NoAnswer."""
-        content = decode_json(self.ask("status", timeout_s).result)
+        content = decode_json(self.ask("status", timeout_s, give_up).result)
         assert isinstance(content, dict), content
         return content
 

@@ -61,7 +61,12 @@ def ball_text(status: dict[str, Any]) -> str:
 def recovery_text(entry: dict[str, Any]) -> str:
     """`tick 812: lost node blue (its connection closed), went on after 3.1 ms, epoch 2`; or who came (back)."""
     name = entry["name"]
-    what = f"lost node {name} ({entry['reason']})" if entry["what"] == "node" else f"node {name} takes part"
+    texts = {
+        "node": f"lost node {name} ({entry['reason']})",
+        "join": f"node {name} takes part",
+        "supervisor": "the supervisor was started again",
+    }
+    what = texts[entry["what"]]
     after = "" if entry["outage_ms"] is None else f", went on after {entry['outage_ms']:.1f} ms"
     return f"tick {entry['tick']}: {what}{after}, epoch {entry['epoch']}"
 

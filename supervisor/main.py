@@ -1,7 +1,8 @@
 """The process `foosim-supervisor run`: the supervisor's core as the router of the simulation plane.
 
 It holds the run's folder: the run file says where the run listens, the journal has what was decided, and at the end
-`result.json` has how it ended. Neighbours: `core` decides, `up` starts it with everything else, `run_folder`.
+`result.json` has how it ended. Started again in the folder of a run that has not ended, it listens where it listened
+and goes on from the journal. Neighbours: `core` decides, `up` starts it with everything else, `run_folder`.
 """
 
 from __future__ import annotations
@@ -15,24 +16,29 @@ from foosim.protocol import channels, limits, wall
 from foosim.protocol.actions import Say
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.command import DONE, FAILED
+from foosim.protocol.errors import Refused
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, remove_journal
+from foosim.protocol.journal import Journal, journal_files, read_newest, remove_journal
 from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.process import Stop, die_with_parent, start_log
+from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import Plan, RunSettings
-from foosim.supervisor.run_folder import RunFolder, RunInfo
+from foosim.supervisor.records import History, fold
+from foosim.supervisor.run_folder import RESULT_FILE, RunFolder, RunInfo
 from foosim.supervisor.status import result
 
 
 class SupervisorProcess:
     """The supervisor on its session, until the run has ended."""
 
-    def __init__(self, plan: Plan, folder: RunFolder, session: Session, inbox: Inbox, journal: Journal) -> None:
+    def __init__(
+        self, plan: Plan, folder: RunFolder, session: Session, inbox: Inbox, journal: Journal, history: History | None
+    ) -> None:
         settings = RunSettings(folder.name, str(plan.options.file), plan.text, plan.pace, plan.ticks)
-        self.core = SupervisorCore(settings, library_fingerprint(), time.monotonic_ns())
+        start = time.monotonic_ns(), new_boot(), clock_name()
+        self.core = SupervisorCore(settings, library_fingerprint(), *start, history)
         self._folder = folder
         self._inbox = inbox
         self._is_told_to_end = False
@@ -44,6 +50,9 @@ class SupervisorProcess:
             wall.now_text(),
             session.locator,
         )
+        known = folder.info()
+        if history is not None and known is not None:
+            self._info = msgspec.structs.replace(self._info, started=known.started, radio=known.radio)
         wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
         self._loop = Loop(self.core, inbox, start_log(SUPERVISOR), self.core.deadline_ns)
         self._loop.connect(wire)
@@ -111,10 +120,26 @@ def serve(plan: Plan, folder: RunFolder) -> int:
     folder.hold()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    with Journal(folder.journals, SUPERVISOR) as journal, Session.router(str(plan.address)) as session:
-        supervisor = SupervisorProcess(plan, folder, session, inbox, journal)
+    history = _history(plan, folder)
+    known = folder.info()
+    address = str(plan.address) if history is None or known is None else known.simulation
+    with Journal(folder.journals, SUPERVISOR) as journal, Session.router(address) as session:
+        supervisor = SupervisorProcess(plan, folder, session, inbox, journal, history)
         stop.then(supervisor.stop)
         code = supervisor.run()
     if code == DONE:
         remove_journal(folder.journals, SUPERVISOR)
     return code
+
+
+def _history(plan: Plan, folder: RunFolder) -> History | None:
+    """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
+    files = journal_files(folder.journals, SUPERVISOR)
+    if not files:
+        return None
+    if folder.result() is not None:
+        raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
+    history = fold(plan.deployment, read_newest(folder.journals, SUPERVISOR))
+    if history.run.deployment != plan.text:
+        raise Refused(f"run {folder.name} was started with another deployment than {plan.options.file} is now")
+    return history

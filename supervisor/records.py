@@ -19,7 +19,7 @@ from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
-from foosim.protocol.layout import BALL, build_layout
+from foosim.protocol.layout import BALL, Layout, build_layout
 from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, End, Epoch
 from foosim.protocol.start import initial_frame
 from foosim.supervisor.account import Account, Recovered, close_outages
@@ -114,6 +114,9 @@ class History:
 
     run: RunRecord
     frame: Frame
+    """The last committed one; that of the start while none is."""
+    layout: Layout
+    """Of that frame."""
     owners: dict[str, str]
     control: Control
     account: Account
@@ -155,6 +158,11 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
             _apply(history, record)
     if history is None:
         raise Malformed("a journal of the supervisor without a record")
+    if history.commits:
+        commit = decode(Commit, history.commits[max(history.commits)])
+        history.frame = frame_from_bytes(commit.tick, history.layout, commit.values, commit.outboxes)
+        if history.frame.digest != commit.digest:
+            raise Malformed(f"commit {commit.tick} of the supervisor's journal has another digest than its frame")
     return history
 
 
@@ -163,21 +171,17 @@ def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
     if isinstance(first, RunRecord):
         control = Control(first.pace, False, 0, first.ticks, [], {})
         account = Account(dict.fromkeys(sorted(deployment.nodes), 0))
-        return History(first, initial_frame(deployment), deployment.owners(), control, account)
-    frame = initial_frame(deployment)
-    commits = {commit.tick: raw for raw in first.commits for commit in (decode(Commit, raw),)}
-    if commits:
-        commit = decode(Commit, commits[max(commits)])
-        layout = build_layout(deployment, [(entity.name, entity.model) for entity in first.added])
-        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        frame, layout = initial_frame(deployment), build_layout(deployment)
+        return History(first, frame, layout, deployment.owners(), control, account)
     return History(
         first.run,
-        frame,
+        initial_frame(deployment),
+        build_layout(deployment, [(entity.name, entity.model) for entity in first.added]),
         first.owners,
         first.control,
         first.account,
         epoch=decode(Epoch, first.epoch) if first.epoch else None,
-        commits=commits,
+        commits={decode(Commit, raw).tick: raw for raw in first.commits},
         chain=first.chain,
         edits={tick: list(edits) for tick, edits in first.edits},
         answers={(answer.sender, answer.id): answer for answer in first.answers},
@@ -213,17 +217,14 @@ def _apply(history: History, record: RequestRecord | Control | CommitRecord | Re
 
 def _commit(history: History, record: CommitRecord) -> None:
     commit = decode(Commit, record.commit)
-    layout = layout_after(history.frame.layout, commit.edits)
-    history.frame = frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
-    if frame.digest != commit.digest:
-        raise Malformed(f"commit {commit.tick} of the supervisor's journal has another digest than its frame")
+    history.layout = layout_after(history.layout, commit.edits)
     history.commits[commit.tick] = record.commit
     history.commits.pop(commit.tick - limits.KEPT_TICKS, None)
     history.edits.pop(commit.tick - 1, None)
     if commit.tick == 0:
         history.started_ns = history.committed_ns = record.now_ns
         return
-    history.chain = chain_next(history.chain, frame.digest)
+    history.chain = chain_next(history.chain, commit.digest)
     history.account.count(record.solved, record.ball_solver)
     if record.lag_ns >= 0:
         history.lags.add(record.lag_ns)

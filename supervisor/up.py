@@ -37,6 +37,8 @@ LEAVE_S: Final = 1.0
 """How long the others may take to end when the supervisor has: it waited for the vHub's capture."""
 STALLED_S: Final = 1.0
 """How long a node that is lost may take to come back by itself before its process is killed."""
+STALLED_TRIES: Final = 5
+"""How many questions a supervisor may leave unanswered for a second each before its process is killed."""
 LOST_S: Final = 3.0
 """How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
 STATUS_S: Final = 1.0
@@ -104,6 +106,8 @@ class Up:
         """Nodes that the run goes on without though their processes live: which process, since when."""
         self._stopped: set[str] = set()
         """Nodes that somebody stopped."""
+        self._unanswered = 0
+        """Questions to the supervisor since its last answer."""
         self._told = 0
         """How many of the run's recoveries were shown."""
 
@@ -182,10 +186,13 @@ class Up:
                 time.sleep(WATCH_S)
 
     def _show(self, control: Control) -> None:
+        supervisor = self._launcher.children[SUPERVISOR]
         try:
-            status = control.status(STATUS_S)
+            status = control.status(STATUS_S, lambda: supervisor.exit_code is not None)
         except NoAnswer:
+            self._end_stalled_supervisor(supervisor)
             return
+        self._unanswered = 0
         now_s = time.monotonic()
         self._tell_recoveries(status["recoveries"])
         if not self._has_ended:
@@ -222,6 +229,26 @@ class Up:
                 self.display.say(f"{child.name} does not answer any more: it is killed")
                 child.process.kill()
 
+    def _end_stalled_supervisor(self, supervisor: Child) -> None:
+        """Kill a supervisor that hangs: a new one goes on with the run."""
+        if supervisor.exit_code is not None or self._has_ended or self._ending_s:
+            return
+        self._unanswered += 1
+        if self._unanswered >= STALLED_TRIES:
+            self._unanswered = 0
+            self.display.say("the supervisor does not answer any more: it is killed")
+            supervisor.process.kill()
+
+    def _comes_back(self, supervisor: Child, now_s: float) -> bool:
+        """Start a supervisor again that ended before the run did; False when the run is over, or it is given up."""
+        over = self._ending_s or self._has_ended or self.folder.info() is None or self.folder.result() is not None
+        if over or supervisor.exit_code in (DONE, REFUSED):
+            return False
+        if not self._restarts.is_known(SUPERVISOR):
+            self._restart_later(supervisor, now_s)
+        self._start_due(now_s)
+        return SUPERVISOR not in self._restarts.failed
+
     def _restart_nodes(self, now_s: float, knows: bool = False) -> None:
         """Start nodes again that ended while the run goes on; one that ends again and again is given up.
 
@@ -234,9 +261,15 @@ class Up:
                 continue
             if child.exit_code == REFUSED and not knows:
                 continue  # it may have been stopped since the last status
-            wait_s = self._restarts.ended(name, now_s)
-            after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s"
-            self.display.say(f"{name} {child.ending}, {after}; its log is {child.log}")
+            self._restart_later(child, now_s)
+        self._start_due(now_s)
+
+    def _restart_later(self, child: Child, now_s: float) -> None:
+        wait_s = self._restarts.ended(child.name, now_s)
+        after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s"
+        self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
+
+    def _start_due(self, now_s: float) -> None:
         for name in self._restarts.due(now_s):
             child = self._launcher.children[name]
             self._launcher.start(name, child.command, child.log)
@@ -249,6 +282,8 @@ class Up:
         supervisor = self._launcher.children[SUPERVISOR]
         now_s = time.monotonic()
         if supervisor.exit_code is not None:
+            if self._comes_back(supervisor, now_s):
+                return True
             if supervisor.exit_code == FAILED:  # it may have noticed a loss, and ended, since we looked last
                 self._look_for_lost(now_s)
             return False

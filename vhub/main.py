@@ -27,6 +27,7 @@ from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
+from foosim.protocol.orphan import Orphan
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.vhub.capture_writer import CaptureWriter
@@ -47,7 +48,7 @@ class HubOptions:
 
 
 class HubProcess:
-    """The vHub on its two sessions, until the run ends, the supervisor is gone, or `stop`."""
+    """The vHub on its two sessions, until the run ends, the supervisor is gone for too long, or `stop`."""
 
     def __init__(self, simulation: Session, radio: Session, inbox: Inbox, options: HubOptions) -> None:
         self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns())
@@ -59,6 +60,7 @@ class HubProcess:
         self._capture: CaptureWriter | None = None
         self._forget_ns = 0
         self._is_abandoned = False
+        self._orphan = Orphan()
         self._why_abandoned = "the vHub was told to end"
         self._log: logging.Logger = start_log(VHUB)
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
@@ -109,6 +111,10 @@ class HubProcess:
         core.busy = self._loop.busy
         if core.member.build is not None and self._journal is None:
             self._begin(core.member.build)
+        if self._orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._is_abandoned:
+            self._why_abandoned = "lost the supervisor, and it has not come back"
+            core.actions.append(Say("error", self._why_abandoned))
+            self._is_abandoned = True
         if self._is_abandoned and core.ended is None and core.state is not None:
             end = End(core.state.closed + 1, self._why_abandoned, True)
             core.receive(channels.END, SUPERVISOR, encode(end), now_ns)
@@ -159,13 +165,14 @@ class HubProcess:
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         if is_alive:
+            if name == SUPERVISOR:
+                self._orphan.hear(True, time.monotonic_ns())
             return
         if plane is Plane.RADIO:
             self.core.client_gone(name, time.monotonic_ns())
         elif name == SUPERVISOR and self.core.ended is None:
-            self._why_abandoned = "lost the supervisor"
-            self.core.actions.append(Say("error", self._why_abandoned))
-            self.stop()
+            self.core.actions.append(Say("warning", "lost the supervisor: holds until it is back"))
+            self._orphan.hear(False, time.monotonic_ns())
 
     def _close(self) -> None:
         """Finish the capture; only then is the journal done with."""
@@ -208,8 +215,8 @@ def vhub(
 ) -> None:
     """Take part in a run as its virtual hub.
 
-    It exits with 0 when the run ended and the capture is finished, with 1 when it lost the supervisor, and with 3 when
-    the supervisor would not have it.
+    It exits with 0 when the run ended and the capture is finished, with 1 when the supervisor was lost for longer than
+    the deployment's `deadlines.orphan`, and with 3 when the supervisor would not have it.
     """
     die_with_parent()
     if no_capture and capture is not None:
