@@ -20,7 +20,7 @@ from foosim.protocol.draws import draw_key, draw_words, unit_interval
 class Weather:
     """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`.
 
-    With `repeat` it comes twice, with `late` once more after up to `LATE_NS`, when hardly anybody expects it.
+    With `repeat` it comes twice.
     """
 
     seed: int = 0
@@ -28,7 +28,6 @@ class Weather:
     spread_ns: int = 0
     loss: float = 0.0
     repeat: float = 0.0
-    late: float = 0.0
 
 
 CALM: Final = Weather()
@@ -44,6 +43,8 @@ class Traced:
     what: str
     channel: str
     payload: bytes
+    name: str = ""
+    """Whom the channel's key names."""
 
 
 Message = tuple[int, int, str, Channel, str, bytes]
@@ -61,6 +62,7 @@ class Bus:
         self._readers: dict[tuple[str, str], list[str]] = {}
         self._mute: dict[str, int] = {}
         self._deaf: dict[str, int] = {}
+        self._repeat_until_ns = 0
         self._clogged: dict[str, int] = {}
         """Until when nobody hears a process, it hears nobody, and what goes either way waits."""
 
@@ -81,9 +83,14 @@ class Bus:
         """Keep all that a process says and is told until a virtual time; nothing is lost."""
         self._clogged[process] = max(until_ns, self._clogged.get(process, 0))
 
+    def repeat_until(self, until_ns: int) -> None:
+        """Bring all that is said until a virtual time once more, after up to `LATE_NS`."""
+        self._repeat_until_ns = until_ns
+
     def heal(self) -> None:
         """From now on nothing is lost, late, cut or clogged."""
         self.weather = CALM
+        self._repeat_until_ns = 0
         for ways in (self._mute, self._deaf, self._clogged):
             ways.clear()
 
@@ -103,6 +110,10 @@ class Bus:
 
     def _push(self, reader: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
         self.sent += 1
+        if at_ns < self._repeat_until_ns:
+            late_ns = at_ns + int(unit_interval(draw_words(self._key, self.sent)[4]) * LATE_NS)
+            heapq.heappush(self._heap, (late_ns, self.sent, reader, channel, name, payload))
+            self.sent += 1
         weather = self.weather
         if weather is not CALM:
             words = draw_words(self._key, self.sent)
@@ -110,10 +121,6 @@ class Bus:
                 return
             if unit_interval(words[3]) < weather.repeat:
                 late_ns = at_ns + weather.delay_ns + int(unit_interval(words[2]) * weather.spread_ns)
-                heapq.heappush(self._heap, (late_ns, self.sent, reader, channel, name, payload))
-                self.sent += 1
-            if unit_interval(words[4]) < weather.late:
-                late_ns = at_ns + int(unit_interval(words[5]) * LATE_NS)
                 heapq.heappush(self._heap, (late_ns, self.sent, reader, channel, name, payload))
                 self.sent += 1
             at_ns += weather.delay_ns + int(unit_interval(words[1]) * weather.spread_ns)

@@ -18,7 +18,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame, layout_after
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import AddedEntity, Build, Delivered, Deliveries, Edit, Epoch, Order, Prepare
+from foosim.protocol.messages import AddedEntity, Build, Delivered, Deliveries, Edit, Epoch, Order, Prepare, RobotPacket
 from foosim.protocol.start import initial_frame
 from foosim.rehearsal.bus import Bus
 
@@ -68,6 +68,12 @@ class Replica:
         assert core.frame is not None and core.frame.tick == tick + 1, "every node has its inputs"
         self.frame = core.frame
         return self.frame
+
+    def sense(self) -> list[RobotPacket]:
+        """Return what all robots send at the frame, in (robot, index) order."""
+        core, _ = next(iter(self._nodes.values()))
+        packets, _ = core.stepper(self.frame.layout).sense(self.frame, self.frame.layout.robots)
+        return packets
 
     def rebuild_engines(self) -> None:
         """Replace all engines by new ones."""

@@ -104,6 +104,8 @@ class System:
         self.solvers: dict[str, Solver] = {}
         self.players: dict[str, PlayerLoop] = {}
         self.answers: dict[str, Answer] = {}
+        self.asked: list[str] = []
+        """Ids of what was requested."""
         self._traces_receive = rehearsal.observer is not None and "receive" in rehearsal.observes
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
@@ -234,11 +236,13 @@ class System:
         """Let a process take one message and do what follows from it."""
         _, _, _, channel, name, payload = message
         if self._traces_receive:
-            self._trace(self.bus.now_ns, process, "receive", channel.name, payload)
+            self._trace(self.bus.now_ns, process, "receive", channel.name, payload, name)
         now_ns = process.clock.at(self.bus.now_ns)
         process.core.receive(channel, name, payload, now_ns)
         process.turn(now_ns)
-        if process.slow_ns and self._core_deadline_ns(process) <= self.bus.now_ns:  # no backlog keeps it from its heartbeat
+        if (
+            process.slow_ns and self._core_deadline_ns(process) <= self.bus.now_ns
+        ):  # no backlog keeps it from its heartbeat
             process.core.wake(now_ns)
             process.turn(now_ns)
         self._perform(process)
@@ -293,7 +297,7 @@ class System:
             process.took(process.clock.at(self.bus.now_ns), process.clock.at(leaves_ns))
         for action in actions:
             if type(action) is Publish:
-                self._trace(leaves_ns, process, "publish", action.channel.name, action.payload)
+                self._trace(leaves_ns, process, "publish", action.channel.name, action.payload, action.name)
                 self.bus.put(process.name, action.channel, action.name, action.payload, leaves_ns)
             else:
                 self._keep(leaves_ns, process, action)
@@ -326,9 +330,11 @@ class System:
         elif isinstance(action, Say) and settings.on_say is not None:
             settings.on_say(process.name, action.level, action.text)
 
-    def _trace(self, now_ns: int, process: Process, what: str, channel: str, payload: bytes) -> None:
+    def _trace(  # what a Traced has
+        self, now_ns: int, process: Process, what: str, channel: str, payload: bytes, name: str = ""
+    ) -> None:
         if self.settings.observer is not None and what in self.settings.observes:
-            self.settings.observer(Traced(now_ns, process.name, what, channel, payload))
+            self.settings.observer(Traced(now_ns, process.name, what, channel, payload, name))
 
     def _committed(self, frame: Frame) -> None:
         self._last_commit_ns = self.bus.now_ns
@@ -387,9 +393,7 @@ class System:
             history = fold(self.supervisor.deployment, self._journal)
             boot = f"boot-{self._boots}"
             now_ns = self._clock(name).at(self.bus.now_ns)
-            self.supervisor = self.settings.supervisor(
-                self._run, library_fingerprint(), now_ns, boot, history=history
-            )
+            self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)
             self._enter_supervisor()
         else:
             self._enter_node(name, library_fingerprint())
@@ -426,6 +430,7 @@ class System:
         """Ask the supervisor for something, every `again_ns` until it answers (0: once); return the request's id."""
         self._requests += 1
         identity = f"request-{self._requests}"
+        self.asked.append(identity)
         payload = encode(Request(OPERATOR, identity, verb, encode_json(arguments)))
         self._ask(identity, payload, again_ns)
         return identity
