@@ -74,7 +74,7 @@ def ask(system: System, verb: str, **arguments: object) -> str:
 
 def _unless_healed(system: System, do: Callable[[], object]) -> None:
     """Do what was planned for later, if it is not too late."""
-    if system.supervisor.frame.tick < HEALED_TICK:
+    if not system.healed:
         do()
 
 
@@ -128,6 +128,7 @@ def _flip(dice: Dice, names: Sequence[str]) -> Fault:
             values = frame.values.copy()
             values[int(place * len(values))] += 1.0
             frame.values = values
+            system.flipped.add(name)
             for cached in ("digest", "numbers"):
                 frame.__dict__.pop(cached, None)
 
@@ -219,7 +220,9 @@ def _add(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _push(dice: Dice, names: Sequence[str]) -> Fault:
-    impulse = [0.04 * (dice.unit() - 0.5) for _ in range(3)]
+    """Sometimes far too hard: then the ball goes into quarantine."""
+    hard = dice.one_of((0.04, 0.04, 0.04, 4.0))
+    impulse = [hard * (dice.unit() - 0.5) for _ in range(3)]
     return Fault(_tick(dice), "push", "push the ball", partial(ask, verb="push", impulse=impulse))
 
 
@@ -228,13 +231,26 @@ def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
     for_ms, ticks, pace = dice.between(1, 400), dice.between(1, 5), dice.one_of(("fast", "1x", "20x"))
 
     def do(system: System) -> None:
-        ask(system, "pause")
-        ask(system, "step", count=ticks)
-        system.later(for_ms * MS, partial(_unless_healed, system, partial(ask, system, "rate", pace=pace)))
-        system.later(for_ms * MS, partial(ask, system, "resume"))
-        system.later((for_ms + 300) * MS, partial(_unless_healed, system, partial(ask, system, "rate", pace="fast")))
+        asked = [ask(system, "pause"), ask(system, "step", count=ticks)]
+        system.later(for_ms * MS, partial(_when_answered, system, asked, go_on))
+
+    def go_on(system: System) -> None:
+        asked = [ask(system, "rate", pace=pace), ask(system, "resume")]
+        system.later(300 * MS, partial(_when_answered, system, asked, be_fast))
+
+    def be_fast(system: System) -> None:
+        if not system.healed:
+            ask(system, "rate", pace="fast")
 
     return Fault(_tick(dice), "tempo", f"pause for {for_ms} ms, step {ticks}, then {pace}", do)
+
+
+def _when_answered(system: System, asked: Sequence[str], do: Callable[[System], None]) -> None:
+    """Go on when all that was asked for before is answered: what comes late would undo what comes after."""
+    if all(identity in system.answers for identity in asked):
+        do(system)
+    else:
+        system.later(ASK_AGAIN_NS, partial(_when_answered, system, asked, do))
 
 
 # --- the supervisor --------------------------------------------------------------------------------------------------
@@ -277,5 +293,7 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "tempo": _tempo,
 }
 KINDS: Final = list(FAULT_OF)
+CHANGES_THE_WORLD: Final = frozenset({"add", "push"})
+"""Kinds after which the world is another one. After all others it is the one that would have been."""
 ONCE: Final = ("flip",)
 """Kinds of which one a seed is enough: if all nodes had other frames, none would be right."""

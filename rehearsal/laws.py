@@ -8,12 +8,12 @@ Neighbours: `swarm` flies seeds under it, `replica` computes again, `packet_laws
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import CHAIN_START, basis_of, chain_next, edits_content
+from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, edits_content
 from foosim.protocol.messages import (
     Answer,
     Commit,
@@ -45,6 +45,9 @@ class Laws:
         self.ticks = 0
         self.packets = PacketLaws(deployment)
         self.epoch = 0
+        self.flipped: Collection[str] = ()
+        """Nodes whose memory a fault has changed."""
+        self._table = deployment.table
         self._replica = replica
         self._deployment = deployment
         self._chain = CHAIN_START
@@ -57,6 +60,9 @@ class Laws:
         self._ordered: dict[int, list[Edit]] = {}
         """What journalled requests change, by tick."""
         self._orders: dict[int, bytes] = {}
+        self._said_epoch: dict[str, int] = {}
+        """The newest epoch of which each node has said a part."""
+        self._stopped: list[str] = []
         self._answers: dict[tuple[str, str], bytes] = {}
         self._chosen = deployment.owners()
         """The owner of each robot by the deployment, or by who moved it last."""
@@ -99,6 +105,7 @@ class Laws:
             hold(not record.edits or record.tick > max(self._orders, default=-1), f"{key} changes what is released")
             self._answers[key] = encode(record.answer)
             self._ordered.setdefault(record.tick, []).extend(record.edits)
+            self._stopped = record.control.stopped
             robot, does, _ = f"{record.answer.text}  ".split(" ", 2)
             if does in ("moved", "is") and robot in self._chosen:
                 self._chosen[robot] = record.owners[robot]
@@ -117,15 +124,27 @@ class Laws:
         parts = self._parts.get((epoch, tick), {})
         hold(sorted(parts) == self._rosters[epoch], f"commit {tick}: parts of {sorted(parts)} in epoch {epoch}")
         hold(edits_content(commit.edits) == self._orders.get(tick - 1), f"commit {tick} with edits that nobody ordered")
-        delivered = self.packets.said.get(tick - 1)
-        hold(delivered is not None, f"commit {tick} before the deliveries of its tick")
-        basis = basis_of(self._digests[tick - 1], commit.edits, delivered or b"")
+        basis = self._basis(tick, commit.edits)
         strange = [node for node, (_, part) in parts.items() if part.basis != basis]
         hold(not strange, f"commit {tick} is made of parts of {strange}, from another basis")
+        self._check_ahead(tick + 1)
         solved = sorted(index for _, part in parts.values() for index in part.solved)
         hold(solved == list(range(len(solved))), f"tick {tick}: entities {solved} are solved")
         for old in [key for key in self._parts if key[1] <= tick]:
             self._parts.pop(old)
+
+    def _basis(self, tick: int, edits: list[Edit]) -> bytes:
+        """Return what all parts of frame `tick` have to start from."""
+        delivered = self.packets.said.get(tick - 1)
+        hold(delivered is not None, f"frame {tick} before the deliveries of the tick before")
+        return basis_of(self._digests[tick - 1], edits, delivered or b"")
+
+    def _check_ahead(self, tick: int) -> None:
+        """Whoever runs ahead of the commits has the frame that is committed then, unless its memory was changed."""
+        for each in [parts for (_, ahead), parts in self._parts.items() if ahead == tick]:
+            for node, (_, part) in each.items():
+                right = node in self.flipped or part.basis == self._basis(tick, self._ordered.get(tick - 1, []))
+                hold(right, f"{node} goes on from another frame {tick - 1} than the committed one")
 
     def _begins(self, epoch: Epoch, raw: bytes) -> None:
         hold(epoch.epoch > self.epoch, f"epoch {epoch.epoch} after {self.epoch}")
@@ -133,6 +152,7 @@ class Laws:
         hold(epoch.digest == self._digests[epoch.tick], f"epoch {epoch.epoch} starts from another frame")
         owners = dict(epoch.owners)
         hold(owners.keys() == self._deployment.robots.keys(), f"epoch {epoch.epoch} has not all robots")
+        hold(not {*epoch.roster} & {*self._stopped}, f"epoch {epoch.epoch} is with a node that is stopped")
         hold({*owners.values()} <= {*epoch.roster}, f"epoch {epoch.epoch}: an owner takes no part")
         self.epoch = epoch.epoch
         self._rosters[epoch.epoch] = sorted(epoch.roster)
@@ -150,6 +170,8 @@ class Laws:
     def _part(self, traced: Traced) -> None:
         part = decode(Part, traced.payload)
         hold(part.node in self._rosters.get(part.epoch, ()), f"{part.node} has no part in epoch {part.epoch}")
+        hold(part.epoch >= self._said_epoch.get(part.node, 0), f"{part.node} goes back to epoch {part.epoch}")
+        self._said_epoch[part.node] = part.epoch
         if part.tick <= self.committed:
             return
         said = self._parts.setdefault((part.epoch, part.tick), {}).setdefault(part.node, (traced.payload, part))
@@ -206,7 +228,20 @@ class Laws:
         hold(again.digest == closing.digest, f"frame {frame.tick} is another one than its orders and deliveries give")
         hold(closing.digest == self._digests[frame.tick], f"frame {frame.tick} is not the committed one")
         self.packets.senses(again, self._replica)
+        self._in_bounds(again)
         self.ticks = frame.tick
+
+    def _in_bounds(self, frame: Frame) -> None:
+        """What is not in quarantine is in the world and no faster than the model promises."""
+        margin, limit = self._table.rules.out_margin, self._table.ball.speed_limit
+        for ball in frame.layout.balls:
+            if frame.at(ball.name, "quarantined") == 0.0:
+                x, y, _ = frame.vector(ball.name, "position", 3)
+                speed = sum(value * value for value in frame.vector(ball.name, "linear_velocity", 3))
+                inside = (
+                    abs(x) <= self._table.field.length / 2 + margin and abs(y) <= self._table.field.width / 2 + margin
+                )
+                hold(inside and speed <= limit * limit, f"{ball.name} is out of its bounds at tick {frame.tick}")
 
     def end(self, system: System, nodes: int) -> None:
         """When all has healed: everybody is back, everything is answered, and the journals give what is there."""

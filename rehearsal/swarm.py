@@ -17,11 +17,24 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.names import CHANNEL_ECHO
 from foosim.protocol.units import Pace
-from foosim.rehearsal.bus import Traced, Weather
+from foosim.rehearsal.bus import CALM, Traced, Weather
 from foosim.rehearsal.clock import Clock
-from foosim.rehearsal.faults import FAULT_OF, HEALED_TICK, HOUR_NS, KINDS, MS, ONCE, TICKS, Dice, Fault, ask, revive
+from foosim.rehearsal.faults import (
+    CHANGES_THE_WORLD,
+    FAULT_OF,
+    HEALED_TICK,
+    HOUR_NS,
+    KINDS,
+    MS,
+    ONCE,
+    TICKS,
+    Dice,
+    Fault,
+    ask,
+    revive,
+)
 from foosim.rehearsal.laws import Laws
-from foosim.rehearsal.packet_laws import Broken
+from foosim.rehearsal.packet_laws import Broken, hold
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import Settings, System
@@ -33,6 +46,8 @@ HEALED_PACE: Final = "0.02x"
 """100 ms a tick: slow enough that all are back before the end."""
 PROGRESS_NS: Final = 10_000_000_000
 """When all is healed the next tick is committed within this virtual time."""
+IDLE_NS: Final = 60_000_000_000
+"""Before, with all that goes on, within this."""
 WORLDS: Final = 4
 """How many worlds there are: seeds differ in what happens to the processes, and take the next of these in turn."""
 PROBER: Final = "prober"
@@ -58,14 +73,22 @@ class Plan:
     weather: Weather
     faults: tuple[Fault, ...]
     clocks: tuple[tuple[str, Clock], ...]
+    ticks: int = TICKS
+
+    @property
+    def healed_tick(self) -> int:
+        return self.ticks - TICKS + HEALED_TICK
 
     @property
     def kinds(self) -> list[str]:
         return sorted({fault.kind for fault in self.faults})
 
 
-def plan_of(seed: int) -> Plan:
-    """Return the plan of a seed: nodes, clocks, weather, and from 8 to 20 faults, of three kinds at least."""
+def plan_of(seed: int, ticks: int = TICKS) -> Plan:
+    """Return the plan of a seed: nodes, clocks, weather, and from 8 to 20 faults, of three kinds at least.
+
+    A longer run has as many more of them.
+    """
     dice = Dice(seed)
     nodes = dice.one_of(NODES)
     names = [f"n{number}" for number in range(1, nodes + 1)]
@@ -78,12 +101,19 @@ def plan_of(seed: int) -> Plan:
         repeat=dice.one_of((0.0, 0.05, 0.3)) if bad else 0.0,
     )
     chosen = [KINDS[(seed + place) % len(KINDS)] for place in range(3)]
-    chosen += [dice.one_of(KINDS) for _ in range(dice.between(*FAULTS) - len(chosen))]
+    times = max(1, ticks // TICKS)
+    chosen += [dice.one_of(KINDS) for _ in range(dice.between(*FAULTS) * times - len(chosen))]
     once = [kind for place, kind in enumerate(chosen) if kind not in ONCE or kind not in chosen[:place]]
-    faults = sorted((FAULT_OF[kind](dice, names) for kind in once), key=lambda fault: fault.tick)
+    late = max(0, ticks - TICKS)
+    faults = [_later(FAULT_OF[kind](dice, names), dice.between(0, late) if late else 0) for kind in once]
+    faults.sort(key=lambda fault: fault.tick)
     here = (*names, channels.SUPERVISOR, channels.VHUB, PROBER)
     clocks = tuple((name, Clock(dice.between(0, 2 * HOUR_NS), dice.between(-1000, 1000))) for name in here)
-    return Plan(seed, nodes, weather, tuple(faults), clocks)
+    return Plan(seed, nodes, weather, tuple(faults), clocks, ticks)
+
+
+def _later(fault: Fault, ticks: int) -> Fault:
+    return replace(fault, tick=fault.tick + ticks)
 
 
 class Prober:
@@ -153,6 +183,8 @@ class Flight:
         text, alone = worlds(text, name, plan.nodes, plan.seed % WORLDS)
         self.plan = plan
         self.seen = 0
+        self._healed_ns = -1
+        self._last_commit_ns = 0
         self._replica = Replica(alone, name, load_deployment(alone, name))
         self.laws = Laws(self._replica, load_deployment(text, name))
         chosen = replace(
@@ -167,11 +199,11 @@ class Flight:
             on_closing=self.laws.close,
             on_commit=self._committed,
         )
-        self.system = System(RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), TICKS), chosen)
-        self._healed_ns = -1
+        self.system = System(RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), plan.ticks), chosen)
+        self.laws.flipped = self.system.flipped
         for fault in plan.faults:
             self.system.at_tick(fault.tick, partial(fault.do, self.system))
-        self.system.at_tick(HEALED_TICK, self._heal)
+        self.system.at_tick(plan.healed_tick, self._heal)
 
     def run(self) -> None:
         """Run to the end; raise Broken for a law that does not hold, or what a core asserts."""
@@ -187,22 +219,21 @@ class Flight:
 
     def _see(self, traced: Traced) -> None:
         self.seen += 1
+        idle_ns = traced.now_ns - self._last_commit_ns
+        if idle_ns > (IDLE_NS if self._healed_ns < 0 else PROGRESS_NS):
+            raise Broken(f"{'healed, ' * (self._healed_ns >= 0)}no tick is committed for {idle_ns / 1e9:.0f} s")
         self.laws.see(traced)
         if traced.what == "journal" and traced.process == channels.VHUB and self.system.hub.state is not None:
             self.laws.packets.account(self.system.hub.state)
 
-    def _committed(self, frame: Frame) -> None:
-        """Healed, the run goes on in time."""
-        now_ns = self.system.bus.now_ns
-        if self._healed_ns >= 0:
-            if now_ns - self._healed_ns > PROGRESS_NS:
-                raise Broken(f"healed, tick {frame.tick} came after {(now_ns - self._healed_ns) / 1e9:.1f} s")
-            self._healed_ns = now_ns
+    def _committed(self, _: Frame) -> None:
+        self._last_commit_ns = self.system.bus.now_ns
 
     def _heal(self) -> None:
         """Fine weather from now on: who is down comes up, who is slow is quick, who stood still goes on."""
         system = self.system
-        self._healed_ns = system.bus.now_ns
+        self._healed_ns = self._last_commit_ns = system.bus.now_ns
+        system.healed = True
         system.bus.heal()
         ask(system, "rate", pace=HEALED_PACE)
         for name, process in list(system.processes.items()):
@@ -213,13 +244,26 @@ class Flight:
             revive(system, f"n{number}")
 
 
-def fly(text: str, name: str, seed: int, settings: Settings | None = None) -> Flown:
-    """Rehearse a deployment under the faults of a seed, on the pure engine. `settings` may plant faulty cores."""
-    plan = plan_of(seed)
+@lru_cache(maxsize=4 * WORLDS)
+def undisturbed(text: str, name: str, world: int, ticks: int) -> bytes:
+    """Return the chain of a world in which nothing happens."""
+    flight = Flight(text, name, Plan(world, NODES[0], CALM, (), (), ticks), Settings())
+    flight.run()
+    return flight.system.supervisor.chain
+
+
+def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks: int = TICKS) -> Flown:
+    """Rehearse a deployment under the faults of a seed, on the pure engine. `settings` may plant faulty cores.
+
+    Where no fault changes the world, it has to be that of the run in which nothing happened (law 3).
+    """
+    plan = plan_of(seed, ticks)
+    expected = b"" if CHANGES_THE_WORLD & {*plan.kinds} else undisturbed(text, name, seed % WORLDS, ticks)
     flown = Flown(seed, plan.nodes, plan.kinds, [f"tick {fault.tick}: {fault.what}" for fault in plan.faults])
     flight = Flight(text, name, plan, settings or Settings())
     try:
         flight.run()
+        hold(expected in (b"", flight.system.supervisor.chain), "the world is not the one that would have been")
     except AssertionError as error:
         flown.broken = f"{type(error).__name__}: {error}"
     system, told = flight.system, flight.system.supervisor.recovery.recovered

@@ -104,6 +104,10 @@ class System:
         self.solvers: dict[str, Solver] = {}
         self.players: dict[str, PlayerLoop] = {}
         self.answers: dict[str, Answer] = {}
+        self.healed = False
+        """Whether a test has said that nothing new is to happen."""
+        self.flipped: set[str] = set()
+        """Nodes whose memory a test has changed."""
         self.asked: list[str] = []
         """Ids of what was requested."""
         self._traces_receive = rehearsal.observer is not None and "receive" in rehearsal.observes
