@@ -195,7 +195,7 @@ def _clog(dice: Dice, names: Sequence[str]) -> Fault:
 
 def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
     """For a while everything is said once more, much later."""
-    for_ms = dice.one_of((20, 100))
+    for_ms = dice.one_of((20, 100, 400))
 
     def do(system: System) -> None:
         system.bus.repeat_until(system.bus.now_ns + for_ms * MS)

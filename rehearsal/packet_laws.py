@@ -142,6 +142,7 @@ class PacketLaws:
         state = system.hub.state
         assert state is not None
         self.account(state)
+        hold(state.packets.refused == 0, f"lockstep clients repeat nothing, {state.refusals} were refused")
         counted = {DELIVERED: 0, DROPPED: 0, IN_FLIGHT: 0}
         for cause in self._fates.values():
             counted[DELIVERED if not cause else IN_FLIGHT if cause == IN_FLIGHT else DROPPED] += 1

@@ -10,6 +10,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from foosim.rehearsal.swarm import undisturbed
+
 
 class Planting:
     """Swaps attributes until it is undone."""
@@ -40,13 +42,15 @@ class Mutant:
 
     @contextmanager
     def planted(self) -> Iterator[None]:
-        """The bug is in the code meanwhile."""
+        """The bug is in the code meanwhile; what was computed with it is not kept."""
         planting = Planting()
+        undisturbed.cache_clear()
         try:
             self.plant(planting)
             yield
         finally:
             planting.undo()
+            undisturbed.cache_clear()
 
 
 class Register:

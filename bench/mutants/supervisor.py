@@ -202,11 +202,6 @@ def _never_lost(planting: Planting) -> None:
     planting.swap(Roster, "lose", lambda self, process: None)
 
 
-@register("a newcomer is let in without its engine", "a node joins when it has built the world", 0)
-def _unready(planting: Planting) -> None:
-    planting.swap(SupervisorCore, "unready_nodes", lambda self, layout: [])
-
-
 @register("a stopped node comes back", "who was stopped is not let in until it is started", 0)
 def _unstopped(planting: Planting) -> None:
     def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
