@@ -1,4 +1,4 @@
-"""What an order does to frame k before it is solved: add, remove, push. Pure, evaluated by every node alike.
+"""What an order does to frame k before it is solved: add, remove, push, freeze. Pure, evaluated by every node alike.
 
 Neighbours: `rules` edits after the order; `step` goes on from the edited numbers.
 """
@@ -11,8 +11,8 @@ from math import isfinite
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, fitting_edits, layout_after
-from foosim.protocol.layout import Layout
-from foosim.protocol.messages import Add, Edit, Push
+from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.messages import Add, Edit, Freeze, Push, Thaw
 from foosim.protocol.start import place_ball
 
 
@@ -25,6 +25,8 @@ def edit(frame: Frame, edits: Sequence[Edit], deployment: Deployment) -> tuple[L
             place_ball(numbers, layout[change.name], change.position, change.velocity)
         elif isinstance(change, Push) and change.name in layout:
             _push(numbers, layout, change, deployment.table.ball.mass)
+        elif isinstance(change, Freeze | Thaw):
+            _take_out(numbers, layout[change.name], isinstance(change, Freeze))
     return layout, numbers
 
 
@@ -55,3 +57,12 @@ def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None
     start = layout[push.name].offsets["linear_velocity"]
     for axis, impulse in enumerate(push.impulse):
         numbers[start + axis] += impulse / mass
+
+
+def _take_out(numbers: list[float], robot: Entity, is_down: bool) -> None:
+    """Mark a robot as out of service or back in it; what it wants from now on is to be where it is."""
+    numbers[robot.offsets["down"]] = float(is_down)
+    wanted = robot.offsets.get("wanted")
+    if wanted is not None:
+        position = robot.offsets["joint_positions"]
+        numbers[wanted : wanted + 2] = numbers[position : position + 2]

@@ -97,6 +97,8 @@ class Stepper:
         counters: list[int] = []
         tick, outboxes = frame.tick, frame.outboxes
         for robot in robots:
+            if frame.numbers[robot.offsets["down"]] != 0.0:
+                continue
             sends: list[tuple[str, str, bytes]] = []
             for channel, period, slot, sensor in self._sensors[robot.name]:
                 if tick % period == 0:
@@ -136,6 +138,8 @@ class Stepper:
     def _take(
         self, packet: Delivered, entity: Entity, numbers: list[float], outboxes: dict[int, list[OutboxPacket]]
     ) -> bool:
+        if numbers[entity.offsets["down"]] != 0.0:
+            return False
         if packet.channel == ECHO:
             waiting = outboxes.get(entity.index, [])
             waiting = [*waiting, OutboxPacket(packet.source, ECHO, packet.payload)]

@@ -199,7 +199,7 @@ class Deployment(Part):
     engine: Literal["bullet", "pure"]
     pace: PaceField
     mixed_cpu: bool = False
-    on_node_loss: Literal["adopt", "stop"] = "adopt"
+    on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
     table: Table
     robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)

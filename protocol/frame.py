@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from foosim.protocol import codec, messages
 from foosim.protocol.errors import Malformed
-from foosim.protocol.layout import ADDABLE, BALL, Entity, Layout
+from foosim.protocol.layout import ADDABLE, BALL, ROBOTS, Entity, Layout
 
 assert sys.byteorder == "little", "numbers travel as raw little-endian float64"
 
@@ -116,8 +116,8 @@ def chain_next(chain: bytes, digest: bytes) -> bytes:
 def fitting_edits(layout: Layout, edits: Sequence[messages.Edit]) -> list[messages.Edit]:
     """Return the edits that do something to a world with this layout, in their order.
 
-    An addition of a name that is taken, the removal of what was not added and a push of what is no free body change
-    nothing: a function of the order alone, the same for all who read it.
+    An addition of a name that is taken, the removal of what was not added, a push of what is no free body and a freeze
+    of what is no robot change nothing: a function of the order alone, the same for all who read it.
     """
     models = dict(layout.models)
     fitting: list[messages.Edit] = []
@@ -130,6 +130,9 @@ def fitting_edits(layout: Layout, edits: Sequence[messages.Edit]) -> list[messag
             if edit.name == BALL or models.get(edit.name) not in ADDABLE:
                 continue
             del models[edit.name]
+        elif isinstance(edit, messages.Freeze | messages.Thaw):
+            if models.get(edit.name) not in ROBOTS:
+                continue
         elif models.get(edit.name) not in ADDABLE:
             continue
         fitting.append(edit)

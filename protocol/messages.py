@@ -65,7 +65,19 @@ class Push(Message, frozen=True):
     impulse: Vector
 
 
-Edit = Add | Remove | Push
+class Freeze(Message, frozen=True):
+    """Take a robot out of service: it holds still, senses nothing, and no packet reaches it (`down` in the frame)."""
+
+    name: Name
+
+
+class Thaw(Message, frozen=True):
+    """Put a robot that was frozen back into service."""
+
+    name: Name
+
+
+Edit = Add | Remove | Push | Freeze | Thaw
 Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 

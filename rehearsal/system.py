@@ -115,6 +115,8 @@ class System:
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
         self._timers: list[tuple[int, int, Callable[[], object]]] = []
+        self._frames: list[Frame] = []
+        """Committed in the present turn of the supervisor."""
         self._dying: dict[str, int] = {}
         """Processes that end amid their next actions: how many of these they still perform."""
         self._boots = 0
@@ -159,7 +161,7 @@ class System:
 
     def _enter_supervisor(self) -> None:
         core = self.supervisor
-        core.on_commit = self._committed
+        core.on_commit = self._frames.append
         self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
         self.processes[channels.SUPERVISOR].took = core.watch.took
 
@@ -306,6 +308,8 @@ class System:
             else:
                 self._keep(leaves_ns, process, action)
         actions.clear()
+        if process.core is self.supervisor and self._frames:
+            self._tell_commits(was_cut=left is not None)
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             farewell = self.hub.farewell()
             self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
@@ -340,11 +344,17 @@ class System:
         if self.settings.observer is not None and what in self.settings.observes:
             self.settings.observer(Traced(now_ns, process.name, what, channel, payload, name))
 
-    def _committed(self, frame: Frame) -> None:
-        self._last_commit_ns = self.bus.now_ns
-        if self.settings.on_commit is not None:
-            self.settings.on_commit(frame)
-        self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
+    def _tell_commits(self, was_cut: bool) -> None:
+        """Tell of the frames that were committed; what a supervisor that ended had not written never was."""
+        frames = self._frames.copy()
+        self._frames.clear()
+        written = fold(self.supervisor.deployment, self._journal).frame.tick if was_cut else frames[-1].tick
+        for frame in frames:
+            if frame.tick <= written:
+                self._last_commit_ns = self.bus.now_ns
+                if self.settings.on_commit is not None:
+                    self.settings.on_commit(frame)
+                self._next += self._at_tick.pop(frame.tick, ())  # between two turns, as everything from outside comes
 
     def _where(self) -> str:
         nodes = {name: process.core.waiting_for for name, process in self.processes.items() if name in self.solvers}

@@ -134,11 +134,10 @@ def serve(plan: Plan, folder: RunFolder) -> int:
 
 def _history(plan: Plan, folder: RunFolder) -> History | None:
     """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
-    files = journal_files(folder.journals, SUPERVISOR)
-    if not files:
-        return None
     if folder.result() is not None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
+    if not journal_files(folder.journals, SUPERVISOR):
+        return None
     history = fold(plan.deployment, read_newest(folder.journals, SUPERVISOR))
     if history.run.deployment != plan.text:
         raise Refused(f"run {folder.name} was started with another deployment than {plan.options.file} is now")

@@ -65,6 +65,13 @@ class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request",
     owners: dict[str, str]
 
 
+class OrderedRecord(msgspec.Struct, frozen=True, array_like=True, tag="ordered", forbid_unknown_fields=True):
+    """What the supervisor itself adds to the order of a tick."""
+
+    tick: int
+    edits: list[Edit]
+
+
 class CommitRecord(msgspec.Struct, frozen=True, array_like=True, tag="commit", forbid_unknown_fields=True):
     """A commit as it is published, with what the account counts: the nodes that solved a body, the ball's solver (empty
     for frame 0), and when it was committed, how late, by the supervisor's clock."""
@@ -105,7 +112,8 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     end: End | None
 
 
-Record = RunRecord | HeadRecord | RequestRecord | Control | CommitRecord | RecoveredRecord | Epoch | End
+Change = RequestRecord | OrderedRecord | Control | CommitRecord | RecoveredRecord | Epoch | End
+Record = RunRecord | HeadRecord | Change
 
 
 @dataclass(slots=True)
@@ -193,7 +201,7 @@ def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
     )
 
 
-def _apply(history: History, record: RequestRecord | Control | CommitRecord | RecoveredRecord | Epoch | End) -> None:
+def _apply(history: History, record: Change) -> None:
     """Take one more record into a history."""
     if isinstance(record, CommitRecord):
         _commit(history, record)
@@ -207,6 +215,8 @@ def _apply(history: History, record: RequestRecord | Control | CommitRecord | Re
         history.control, history.owners = record.control, record.owners
         if record.edits:
             history.edits.setdefault(record.tick, []).extend(record.edits)
+    elif isinstance(record, OrderedRecord):
+        history.edits.setdefault(record.tick, []).extend(record.edits)
     elif isinstance(record, RecoveredRecord):
         history.recovered.append(record.entry)
     elif isinstance(record, Control):

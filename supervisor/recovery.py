@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol.actions import Journal
 from foosim.protocol.codec import encode
+from foosim.protocol.messages import Edit, Freeze, Thaw
 from foosim.supervisor.account import Recovered, close_outages
 from foosim.supervisor.records import RecoveredRecord
 from foosim.supervisor.roster import Process
@@ -46,6 +47,7 @@ class Recovery:
         members = [member for member in core.members if member != name]
         self.note("node", name, reason)
         if members:
+            self._freeze(name)
             self.open(self.adopted([name], members), members, now_ns)
             core.say("warning", f"lost node {name}: {reason}; goes on from tick {core.frame.tick} without it")
         else:
@@ -61,6 +63,7 @@ class Recovery:
                 core.finish(f"lost {name}: {reason}", failed=True)
                 return
             self.note("node", name, reason)
+            self._freeze(name)
         if here:
             self.open(self.adopted({*core.owners.values()} - {*here}, here), here, now_ns)
         else:
@@ -87,6 +90,11 @@ class Recovery:
         owners.update((robot, name) for robot, node in self.returns.items() if node == name)
         self.returns = {robot: node for robot, node in self.returns.items() if node != name}
         self.note("join", name, "back" if self._was_lost(name) else "started")
+        if self._freezes:
+            frozen: list[Edit] = [Freeze(robot) for robot, node in sorted(self.returns.items()) if node != name]
+            core.requests.order(core.frame.tick, [] if core.members else frozen)
+            thawed: list[Edit] = [Thaw(robot) for robot in sorted(owners) if owners[robot] == name]
+            core.requests.order(core.released, [edit for edit in thawed if edit.name not in self.returns])
         self.open(owners, [*core.members, name], now_ns)
         core.say("info", f"node {name} takes part from tick {core.frame.tick}")
 
@@ -102,8 +110,9 @@ class Recovery:
             self.join(process, now_ns)
 
     def moved(self, robot: str) -> None:
-        """Somebody chose an owner for a robot: that one stays."""
-        self.returns.pop(robot, None)
+        """Somebody chose an owner for a robot: that one stays, and runs it."""
+        if self.returns.pop(robot, None) is not None and self._freezes:
+            self._core.requests.order(self._core.released, [Thaw(robot)])
 
     def committed(self, before_ns: int, now_ns: int) -> None:
         """A frame is committed, the one before it was at `before_ns`: the world goes on again."""
@@ -122,6 +131,10 @@ class Recovery:
             }
             for entry in self.recovered
         ]
+
+    @property
+    def _freezes(self) -> bool:
+        return self._core.deployment.on_node_loss == "freeze"
 
     def _ends_run(self, name: str) -> bool:
         """Whether the run cannot go on without a node."""
@@ -143,6 +156,13 @@ class Recovery:
         core.actions.append(Journal(encode(core.control())))
         core.open_epoch(owners, now_ns, members)
         core.requests.layout_ready(now_ns)
+
+    def _freeze(self, lost: str) -> None:
+        """Where the deployment says so, take the robots of a lost node out of service from the last commit on."""
+        core = self._core
+        if self._freezes:
+            frozen: list[Edit] = [Freeze(robot) for robot, owner in sorted(core.owners.items()) if owner == lost]
+            core.requests.order(core.frame.tick, frozen)
 
     def adopted(self, lost: Collection[str], members: Collection[str]) -> dict[str, str]:
         """Return the owners without some nodes: each of their robots goes to whoever then has the fewest, ties by name.

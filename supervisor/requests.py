@@ -22,7 +22,7 @@ from foosim.protocol.layout import BALL, Layout
 from foosim.protocol.messages import Add, Answer, Edit, Push, Remove, Request
 from foosim.protocol.names import NAME_RULE, is_name, nearest_name
 from foosim.protocol.units import parse_pace
-from foosim.supervisor.records import RequestRecord
+from foosim.supervisor.records import OrderedRecord, RequestRecord
 from foosim.supervisor.status import status
 
 if TYPE_CHECKING:
@@ -140,6 +140,20 @@ class Requests:
     def edits_for(self, tick: int) -> list[Edit]:
         """Take what requests add to the order of `tick`."""
         return self._edits.pop(tick, [])
+
+    def order(self, tick: int, edits: list[Edit]) -> None:
+        """Add what the supervisor itself wants to the order of a tick that is not committed.
+
+        The epoch that follows says the orders again that were released.
+        """
+        core = self._core
+        if not edits:
+            return
+        core.actions.append(Journal(encode(OrderedRecord(tick, edits))))
+        if tick < core.released:
+            core.orders[tick] = [*core.orders[tick], *edits]
+        else:
+            self._edits.setdefault(tick, []).extend(edits)
 
     def coming_edits(self) -> list[Edit]:
         """Return what requests add to ticks that are not released yet."""

@@ -23,7 +23,7 @@ from foosim.protocol.draws import Slot
 from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Counter, Delivered, Edit, Epoch, Push, Remove
+from foosim.protocol.messages import Add, Counter, Delivered, Edit, Epoch, Freeze, Push, Remove, Thaw
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
 from foosim.vhub.records import Closing
 
@@ -51,7 +51,7 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
 class EditRow(Row, frozen=True):
     """A change of the world by an order. Lists are x, y, z in the world frame, empty where the kind has none."""
 
-    kind: Literal["add", "remove", "push"]
+    kind: Literal["add", "remove", "push", "freeze", "thaw"]
     name: str = ""
     model: str = ""
     position: list[float] = []
@@ -365,7 +365,9 @@ def edit_row(edit: Edit) -> EditRow:
         return EditRow("add", edit.name, edit.model, position=list(edit.position), velocity=list(edit.velocity))
     if isinstance(edit, Remove):
         return EditRow("remove", edit.name)
-    return EditRow("push", edit.name, impulse=list(edit.impulse))
+    if isinstance(edit, Push):
+        return EditRow("push", edit.name, impulse=list(edit.impulse))
+    return EditRow("freeze" if isinstance(edit, Freeze) else "thaw", edit.name)
 
 
 def edit_of(row: EditRow) -> Edit:
@@ -374,7 +376,9 @@ def edit_of(row: EditRow) -> Edit:
         return Add(row.name, row.model, _vector(row.position), _vector(row.velocity))
     if row.kind == "remove":
         return Remove(row.name)
-    return Push(row.name, _vector(row.impulse))
+    if row.kind == "push":
+        return Push(row.name, _vector(row.impulse))
+    return Freeze(row.name) if row.kind == "freeze" else Thaw(row.name)
 
 
 def delivered_of(row: DeliveredRow) -> Delivered:

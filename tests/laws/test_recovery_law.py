@@ -11,10 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.protocol import channels
+from foosim.protocol.channels import SUPERVISOR
+from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.messages import Answer, Request
 from foosim.protocol.units import Pace
-from foosim.rehearsal.bus import Weather
+from foosim.rehearsal.bus import Traced, Weather
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
-from foosim.rehearsal.system import Settings, System
+from foosim.rehearsal.system import OPERATOR, Settings, System
+from foosim.vhub.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300
@@ -54,9 +59,7 @@ def disturbed(
             system.at_tick(tick, partial(fault, system))
 
     pace = chosen.pop("pace", None)
-    return rehearse(
-        TABLE.read_text(), TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare
-    )
+    return rehearse(TABLE.read_text(), TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare)
 
 
 def told(run: Rehearsed) -> list[tuple[str, str]]:
@@ -139,6 +142,117 @@ def test_where_the_deployment_says_so_the_run_ends(sets: str) -> None:
     assert run.digests == undisturbed().digests[: len(run.digests)] and 100 <= run.json["ticks"] <= 105
 
 
+def restart(down_ms: int = 0, amid: int = 0) -> Callable[[System], object]:
+    """End the supervisor amid its next turn, `amid` actions into it, and start it again."""
+
+    def start_again(system: System) -> None:
+        if SUPERVISOR in system.processes:
+            system.later(MS, partial(start_again, system))
+        else:
+            system.start(SUPERVISOR)
+
+    def do(system: System) -> None:
+        if SUPERVISOR in system.processes and not system.is_dying(SUPERVISOR):
+            system.end_amid(SUPERVISOR, amid)
+            system.later(max(1, down_ms * MS), partial(start_again, system))
+
+    return do
+
+
+def test_the_supervisor_is_started_again_and_again() -> None:
+    faults = [(1, restart()), (9, restart(0, 1)), (60, restart(500)), (70, restart(0, 2)), (200, restart(0, 3))]
+    run = disturbed([*faults, (120, kill("n2")), (125, restart()), (150, start("n2"))], keeps_journals=True)
+    same = undisturbed()
+    assert run.digests == same.digests and run.json["digest"] == same.json["digest"]
+    assert [what for what, _ in told(run)] == 4 * ["supervisor"] + ["node", "supervisor", "join", "supervisor"]
+    assert run.json["packets"] == same.json["packets"]
+    assert sum(node["solved_ticks"] for node in run.json["nodes"].values()) >= TICKS
+    assert run.json["reason"] == "done"
+
+
+def test_a_node_that_does_not_come_back_to_the_supervisor_is_lost() -> None:
+    def both(system: System) -> None:
+        system.kill(SUPERVISOR)
+        system.kill("n2")
+        system.start(SUPERVISOR)
+
+    run = disturbed([(100, both)], keeps_journals=True)
+    assert run.digests == undisturbed().digests
+    assert run.json["recoveries"][1]["reason"] == "it has not come back to the supervisor"
+    assert told(run) == [("supervisor", "supervisor"), ("node", "n2")]
+
+
+@pytest.mark.parametrize("amid", range(4))
+def test_what_was_asked_is_kept_by_the_next_supervisor(amid: int) -> None:
+    """A push, a move and a pause, each with a supervisor that ends in the turn that answers it.
+
+    Either it was written, and takes effect at the tick of its answer, or nobody was answered.
+    """
+    asked: dict[str, str] = {}
+    pushes: list[int] = []
+    told: list[Answer] = []
+
+    def ask(system: System, verb: str, **arguments: Any) -> None:
+        asked[verb] = system.request(verb, **arguments)
+        ask_again(system, Request(OPERATOR, asked[verb], verb, encode_json(arguments)))
+
+    def ask_again(system: System, request: Request, times: int = 10) -> None:
+        """As an operator's command does; here also when it is answered."""
+        if times:
+            system.bus.put(OPERATOR, channels.REQUEST, OPERATOR, encode(request), system.bus.now_ns)
+            system.later(50 * MS, partial(ask_again, system, request, times - 1))
+
+    def prepare(system: System) -> None:
+        things: dict[str, dict[str, Any]] = {
+            "push": {"impulse": [0.01, 0.0, 0.0]},
+            "move": {"robot": "camera", "node": "n3"},
+            "pause": {},
+        }
+        for number, (verb, arguments) in enumerate(things.items()):
+            tick = 50 * (number + 1)
+            system.at_tick(tick, partial(ask, system, verb, **arguments))
+            system.at_tick(tick, partial(restart(0, amid), system))
+        system.at_tick(150, lambda: system.later(1_000 * MS, partial(go_on, system)))
+
+    def go_on(system: System) -> None:
+        assert system.supervisor.pacer.paused and system.supervisor.owners["camera"] == "n3"
+        answers = {verb: [answer for answer in told if answer.id == asked[verb]] for verb in asked}
+        for verb, same in answers.items():
+            assert same and all(answer == same[0] and answer.accepted for answer in same), verb
+        ticks.append(answers["push"][0].tick)
+        system.request("resume")
+
+    def see(traced: Traced) -> None:
+        if traced.what == "publish" and traced.channel == channels.ANSWER.name:
+            told.append(decode(Answer, traced.payload))
+
+    def close(closing: Closing) -> None:
+        pushes.extend([closing.frame.tick - 1] * len(closing.edits))
+
+    ticks: list[int] = []
+    chosen = Settings(keeps_journals=True, on_closing=close, observer=see)
+    run = rehearse(TABLE.read_text(), TABLE.name, TICKS, 3, PURE, chosen, pace=Pace("realtime"), prepare=prepare)
+    assert run.json["reason"] == "done" and len(run.digests) == TICKS
+    assert pushes == ticks and len(ticks) == 1, "pushed once, at the tick of the answer"
+
+
+def test_with_freeze_the_robots_of_a_lost_node_are_down_until_it_is_back() -> None:
+    down: list[list[str]] = []
+
+    def look(system: System) -> None:
+        frame = system.supervisor.frame
+        down.append([robot.name for robot in frame.layout.robots if frame.at(robot.name, "down") != 0.0])
+
+    sets = (*PURE, "on_node_loss=freeze")
+    faults = [(20, look), (40, kill("n2")), (42, look), (60, move("red.attack", "n1")), (90, look)]
+    run = disturbed([*faults, (100, start("n2")), (200, look)], sets=sets)
+    before, lost, moved, back = down
+    assert before == back == []
+    assert len(lost) > 1 and "red.attack" in lost and moved == [name for name in lost if name != "red.attack"]
+    assert run.digests[:40] == undisturbed().digests[:40] and run.digests != undisturbed().digests
+    assert run.json["reason"] == "done" and not run.json["failed"]
+
+
 def test_a_ball_that_is_added_while_a_node_is_lost() -> None:
     faults: list[Fault] = [
         (50, lambda system: system.request("add", name="b2", position=[0.1, 0.0, 0.02])),
@@ -158,13 +272,19 @@ FAULTS: Final = st.lists(
         st.one_of(
             st.sampled_from(NODES).map(lambda name: ("kill", name)),
             st.sampled_from(NODES).map(lambda name: ("start", name)),
+            st.tuples(st.just("restart"), st.sampled_from([0, 1, 30]), st.integers(0, 4)),
             st.tuples(st.just("move"), st.sampled_from(["red.goal", "camera", "blue.attack"]), st.sampled_from(NODES)),
         ),
     ),
     min_size=3,
     max_size=20,
 )
-DO: Final[dict[str, Callable[..., Callable[[System], object]]]] = {"kill": kill, "start": start, "move": move}
+DO: Final[dict[str, Callable[..., Callable[[System], object]]]] = {
+    "kill": kill,
+    "start": start,
+    "move": move,
+    "restart": restart,
+}
 
 
 @settings(max_examples=20)
@@ -180,7 +300,8 @@ def test_whatever_happens_the_world_is_the_same(faults: list[Any], weather: int 
             system.at_tick(tick, partial(_keep_one, fault, system))
 
     bad = Weather(weather, 100_000, 2 * MS, loss=0.02, repeat=0.05) if weather is not None else Weather()
-    run = rehearse(TABLE.read_text(), TABLE.name, TICKS, 3, PURE, Settings(weather=bad), prepare=prepare)
+    chosen = Settings(weather=bad, keeps_journals=True)
+    run = rehearse(TABLE.read_text(), TABLE.name, TICKS, 3, PURE, chosen, prepare=prepare)
     assert run.digests == undisturbed().digests
 
 

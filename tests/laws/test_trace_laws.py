@@ -21,6 +21,8 @@ from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.records import CommitRecord
+from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.state import HubState
@@ -55,6 +57,8 @@ def spoken_before_written(trace: Sequence[Traced]) -> list[str]:
                 record = decode_any(HubRecord, traced.payload)
                 if isinstance(record, TickRecord):
                     closed.add(record.tick)
+            elif isinstance(commit := decode_any(SupervisorRecord, traced.payload), CommitRecord):
+                written[traced.process].add(commit.commit)
         elif traced.what == "publish" and traced.channel == channels.DELIVERIES.name:
             tick = decode(Deliveries, traced.payload).tick
             if tick - 1 not in closed:

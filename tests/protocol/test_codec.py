@@ -28,8 +28,10 @@ from foosim.protocol.messages import (
     Delivered,
     Deliveries,
     Done,
+    Edit,
     End,
     Epoch,
+    Freeze,
     Hello,
     Order,
     Part,
@@ -37,6 +39,7 @@ from foosim.protocol.messages import (
     Remove,
     Request,
     Sent,
+    Thaw,
     Up,
     Want,
 )
@@ -303,9 +306,11 @@ def test_number_arrays_are_raw_little_endian_floats(numbers: list[float]) -> Non
 
 
 def test_edits_are_told_apart_by_their_tags() -> None:
-    edits: list[Add | Remove | Push] = [
+    edits: list[Edit] = [
         Add("b", "ball", (0.0, 0.0, 0.1), (1.0, -0.0, 0.0)),
         Push("ball", (0.0, 1e-300, 0.0)),
+        Freeze("red.goal"),
+        Thaw("red.goal"),
         Remove("b"),
     ]
     order = decode(Order, encode(Order(1, 2, edits)))

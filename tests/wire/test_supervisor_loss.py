@@ -1,0 +1,101 @@
+"""A real supervisor that is killed or hangs: another one goes on, and the world is the one that would have been."""
+
+from __future__ import annotations
+
+import signal
+from typing import TYPE_CHECKING, Any
+
+from foosim.protocol import channels
+from foosim.protocol.codec import encode, encode_json
+from foosim.protocol.messages import Request
+from foosim.rehearsal.rehearse import rehearse
+from foosim.supervisor.control import Control
+from foosim.supervisor.run_folder import open_run
+from foosim.vhub.capture_reader import open_capture
+from tests.wire.test_run import last_json
+
+if TYPE_CHECKING:
+    from tests.wire.conftest import House
+
+
+def is_back(control: Control, times: int) -> dict[str, Any] | None:
+    """The status, once so many supervisors have taken over."""
+    status = control.status()
+    came = sum(entry["what"] == "supervisor" for entry in status["recoveries"])
+    return status if came >= times and status["state"] != "recovering" else None
+
+
+def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: House) -> None:
+    up = house.up("--json", "--engine", "pure", players=True)
+    house.ticking(5)
+    with Control(house.info().simulation) as control:
+        house.kill("supervisor")
+        house.wait_for("the supervisor to be back", lambda: is_back(control, 1))
+        moved = control.ask("move", robot="red.goal", node="blue")
+        house.kill("supervisor", signal.SIGSTOP)
+        status = house.wait_for("another supervisor", lambda: is_back(control, 2))
+        assert "red.goal" in status["nodes"]["blue"]["owned"]
+        paused = control.ask("pause")
+        house.kill("supervisor")
+        status = house.wait_for("a third supervisor", lambda: is_back(control, 3))
+        assert status["state"] == "paused" and status["ticks"] == paused.tick
+        for answer in (moved, paused):  # the same request, the same answer, by whoever gives it
+            again = Request(answer.sender, answer.id, "status", encode_json({}))
+            control._wire.put(channels.REQUEST, answer.sender, encode(again))
+            assert control._wait(answer.id, 100.0) == answer
+        control.ask("resume")
+        house.ticking(paused.tick + 100)
+        control.ask("down")
+    code, out, err = house.end(up)
+    assert code == 0, err
+    content = last_json(out)
+    assert [entry["what"] for entry in content["recoveries"]] == 3 * ["supervisor"]
+    assert all(entry["outage_ms"] > 0 for entry in content["recoveries"])
+    assert err.count("the supervisor was started again") == 3
+    assert content["reason"] == "stopped" and content["moves"] == 1
+    assert open_capture(house.folder / content["capture"]).about.finished
+    assert house.processes_with(str(house.folder)) == {}
+    same = rehearse(house.table.read_text(), "table.yaml", content["ticks"], None, ["engine=pure"]).json
+    assert content["digest"] == same["digest"] and content["packets"] == same["packets"]
+    assert content["handovers"] == same["handovers"]
+
+
+def test_who_is_left_alone_holds_and_ends(house: House) -> None:
+    """Without a launcher nobody starts the supervisor again."""
+    run = ["--set", "players={}", "--set", "engine=pure", "--set", "deadlines={start: 100 s, orphan: 1 s}"]
+    supervisor = house.start("foosim-supervisor", "run", house.table, *run)
+    info = house.wait_for("the run file", house.live().info)
+    connect = ["--connect", info.simulation]
+    others = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
+    others.append(house.start("foosim-vhub", *connect, "--no-capture", "--run-folder", house.folder / "hub"))
+    house.ticking(5)
+    supervisor.kill()
+    for other in others:
+        code, _, err = house.end(other)
+        assert code == 1 and "lost the supervisor, and it has not come back" in err, err
+    other_file = [*run[:-1], "deadlines={start: 99 s}", "--run", info.run]
+    again = house.start("foosim-supervisor", "run", house.table, *other_file)
+    code, _, err = house.end(again)
+    assert code == 3 and f"run {info.run} was started with another deployment" in err
+
+
+def test_a_supervisor_that_is_started_again_by_hand_goes_on(house: House) -> None:
+    run = ["--set", "players={}", "--set", "engine=pure", "--for", "2 s", "--pace", "fast"]
+    first = house.start("foosim-supervisor", "run", house.table, *run)
+    info = house.wait_for("the run file", house.live().info)
+    connect = ["--connect", info.simulation]
+    others = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
+    others.append(house.start("foosim-vhub", *connect, "--no-capture", "--run-folder", house.folder / "hub"))
+    house.ticking(5)
+    first.kill()
+    again = house.start("foosim-supervisor", "run", house.table, *run, "--run", info.run)
+    code, _, err = house.end(again)
+    assert code == 0, err
+    for other in others:
+        assert house.end(other)[0] == 0
+    result = open_run(info.run).result()
+    assert result is not None and result["ticks"] == 1000
+    same = rehearse(house.table.read_text(), "table.yaml", 1000, None, ["players={}", "engine=pure"]).json
+    assert result["digest"] == same["digest"]
+    code, _, err = house.run("foosim-supervisor", "run", house.table, *run, "--run", info.run)
+    assert code == 3 and f"run {info.run} has ended" in err
