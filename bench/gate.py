@@ -39,12 +39,12 @@ def find(name: str, seeds: int) -> Found:
     text = TABLE.read_text()
     begun_s = time.process_time()
     with mutant.planted():
-        recorded = bool(fly(text, TABLE.name, mutant.seed).broken)
         for seed in range(1, seeds + 1):
             broken = fly(text, TABLE.name, seed).broken
             if broken:
+                recorded = seed == mutant.seed or bool(fly(text, TABLE.name, mutant.seed).broken)
                 return Found(name, seed, broken, recorded, time.process_time() - begun_s)
-    return Found(name, -1, "", recorded, time.process_time() - begun_s)
+    return Found(name, -1, "", False, time.process_time() - begun_s)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -120,8 +120,8 @@ class System:
         self._dying: dict[str, int] = {}
         """Processes that end amid their next actions: how many of these they still perform."""
         self._boots = 0
-        self._soonest_ns = 0
-        """No process is woken before, as far as is known without looking at each."""
+        self._soonest_ns = self._last_commit_ns = 0
+        """No process is woken before the first, as far as is known without looking at each."""
         self._clocks = {name: replace(clock) for name, clock in rehearsal.clocks.items()}
         self._behind: dict[str, Process] = {}
         """Processes with something in their inbox."""
@@ -146,7 +146,6 @@ class System:
             core = ClientCore(name, "boot", self._clock(name).at(0))
             self._enter(name, core, client(core), channels.CLIENT_READS)
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
-        self._last_commit_ns = 0
 
     def _enter(
         self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
