@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any, Final
 
-from bench import barrier, distributed, echo, hub, machine, realtime, table_one_process
+from bench import barrier, distributed, echo, hub, machine, realtime, swarm, table_one_process
 from bench.runs import BenchError
 
 
@@ -59,6 +59,7 @@ BENCHES: Final = (
     Bench("realtime", "the same in real time", with_default(realtime.realtime), realtime.lines),
     Bench("hub", "packets through the vHub's core", with_default(hub.hub), hub.lines),
     Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
+    Bench("swarm", "rehearsals under random faults, by seed", swarm.swarm, swarm.lines),
     Bench("barrier", "the messages of a tick alone", run_barrier, barrier_lines),
 )
 

@@ -16,7 +16,7 @@ from foosim.protocol import channels
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.rehearsal.system import System
 
-TICKS: Final = 240
+TICKS: Final = 230
 HEALED_TICK: Final = 200
 """From here on nothing new happens, and what is down comes up."""
 MS: Final = 1_000_000

@@ -135,10 +135,9 @@ class Prober:
             return
         if not self._joined:
             self._joined = True
-            core.join(
-                core.deployment.ticks(core.deployment.clients[PROBER].rate_hz or 1),
-                [(robot, CHANNEL_ECHO) for robot in self.ROBOTS],
-            )
+            rate_hz = core.deployment.clients[PROBER].rate_hz
+            assert rate_hz is not None
+            core.join(core.deployment.ticks(rate_hz), [(robot, CHANNEL_ECHO) for robot in self.ROBOTS])
         if core.go is not None:
             for packet in core.go.packets:
                 if packet.payload in self._back:

@@ -26,7 +26,7 @@ def _old_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch >= self.epoch and bool(before(self, channel, message, payload))
 
-    before = planting.swap(NodeCore, "_fenced", fenced)
+    before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
 @register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 0)
@@ -34,7 +34,7 @@ def _new_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch <= self.epoch and bool(before(self, channel, message, payload))
 
-    before = planting.swap(NodeCore, "_fenced", fenced)
+    before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
 @register("node goes back to an old epoch", "epochs only grow", 0)
@@ -44,7 +44,7 @@ def _epochs_fall(planting: Planting) -> None:
             self.epoch = epoch.epoch - 1
         before(self, epoch, payload, now_ns)
 
-    before = planting.swap(NodeCore, "_on_epoch", on_epoch)
+    before: Any = planting.swap(NodeCore, "_on_epoch", on_epoch)
 
 
 @register("node does not compare bases", "a node collects parts with its own basis only", 0)
@@ -80,7 +80,7 @@ def _own_frame(planting: Planting) -> None:
         if self._awaited_epoch is epoch and newest is not None and self.name in epoch.roster:
             self._resume(newest, now_ns)
 
-    before = planting.swap(NodeCore, "_on_epoch", on_epoch)
+    before: Any = planting.swap(NodeCore, "_on_epoch", on_epoch)
 
 
 @register("node keeps parts of the old epoch", "a new epoch computes its ticks from its own parts", 0)
@@ -97,7 +97,7 @@ def _old_parts(planting: Planting) -> None:
         if kept is not None:
             self.actions[-1] = type(self.actions[-1])(channels.PART, self.name, kept)
 
-    before = planting.swap(NodeCore, "_on_epoch", on_epoch)
+    before: Any = planting.swap(NodeCore, "_on_epoch", on_epoch)
     done = planting.swap(NodeCore, "solved", solved)
 
 
@@ -109,13 +109,13 @@ def _own_shares(planting: Planting) -> None:
             object.__setattr__(term.assignment, "roster", (self.name, *self.roster))
         return term
 
-    before = planting.swap(NodeCore, "_make_term", make_term)
+    before: Any = planting.swap(NodeCore, "_make_term", make_term)
 
 
 @register("noise from a running stream", "draws are keyed by tick, never taken from a running stream", 0)
 def _running_noise(planting: Planting) -> None:
     numbers = count()
-    before = planting.swap(encoder, "draw_words", lambda key, tick: before(key, next(numbers)))
+    before: Any = planting.swap(encoder, "draw_words", lambda key, tick: before(key, next(numbers)))
 
 
 @register("no quarantine", "a result that cannot be is not taken", 0)
@@ -130,7 +130,7 @@ def _twice_delivered(planting: Planting) -> None:
         self.kept_packets = list(packets)
         return before(self, kept if kept and not packets else packets, solved, numbers)
 
-    before = planting.swap(Stepper, "deliver", deliver)
+    before: Any = planting.swap(Stepper, "deliver", deliver)
 
 
 @register("solver knows who it is", "`step` knows neither node, owner nor epoch", 0)
@@ -140,7 +140,7 @@ def _knowing_step(planting: Planting) -> None:
             numbers[0] += 1e-9
         return before(self, numbers)
 
-    before = planting.swap(Assignment, "shares", shares)
+    before: Any = planting.swap(Assignment, "shares", shares)
 
 
 @register("outboxes are not emptied", "an outbox holds what is sent at the next tick, once", 0)
@@ -151,7 +151,7 @@ def _full_outbox(planting: Planting) -> None:
         self.kept_outboxes = outboxes
         return outboxes or kept
 
-    before = planting.swap(step.Stepper, "deliver", deliver)
+    before: Any = planting.swap(step.Stepper, "deliver", deliver)
 
 
 @register("ready is said once", "hello and ready are said again until they are answered", 0)
@@ -161,7 +161,7 @@ def _ready_once(planting: Planting) -> None:
         before(self, now_ns, heartbeat)
         self._said_ready = self._said_ready or said
 
-    before = planting.swap(Member, "wake", wake)
+    before: Any = planting.swap(Member, "wake", wake)
 
 
 @register("client answers a Go anew", "a Go that comes again gets the same bytes again", 0)
@@ -172,7 +172,7 @@ def _two_dones(planting: Planting) -> None:
         else:
             before(self, go)
 
-    before = planting.swap(ClientCore, "_on_go", on_go)
+    before: Any = planting.swap(ClientCore, "_on_go", on_go)
 
 
 @register("client numbers from one", "the sequence number counts per source over all channels", 0)
@@ -181,7 +181,7 @@ def _numbers_from_one(planting: Planting) -> None:
         self._sequence = 0 if self._answered == 5 else self._sequence
         return before(self, packets, stamp_ns)
 
-    before = planting.swap(ClientCore, "_numbered", numbered)
+    before: Any = planting.swap(ClientCore, "_numbered", numbered)
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

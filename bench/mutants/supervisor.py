@@ -46,7 +46,7 @@ def _old_epochs(planting: Planting) -> None:
 
 @register("supervisor does not compare bases", "a part counts if its basis is the supervisor's", 0)
 def _any_basis(planting: Planting) -> None:
-    before = planting.swap(
+    before: Any = planting.swap(
         core, "basis_of", lambda digest, edits, delivered: _AnyBasis(before(digest, edits, delivered))
     )
 
@@ -86,7 +86,7 @@ def _hasty_commit(planting: Planting) -> None:
         before(self, *given)
         _spoken_first(self.actions, first)
 
-    before = planting.swap(SupervisorCore, "_say_commit", say_commit)
+    before: Any = planting.swap(SupervisorCore, "_say_commit", say_commit)
 
 
 @register("epoch is said before it is written", "the supervisor journals epochs before it publishes", 0)
@@ -96,7 +96,7 @@ def _hasty_epoch(planting: Planting) -> None:
         before(self, *given)
         _spoken_first(self.actions, first)
 
-    before = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
 
 
 @register("requests are not journalled", "a request is journalled when its tick is chosen, then answered", 0)
@@ -108,7 +108,7 @@ def _unwritten(planting: Planting) -> None:
         actions[first:] = [action for action in actions[first:] if not isinstance(action, Journal)]
         return answer
 
-    before = planting.swap(Requests, "_accept", accept)
+    before: Any = planting.swap(Requests, "_accept", accept)
 
 
 @register("requests are done each time they come", "the same id gets the same answer", 0)
@@ -117,7 +117,7 @@ def _each_time(planting: Planting) -> None:
         self._answers.pop((request.sender, request.id), None)
         before(self, request, payload, now_ns)
 
-    before = planting.swap(Requests, "take", take)
+    before: Any = planting.swap(Requests, "take", take)
 
 
 @register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 0)
@@ -132,7 +132,7 @@ def _other_orders(planting: Planting) -> None:
             self.orders[tick] = []
         before(self, *given)
 
-    before = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
 
 
 @register("orders are not issued again", "orders from c on are issued again", 0)
@@ -142,13 +142,13 @@ def _no_orders(planting: Planting) -> None:
         before(self, *given)
         self.released = said
 
-    before = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
     planting.swap(SupervisorCore, "_on_want", lambda self, want, payload, now_ns: None)
 
 
 @register("orders run ahead", "order k is released once tick k - W is committed", 0)
 def _run_ahead(planting: Planting) -> None:
-    before = planting.swap(
+    before: Any = planting.swap(
         Pacer, "may_release", lambda self, tick, committed, now_ns: before(self, tick, committed + 3, now_ns)
     )
 
@@ -159,7 +159,7 @@ def _same_epoch(planting: Planting) -> None:
         self.epoch = max(0, self.epoch - (self.epoch % 3 == 2))
         before(self, *given)
 
-    before = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
 
 
 @register("epochs are volatile", "a restarted supervisor goes on with a greater epoch", 0)
@@ -168,7 +168,7 @@ def _volatile(planting: Planting) -> None:
         before(core, history)
         core.epoch = 0
 
-    before = planting.swap(take_over, "stand_on", stand_on)
+    before: Any = planting.swap(take_over, "stand_on", stand_on)
     planting.swap(take_over.TakeOver, "standing", _standing_without_epoch)
 
 
@@ -189,7 +189,7 @@ def _kept_robots(planting: Planting) -> None:
             self.returns.clear()
         before(self, process, now_ns)
 
-    before = planting.swap(Recovery, "join", join)
+    before: Any = planting.swap(Recovery, "join", join)
 
 
 @register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 0)
@@ -208,7 +208,7 @@ def _unstopped(planting: Planting) -> None:
         self._core.roster.stopped.discard(hello.name)
         before(self, hello, payload, now_ns)
 
-    before = planting.swap(Handshake, "hello", hello)
+    before: Any = planting.swap(Handshake, "hello", hello)
 
 
 @register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 0)
@@ -226,7 +226,7 @@ def _stale_edits(planting: Planting) -> None:
         before(history, record)
         history.edits.update(edits)
 
-    before = planting.swap(records, "_commit", commit)
+    before: Any = planting.swap(records, "_commit", commit)
 
 
 @register("the roster of the epoch is not kept", "the barrier passes with every node of the epoch", 0)
@@ -236,7 +236,7 @@ def _short_roster(planting: Planting) -> None:
         owning = {*owners.values()}
         self.members = tuple(name for name in self.members if name in owning)[: max(1, len(owning) - 1)]
 
-    before = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
 
 
 @register("a lost commit is not said again", "commits are asked for again and kept", 0)
@@ -245,7 +245,7 @@ def _lost_commit(planting: Planting) -> None:
         if want.kind != channels.COMMIT.name:
             before(self, want, payload, now_ns)
 
-    before = planting.swap(SupervisorCore, "_on_want", on_want)
+    before: Any = planting.swap(SupervisorCore, "_on_want", on_want)
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

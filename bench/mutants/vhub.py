@@ -29,7 +29,7 @@ def _hasty(planting: Planting) -> None:
         self.actions[first:] = reversed(self.actions[first:])
         return closed
 
-    before = planting.swap(HubCore, "_close_clients", close_clients)
+    before: Any = planting.swap(HubCore, "_close_clients", close_clients)
 
 
 @register("vHub does not ask again", "who has had no progress asks again (vHub)", 0)
@@ -52,7 +52,7 @@ def _not_final(planting: Planting) -> None:
         else:
             before(self, want, payload, now_ns)
 
-    before = planting.swap(HubCore, "_on_want", on_want)
+    before: Any = planting.swap(HubCore, "_on_want", on_want)
 
 
 @register("samples of any frame", "samples with that D(k) of every robot in frame k", 0)
@@ -61,7 +61,7 @@ def _any_frame(planting: Planting) -> None:
         told = list(samples)
         return before(told, told[0].digest if told else digest, frame, sampling)
 
-    before = planting.swap(core, "world_packets", world_packets)
+    before: Any = planting.swap(core, "world_packets", world_packets)
 
 
 @register("samples of some robots", "closing waits for the samples of every robot", 0)
@@ -71,7 +71,7 @@ def _some_robots(planting: Planting) -> None:
         packets = before(told, digest, frame, sampling)
         return [packet for one in told for packet in one.packets] if packets is None and told else packets
 
-    before = planting.swap(core, "world_packets", world_packets)
+    before: Any = planting.swap(core, "world_packets", world_packets)
 
 
 @register("early commits are forgotten", "what comes before its turn waits for it", 0)
@@ -81,7 +81,7 @@ def _no_early(planting: Planting) -> None:
         self._early.clear()
         return taken
 
-    before = planting.swap(Commits, "take", take)
+    before: Any = planting.swap(Commits, "take", take)
 
 
 @register("account leaks", "offered = delivered + dropped + in flight", 0)
@@ -91,7 +91,7 @@ def _leak(planting: Planting) -> None:
         self.packets.delivered -= len(released) > 1
         return released
 
-    before = planting.swap(HubState, "_arrive_at_clients", arrive)
+    before: Any = planting.swap(HubState, "_arrive_at_clients", arrive)
 
 
 @register("packets stay in flight", "each packet has one fate", 0)
@@ -102,7 +102,7 @@ def _stay(planting: Planting) -> None:
             self._flights.setdefault(tick + 1, []).append(taken[0])
         return taken
 
-    before = planting.swap(HubState, "_take_arrivals", take_arrivals)
+    before: Any = planting.swap(HubState, "_take_arrivals", take_arrivals)
 
 
 @register("deliveries out of order", "deliveries are in (due, source, sequence, copy) order", 0)
@@ -119,7 +119,7 @@ def _early(planting: Planting) -> None:
             later.remove(flight)
             self._flights.setdefault(tick + 1, []).append(flight)
 
-    before = planting.swap(HubState, "_send", send)
+    before: Any = planting.swap(HubState, "_send", send)
 
 
 @register("robots' numbers repeat", "a robot's sequence number is tick x 2^16 + index", 0)
@@ -129,7 +129,7 @@ def _numbers(planting: Planting) -> None:
 
 @register("final too far ahead", "deliveries of ticks ahead are final only where nothing can reach robots", 0)
 def _too_final(planting: Planting) -> None:
-    before = planting.swap(HubState, "_following", lambda self, tick: before(self, tick) + 1)
+    before: Any = planting.swap(HubState, "_following", lambda self, tick: before(self, tick) + 1)
 
 
 @register("Go is said once", "Go is repeated until it is answered", 0)
@@ -158,7 +158,7 @@ def _same_number(planting: Planting) -> None:
     def say_go(self: Any, session: Any, number: int, *given: Any) -> None:
         before(self, session, number - number % 2, *given)
 
-    before = planting.swap(Sessions, "say_go", say_go)
+    before: Any = planting.swap(Sessions, "say_go", say_go)
 
 
 @register("fold forgets downlinks", "a fold of the journal gives the state again", 0)
@@ -168,7 +168,7 @@ def _fold(planting: Planting) -> None:
 
 @register("what clients sent is not written", "the record holds the admitted bytes", 0)
 def _unwritten(planting: Planting) -> None:
-    before = planting.swap(
+    before: Any = planting.swap(
         core,
         "tick_record",
         lambda closing, commit, samples, admitted, state, deliveries: before(
