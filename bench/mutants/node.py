@@ -164,6 +164,17 @@ def _ready_once(planting: Planting) -> None:
     before: Any = planting.swap(Member, "wake", wake)
 
 
+@register("lost node does not say ready again", "an epoch without a node is no answer to its ready", 30)
+def _answered_by_another(planting: Planting) -> None:
+    def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
+        is_present = epoch.epoch == self.epoch
+        before(self, epoch, payload, now_ns)
+        if is_present:
+            self.member.entered()
+
+    before = planting.swap(NodeCore, "_on_epoch", on_epoch)
+
+
 @register("client answers a Go anew", "a Go that comes again gets the same bytes again", 0)
 def _two_dones(planting: Planting) -> None:
     def on_go(self: Any, go: Any) -> None:
