@@ -21,7 +21,7 @@ from foosim.vhub.state import HubState
 register = Register()
 
 
-@register("vHub speaks before it writes", "the vHub writes one record per tick before it publishes", 0)
+@register("vHub speaks before it writes", "the vHub writes one record per tick before it publishes", 1)
 def _hasty(planting: Planting) -> None:
     def close_clients(self: Any, now_ns: int) -> bool:
         first = len(self.actions)
@@ -32,17 +32,17 @@ def _hasty(planting: Planting) -> None:
     before: Any = planting.swap(HubCore, "_close_clients", close_clients)
 
 
-@register("vHub does not ask again", "who has had no progress asks again (vHub)", 0)
+@register("vHub does not ask again", "who has had no progress asks again (vHub)", 2)
 def _patient(planting: Planting) -> None:
     planting.swap(HubCore, "_ask_again", lambda self, now_ns: self._patience.asked(now_ns))
 
 
-@register("vHub does not answer who asks", "supervisor and vHub keep the last 16 ticks", 0)
+@register("vHub does not answer who asks", "supervisor and vHub keep the last 16 ticks", 1)
 def _mute(planting: Planting) -> None:
     planting.swap(HubCore, "_on_want", lambda self, want, payload, now_ns: None)
 
 
-@register("deliveries are said otherwise again", "deliveries are final when published", 0)
+@register("deliveries are said otherwise again", "deliveries are final when published", 1)
 def _not_final(planting: Planting) -> None:
     def on_want(self: Any, want: Any, payload: bytes, now_ns: int) -> None:
         packets = self.state.deliveries.get(want.tick)
