@@ -135,7 +135,6 @@ class Link:
 
         self.core: Final = core
         self.locator: Final = session.locator
-        self.is_lost = False
         self.closed = False
         self._session = session
         self._inbox = Inbox(limits.INBOX_MESSAGES_MAX)
@@ -156,7 +155,11 @@ class Link:
         self._loop.perform()
 
     def wait(self, reached: Callable[[], bool], timeout_s: float | None) -> None:
-        """Go round until something is reached or the time is over. Raises ConnectionFailed when the vHub is lost."""
+        """Go round until something is reached or the time is over.
+
+        A vHub that is gone is waited for; raises ConnectionFailed when it does not come back, ConnectionRefused when it
+        comes back with another run.
+        """
         if self.closed:
             raise NotJoined("the client is closed")
         self._until_ns = NEVER_NS
@@ -167,7 +170,9 @@ class Link:
             self._loop.go_round()
             if reached():
                 return
-            if self.is_lost:
+            if self.core.refusal and self.core.deployment is not None:
+                raise ConnectionRefused(f"{self.core.name} at {self.locator}: {self.core.refusal}")
+            if self.core.lost:
                 raise ConnectionFailed(f"lost the vHub at {self.locator}")
             if time.monotonic_ns() >= self._until_ns:
                 return
@@ -179,7 +184,7 @@ class Link:
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         if name == VHUB:
-            self.is_lost = not is_alive
+            (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
 
 
 class Client:

@@ -1,8 +1,9 @@
 """The core of a client: takes messages and the time, and keeps its side of the talk with the vHub.
 
-Hello until it is answered, Join until the first downlink. In lockstep `go` is the Go that waits for an answer, and
+Hello until it is answered, Join until the vHub is heard. In lockstep `go` is the Go that waits for an answer, and
 `done` answers it: stop and wait, so that a Go that comes again gets the same bytes again. A free-running client takes
-`arrivals` and sends when it likes. Downlinks are numbered: repeats are dropped, gaps counted.
+`arrivals` and sends when it likes; what it sent is kept until the vHub has recorded it. Downlinks are numbered: repeats
+are dropped, gaps counted. When the vHub is gone (`hub_gone`) all starts again with hello, and goes on where it was.
 Neighbours: `player` and `client` drive it; `vhub.sessions` is the other side.
 """
 
@@ -28,6 +29,7 @@ from foosim.protocol.messages import (
     Done,
     Down,
     Go,
+    Heard,
     Join,
     Received,
     Sent,
@@ -38,6 +40,8 @@ from foosim.protocol.names import CHANNEL_ECHO
 
 AGAIN_NS: Final = 200_000_000
 """After how long hello is said again; a Join's wait doubles from there, up to a second."""
+AWAY_AGAIN_NS: Final = 50_000_000
+"""The same while the vHub is gone: the run waits for who comes back."""
 NEVER_NS: Final = limits.COUNTER_MAX
 GAPS_KEPT: Final = 1024
 """How many numbers of missing downlinks are remembered, so that a late one is told from a repeat."""
@@ -66,6 +70,10 @@ class ClientStatistics:
     received: int
     sent: int
     answered: int
+    unsent: int = 0
+    """Packets that were not sent, since too many wait to be recorded."""
+    returns: int = 0
+    """How often it went on after the vHub was gone."""
 
 
 class ClientCore:
@@ -85,11 +93,20 @@ class ClientCore:
         self.tick = -1
         """The newest tick that the vHub has named."""
         self.ended = False
+        self.is_away = False
+        """Whether the vHub is gone, and has not let the client in again."""
+        self.lost = False
+        """Whether it was gone for longer than a run waits for it."""
         self._world = world
         self._now_ns = now_ns
         self._again_ns = now_ns
         self._again_after_ns = AGAIN_NS
         self._join = b""
+        self._is_heard = False
+        """Whether anything was heard since the Join was said."""
+        self._lost_ns = NEVER_NS
+        self._unrecorded: deque[Sent] = deque()
+        self._resend_ns = NEVER_NS
         self._period = 0
         self._sequence = 0
         self._downlink = 0
@@ -97,12 +114,13 @@ class ClientCore:
         self._done = b""
         self._done_number = -1
         self._downlinks = self._repeated = self._missing = self._malformed = self._overflowed = 0
-        self._received = self._sent = self._answered = 0
+        self._received = self._sent = self._answered = self._unsent = self._returns = 0
         self._readers: dict[type[Any], Callable[[Any], None]] = {
             ClientWelcome: self._on_welcome,
             ClientRefusal: self._on_refusal,
             Go: self._on_go,
             Down: self._on_down,
+            Heard: self._on_heard,
         }
 
     # --- what the shell calls --------------------------------------------------------------------------------------
@@ -126,20 +144,42 @@ class ClientCore:
     def wake(self, now_ns: int) -> None:
         """Say again what has not been answered, when it is due."""
         self._now_ns = max(self._now_ns, now_ns)
-        if now_ns < self.deadline_ns():
-            return
-        if self.welcome is None:
-            hello = ClientHello(self.name, self.boot, limits.PROTOCOL_VERSION, self._world, self._downlink)
-            self.actions.append(Publish(channels.CLIENT_HELLO, self.name, encode(hello)))
-        else:
-            self._publish(self._join)
-            self._again_after_ns = min(2 * self._again_after_ns, limits.WANT_EVERY_NS_MAX)
-        self._again_ns = now_ns + self._again_after_ns
+        if now_ns >= self._lost_ns:
+            self.lost, self._lost_ns = True, NEVER_NS
+        if now_ns >= self._hello_ns:
+            if self.welcome is None or self.is_away:
+                self._say_hello()
+            else:
+                self._publish(self._join)
+                self._again_after_ns = min(2 * self._again_after_ns, limits.WANT_EVERY_NS_MAX)
+            self._again_ns = now_ns + self._again_after_ns
+        if now_ns >= self._resend_ns:
+            self._resend(whole=False)
+
+    @property
+    def _hello_ns(self) -> int:
+        """When hello or Join is said next."""
+        waits = self.welcome is None or self.is_away or (self._join and not self._is_heard)
+        return self._again_ns if waits and not self.refusal and not self.ended else NEVER_NS
 
     def deadline_ns(self) -> int:
         """When `wake` has something to do next."""
-        waits = self.welcome is None or (self._join and self._downlinks == 0)
-        return self._again_ns if waits and not self.refusal and not self.ended else NEVER_NS
+        return min(self._hello_ns, self._lost_ns, self._resend_ns)
+
+    def hub_gone(self, now_ns: int) -> None:
+        """The vHub's presence has ended: say hello until it is back. What is sent meanwhile is kept."""
+        if self.deployment is None or self.is_away or self.ended:
+            return
+        self.is_away = True
+        self._lost_ns = now_ns + self.deployment.deadlines.vhub_back_ns
+        self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
+        self._resend_ns = NEVER_NS
+        self.actions.append(Say("warning", "the vHub is gone; waits for it to come back"))
+
+    def hub_here(self, now_ns: int) -> None:
+        """A vHub is present."""
+        if self.is_away:
+            self._again_ns = now_ns
 
     def statistics(self) -> ClientStatistics:
         return ClientStatistics(
@@ -151,6 +191,8 @@ class ClientCore:
             self._received,
             self._sent,
             self._answered,
+            self._unsent,
+            self._returns,
         )
 
     # --- what the client does --------------------------------------------------------------------------------------
@@ -168,7 +210,9 @@ class ClientCore:
         items = [Subscription(robot, channel) for robot, channel in wanted]
         self._join = encode(Join(self.name, self.boot, period_ticks, items))
         self._period = period_ticks
-        self._publish(self._join)
+        self._is_heard = False
+        if not self.is_away:
+            self._publish(self._join)
         self._again_after_ns = AGAIN_NS
         self._again_ns = self._now_ns + AGAIN_NS
 
@@ -187,18 +231,37 @@ class ClientCore:
         self._publish(payload)
 
     def send(self, packets: Sequence[Outgoing], stamp_ns: int = 0) -> None:
-        """Send packets, free-running; `stamp_ns` is the client's own clock. Raises UnknownName or PacketError."""
+        """Send packets, free-running; `stamp_ns` is the client's own clock. Raises UnknownName or PacketError.
+
+        Where more than `UPLINKS_KEPT_MAX` would wait to be recorded, they are not sent, and counted.
+        """
         assert self.welcome is not None, "send before a welcome"
         sent = self._numbered(packets, stamp_ns)
+        if len(self._unrecorded) + len(sent) > limits.UPLINKS_KEPT_MAX:
+            if not self._unsent:
+                self.actions.append(
+                    Say("warning", f"{len(self._unrecorded)} packets wait for the vHub: no more is sent")
+                )
+            self._unsent += len(sent)
+            return
         self._count_sent(sent)
+        if not self._unrecorded:
+            self._resend_ns = self._now_ns + limits.WANT_EVERY_NS_MAX
+        self._unrecorded.extend(sent)
+        if self.is_away:
+            self._resend_ns = NEVER_NS
+            return
         for part in _split(sent, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part)))
 
     # --- messages --------------------------------------------------------------------------------------------------
 
     def _on_welcome(self, welcome: ClientWelcome) -> None:
-        if not self._is_for_me(welcome) or self.welcome is not None or self.refusal:
+        if not self._is_for_me(welcome) or self.refusal or (self.welcome is not None and not self.is_away):
             self._repeated += 1
+            return
+        if self.welcome is not None:
+            self._return(welcome, self.welcome)
             return
         try:
             deployment = load_deployment(welcome.deployment, welcome.deployment_name)
@@ -210,8 +273,25 @@ class ClientCore:
         self._sequence = welcome.sequence
         self._downlink = welcome.downlink
 
+    def _return(self, welcome: ClientWelcome, before: ClientWelcome) -> None:
+        """Go on with a vHub that is back: join as before, and send what it has not recorded."""
+        if welcome.run != before.run:
+            self._refused(f"the vHub is back with run {welcome.run}, this client was in {before.run}")
+            return
+        self.welcome = welcome
+        self.is_away = False
+        self._lost_ns = NEVER_NS
+        self._returns += 1
+        if self._join:
+            self._is_heard = False
+            self._publish(self._join)
+            self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
+        self._recorded(welcome.sequence)
+        self._resend(whole=True)
+        self.actions.append(Say("info", "the vHub is back"))
+
     def _on_refusal(self, refusal: ClientRefusal) -> None:
-        if not self._is_for_me(refusal) or self.welcome is not None or self.refusal:
+        if not self._is_for_me(refusal) or (self.welcome is not None and not self.is_away) or self.refusal:
             self._repeated += 1
             return
         self._refused(refusal.reason)
@@ -225,7 +305,12 @@ class ClientCore:
             raise Malformed(f"a message on the key of {self.name} that names {message.name}")
         return message.boot == self.boot
 
+    def _on_heard(self, heard: Heard) -> None:
+        self._is_heard = True
+        self._recorded(heard.acknowledged)
+
     def _on_go(self, go: Go) -> None:
+        self._is_heard = True
         if go.number == self._done_number:
             self._repeated += 1
             self._publish(self._done)
@@ -243,6 +328,8 @@ class ClientCore:
         self._received += len(go.packets)
 
     def _on_down(self, down: Down) -> None:
+        self._is_heard = True
+        self._recorded(down.acknowledged)
         if not self._is_new(down):
             return
         self._take_number(down.number)
@@ -304,6 +391,30 @@ class ClientCore:
         if size > limits.PAYLOAD_BYTES_MAX:
             raise PacketError(f"{size} bytes in one packet, at most {limits.PAYLOAD_BYTES_MAX} are allowed")
 
+    def _recorded(self, sequence: int) -> None:
+        """Forget what the vHub has recorded."""
+        kept = self._unrecorded
+        if kept and kept[0].sequence <= sequence:
+            self._resend_ns = self._now_ns + limits.WANT_EVERY_NS_MAX
+            while kept and kept[0].sequence <= sequence:
+                kept.popleft()
+        if not kept:
+            self._resend_ns = NEVER_NS
+
+    def _resend(self, whole: bool) -> None:
+        """Send again what is not recorded: all of it, or the first message's worth."""
+        for part in _split(self._unrecorded, channels.UP.bytes_max):
+            self._publish(encode(Up(self.name, self.boot, part)))
+            if not whole:
+                break
+        self._resend_ns = self._now_ns + limits.WANT_EVERY_NS_MAX if self._unrecorded else NEVER_NS
+
+    def _say_hello(self) -> None:
+        received = min(self._gaps, default=self._downlink + 1) - 1
+        again = self.welcome is not None
+        hello = ClientHello(self.name, self.boot, limits.PROTOCOL_VERSION, self._world, received, again)
+        self.actions.append(Publish(channels.CLIENT_HELLO, self.name, encode(hello)))
+
     def _count_sent(self, sent: Sequence[Sent]) -> None:
         self._sequence += len(sent)
         self._sent += len(sent)
@@ -321,7 +432,7 @@ def check_subscription(deployment: Deployment, robot: str, channel: str) -> None
         raise UnknownName(f"{robot} has no such channel to hear", channel, heard)
 
 
-def _split(sent: Sequence[Sent], bytes_max: int) -> Iterator[list[Sent]]:
+def _split(sent: Iterable[Sent], bytes_max: int) -> Iterator[list[Sent]]:
     """Yield the packets in as many messages as their sizes need."""
     part: list[Sent] = []
     size = 0

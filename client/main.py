@@ -28,7 +28,7 @@ CONNECT_S = 60.0
 
 
 class PlayerProcess:
-    """One player on one session, until the run ends, the vHub is gone, or `stop`."""
+    """One player on one session, until the run ends, the vHub is gone for good, or `stop`."""
 
     def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
         self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
@@ -47,6 +47,8 @@ class PlayerProcess:
     def run(self) -> int:
         """Take part until the end; return the exit code."""
         self._loop.run(self._is_over)
+        if self.core.lost:
+            self.core.actions.append(Say("error", "lost the vHub"))
         self._loop.perform()
         if self.core.refusal:
             return REFUSED
@@ -58,7 +60,7 @@ class PlayerProcess:
         self._inbox.wake()
 
     def _is_over(self) -> bool:
-        return self.stopped or self.core.ended or bool(self.core.refusal)
+        return self.stopped or self.core.ended or self.core.lost or bool(self.core.refusal)
 
     def _turn(self, now_ns: int) -> None:
         if self.core.deployment is not None and not self._is_present:
@@ -70,9 +72,8 @@ class PlayerProcess:
         return min(self.core.deadline_ns(), self._player.deadline_ns())
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
-        if not is_alive and name == VHUB and not self.core.ended:
-            self.core.actions.append(Say("error", "lost the vHub"))
-            self.stop()
+        if name == VHUB:
+            (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
 
 
 def run_player(name: str, connect: str, world: str = "") -> int:

@@ -130,13 +130,13 @@ class PlayerLoop:
         elif self._period_ns:
             self.newest.take(core.arrivals)
             core.arrivals.clear()
-            if now_ns >= self._beat_ns:
+            if now_ns >= self._beat_ns and not core.is_away:
                 core.send(self._act(max(core.tick, 0)), now_ns)
                 self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
 
     def deadline_ns(self) -> int:
         """When a free-running player acts next."""
-        return NEVER_NS if self.core.ended else self._beat_ns
+        return NEVER_NS if self.core.ended or self.core.is_away else self._beat_ns
 
     def _begin(self, deployment: Deployment, now_ns: int) -> None:
         name = self.core.name

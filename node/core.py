@@ -39,7 +39,6 @@ from foosim.protocol.messages import (
     Outbox,
     Part,
     Prepare,
-    Recall,
     Samples,
     Want,
 )
@@ -108,7 +107,7 @@ class NodeCore:
             channels.EPOCH.name: self._on_epoch,
             channels.COMMIT.name: self._on_commit,
             channels.WANT.name: self._on_want,
-            channels.RECALL.name: self._on_recall,
+            channels.RECALL.name: self.member.recall,
             channels.BUILD.name: self._on_build,
             channels.PREPARE.name: self._on_prepare,
             channels.END.name: self._on_end,
@@ -332,7 +331,7 @@ class NodeCore:
             self._repeated += 1
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
-        own_tick = 0 if self.frame is None else self.frame.tick
+        own_tick = self.member.first_tick if self.frame is None else self.frame.tick
         if not self._inputs.take_deliveries(deliveries, payload, own_tick):
             self._repeated += 1
 
@@ -393,9 +392,6 @@ class NodeCore:
         self.deployment, layout = self.member.deployment, self.member.layout
         assert layout is not None
         self.member.want_layout(layout)
-
-    def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
-        self._repeated += not self.member.recall(recall)
 
     def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
         if self.deployment is not None:

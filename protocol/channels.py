@@ -85,7 +85,7 @@ CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
 CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
 UP: Final = _radio("up", messages.Join | messages.Up | messages.Done, "client", "vhub", "the client's rate")
-DOWN: Final = _radio("down", messages.Go | messages.Down, "vhub", "the named one", "the client's rate")
+DOWN: Final = _radio("down", messages.Go | messages.Down | messages.Heard, "vhub", "the named one", "the client's rate")
 
 CHANNELS: Final[tuple[Channel, ...]] = (
     HELLO,

@@ -179,6 +179,8 @@ class Deadlines(Part):
     start_ns: Deadline = _default("60 s", "start")
     orphan_ns: Deadline = _default("30 s", "orphan")
     """Nodes and vHub end when their supervisor has been gone for so long."""
+    vhub_back_ns: Deadline = _default("30 s", "vhub_back")
+    client_back_ns: Deadline = _default("2 s", "client_back")
 
 
 def _int_only(value: object) -> object:

@@ -140,6 +140,29 @@ def _checksum(payload: bytes) -> int:
     return crc32(payload, crc32(_LENGTH.pack(len(payload))))
 
 
+def lock_journal(folder: Path, stem: str) -> int:
+    """Take the lock of a journal, held until it is closed; the kernel frees it when the process ends.
+
+    Raises JournalError when another process has it.
+    """
+    path = folder / f"{stem}.lock"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise JournalError(f"{path}: cannot be opened, {error.strerror}") from None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        holder = os.pread(lock, 20, 0).decode(errors="replace").strip()
+        os.close(lock)
+        raise JournalError(f"{path}: the journal is being written by another process ({holder})") from None
+    except OSError as error:
+        os.close(lock)
+        raise JournalError(f"{path}: cannot be locked, {error.strerror}") from None
+    return lock
+
+
 class Journal:
     """The one writer of a journal: files `STEM-000001.journal`, ... in `folder`; a new one at every opening.
 
@@ -243,24 +266,14 @@ class Journal:
     # --- files -------------------------------------------------------------------------------------------------------
 
     def _lock(self) -> int:
-        """Take the lock that is held as long as the journal is open; the kernel frees it when the process ends."""
-        path = self.folder / f"{self.stem}.lock"
+        """Take the lock that is held as long as the journal is open, and note in it who has it."""
+        lock = lock_journal(self.folder, self.stem)
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        except OSError as error:
-            raise JournalError(f"{path}: cannot be opened, {error.strerror}") from None
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            holder = os.pread(lock, 20, 0).decode(errors="replace").strip()
-            os.close(lock)
-            raise JournalError(f"{path}: the journal is being written by another process ({holder})") from None
+            os.ftruncate(lock, 0)
+            os.pwrite(lock, f"pid {os.getpid()}\n".encode(), 0)
         except OSError as error:
             os.close(lock)
-            raise JournalError(f"{path}: cannot be locked, {error.strerror}") from None
-        os.ftruncate(lock, 0)
-        os.pwrite(lock, f"pid {os.getpid()}\n".encode(), 0)
+            raise JournalError(f"{self.folder / self.stem}.lock: cannot be written, {error.strerror}") from None
         return lock
 
     def _begin_file(self) -> None:

@@ -41,6 +41,12 @@ WANT_AFTER_NS: Final = 20_000_000
 WANT_EVERY_NS_MAX: Final = 1_000_000_000
 HEARTBEAT_NS: Final = 100_000_000
 DOWNLINK_KEPT_NS: Final = 2_000_000_000
+DOWNLINKS_KEPT_MAX: Final = 16_384
+"""How many numbered downlinks are kept for one client."""
+UPLINKS_KEPT_MAX: Final = 65_536
+"""How many packets a client keeps that the vHub has not recorded yet."""
+CHECKPOINT_TICKS: Final = 500
+"""How often the vHub's state goes to its journal: a fold begins at the last one."""
 LAG_ANCHOR_NS: Final = 100_000_000
 """A lag above this moves the wall anchor; less is caught up."""
 JOURNAL_BYTES_MAX: Final = 64 * 1024 * 1024

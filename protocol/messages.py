@@ -247,6 +247,16 @@ class Recall(Message, frozen=True):
     boot: Name
 
 
+class Origin(Item, frozen=True):
+    """Where a run begins that does not begin anew: at frame `tick` of `source`, with that frame's digest and the chain
+    over all frames up to it."""
+
+    tick: Counter
+    source: Text
+    digest: Digest
+    chain: Digest
+
+
 class Build(Message, frozen=True):
     """Everything that a process needs to build the world: one address was all that it had to know.
 
@@ -261,6 +271,7 @@ class Build(Message, frozen=True):
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     pace: Name
     added: Added
+    origin: Origin | None = None
 
 
 class Refusal(Message, frozen=True, tag="refusal"):
@@ -368,17 +379,24 @@ class Subscription(Item, frozen=True):
 
 
 class ClientHello(Message, frozen=True, tag="clienthello"):
-    """A client asks to be let in. `received` is the last downlink number it has."""
+    """A client asks to be let in. `received` is the last downlink number it has.
+
+    `again`: it had been let in before, has lost the vHub, and goes on with its own numbers.
+    """
 
     name: Name
     boot: Name
     version: Counter
     world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     received: Counter
+    again: bool = False
 
 
 class ClientWelcome(Message, frozen=True):
-    """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1."""
+    """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1.
+
+    Everything up to `sequence` is recorded, nothing behind it is: who comes back sends that again.
+    """
 
     name: Name
     boot: Name
@@ -387,6 +405,7 @@ class ClientWelcome(Message, frozen=True):
     downlink: Counter
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
+    run: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
 
 
 class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
@@ -420,7 +439,7 @@ class Join(Message, frozen=True):
 
 
 class Up(Message, frozen=True):
-    """Packets of a free-running client."""
+    """Packets of a free-running client, numbered one after the other; the vHub takes none behind a gap."""
 
     name: Name
     boot: Name
@@ -465,3 +484,12 @@ class Down(Message, frozen=True):
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     ended: bool
+
+
+class Heard(Message, frozen=True):
+    """The vHub has recorded what a free-running client sent up to the number `acknowledged`.
+
+    Downlinks say the same; this is for a client that gets none.
+    """
+
+    acknowledged: Counter

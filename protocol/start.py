@@ -1,15 +1,22 @@
-"""The world at tick 0 and the state of an entity that is added: pure functions of the deployment.
+"""What a run begins with: the world at tick 0, or a frame of another run; and the state of an entity that is added.
 
-Neighbours: `layout` has the slots; the rules of the table (`node.rules`) take it from there.
+Tick 0 and additions are pure functions of the deployment. A run that begins with a frame of another one keeps that
+frame's tick and the chain up to it, so that equal inputs give equal digests. Neighbours: `layout` has the slots; the
+rules of the table (`node.rules`) take it from there.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+import msgspec
 import numpy as np
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame
+from foosim.protocol.errors import BadValue, Malformed
+from foosim.protocol.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.protocol.layout import Entity, Layout, build_layout
+from foosim.protocol.messages import Added, AddedEntity, Numbers, Origin, Outboxes
 
 
 def place_ball(
@@ -52,3 +59,50 @@ def initial_frame(deployment: Deployment) -> Frame:
     """Return frame 0."""
     layout = build_layout(deployment)
     return Frame(0, layout, np.array(initial_numbers(deployment, layout)))
+
+
+class Start(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A frame that a run begins with instead of frame 0, and where it comes from.
+
+    `added` are the entities of its layout beside the deployment's. The frame says all: positions and speeds, score, the
+    memory of rules, actuators and sensors, outboxes.
+    """
+
+    origin: Origin
+    values: Numbers
+    outboxes: Outboxes
+    added: Added
+
+
+def start_with(frame: Frame, source: str, chain: bytes, added: Iterable[AddedEntity]) -> Start:
+    """Return the start with a frame of `source`; `chain` is over all frames up to it."""
+    origin = Origin(frame.tick, source, frame.digest, chain)
+    return Start(origin, frame.values.tobytes(), frame.outbox_items, list(added))
+
+
+def first_frame(deployment: Deployment, start: Start | None) -> Frame:
+    """Return the frame that a run begins with.
+
+    Raises BadValue for a start whose frame does not fit the deployment.
+    """
+    if start is None:
+        return initial_frame(deployment)
+    try:
+        layout = build_layout(deployment, [(entity.name, entity.model) for entity in start.added])
+        frame = frame_from_bytes(start.origin.tick, layout, start.values, start.outboxes)
+    except Malformed as error:
+        raise BadValue(f"the frame to begin with does not fit the deployment: {error}", start.origin.source) from None
+    if frame.digest != start.origin.digest:
+        raise BadValue("the frame to begin with has another digest in this deployment's layout", start.origin.source)
+    return frame
+
+
+def added_to(deployment: Deployment, layout: Layout) -> list[AddedEntity]:
+    """Return the entities of a layout beside the deployment's."""
+    base = build_layout(deployment)
+    return [AddedEntity(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
+
+
+def first_chain(origin: Origin | None) -> bytes:
+    """Return the chain over the frames up to the one that a run begins with."""
+    return CHAIN_START if origin is None else origin.chain

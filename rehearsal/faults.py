@@ -14,6 +14,7 @@ from typing import Final, TypeVar
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
+from foosim.rehearsal.hub_journal import Ending
 from foosim.rehearsal.system import System
 
 TICKS: Final = 230
@@ -253,7 +254,7 @@ def _when_answered(system: System, asked: Sequence[str], do: Callable[[System], 
         system.later(ASK_AGAIN_NS, partial(_when_answered, system, asked, do))
 
 
-# --- the supervisor --------------------------------------------------------------------------------------------------
+# --- supervisor and vHub --------------------------------------------------------------------------------------------------
 
 
 def _supervisor(dice: Dice, names: Sequence[str]) -> Fault:
@@ -276,6 +277,13 @@ def _revive_supervisor(system: System, down_ms: int) -> None:
         system.start(channels.SUPERVISOR)
 
 
+def _hub(dice: Dice, names: Sequence[str]) -> Fault:
+    endings: tuple[Ending, ...] = ("now", "torn", "unsaid")
+    ending, back_ms = dice.one_of(endings), dice.one_of((1, 50, 300, 600))
+    what = f"the vHub ends, {ending}, for {back_ms} ms"
+    return Fault(_tick(dice), "vhub", what, lambda system: system.kill_hub(ending, back_ms * MS))
+
+
 FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "kill": _kill,
     "pause": _pause,
@@ -286,6 +294,7 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "slow": _slow,
     "push": _push,
     "supervisor": _supervisor,
+    "vhub": _hub,
     "flip": _flip,
     "clog": _clog,
     "clock": _clock,

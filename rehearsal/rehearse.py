@@ -17,10 +17,12 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Epoch
+from foosim.protocol.start import Start
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import result
+from foosim.vhub.capture_file import origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.records import Closing
 
@@ -62,11 +64,14 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     pace: Pace | None = None,
     prepare: Callable[[System], None] | None = None,
     capture: Path | None = None,
+    start: Start | None = None,
 ) -> Rehearsed:
     """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on those that it declares).
 
-    `prepare` is called with the built system before it runs: a test's or notebook's place to ask for things at ticks.
-    Raises DeploymentError for a bad text, CaptureError when `capture` exists or cannot be written.
+    `start` is a frame of another run to begin with (`vhub.branching.read_branch`). `prepare` is called with the built
+    system before it runs: a test's or notebook's place to ask for things at ticks.
+    Raises DeploymentError for a bad text, CaptureError when `capture` exists or cannot be written,
+    BadValue for a `start` that does not fit.
     """
     text = apply_sets(text, name, sets) if nodes is None else with_nodes(text, name, nodes, sets)
     settings = settings or Settings()
@@ -80,8 +85,9 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
 
     settings.on_commit = committed
     pace = pace or Pace("fast")
-    writer = None if capture is None else _open_capture(capture, text, name, settings, pace)
-    system = System(RunSettings(settings.run, name, text, pace, ticks), settings)
+    run = RunSettings(settings.run, name, text, pace, ticks, start)
+    writer = None if capture is None else _open_capture(capture, text, name, settings, run)
+    system = System(run, settings)
     if prepare is not None:
         prepare(system)
     begun_ns = time.perf_counter_ns()
@@ -93,15 +99,17 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
             writer.finish()
     wall_ns = time.perf_counter_ns() - begun_ns
     rehearsed.json = result(system.supervisor)
-    rehearsed.json["rtf"] = round(rehearsed.json["ticks"] * rehearsed.json["tick_ns"] / wall_ns, 3)
+    simulated = rehearsed.json["ticks"] - rehearsed.json["first_tick"]
+    rehearsed.json["rtf"] = round(simulated * rehearsed.json["tick_ns"] / wall_ns, 3)
     rehearsed.json["capture"] = None if capture is None else str(capture)
     rehearsed.answers = system.answers
     return rehearsed
 
 
-def _open_capture(path: Path, text: str, name: str, settings: Settings, pace: Pace) -> CaptureWriter:
+def _open_capture(path: Path, text: str, name: str, settings: Settings, run: RunSettings) -> CaptureWriter:
     """Open a capture that gets all closings and log lines of a rehearsal."""
-    metadata = {"run": settings.run, "pace": str(pace), "fingerprint": library_fingerprint().hex()}
+    metadata = {"run": run.run, "pace": str(run.pace), "fingerprint": library_fingerprint().hex()}
+    metadata |= origin_metadata(run.origin)
     writer = CaptureWriter(path, load_deployment(text, name), name, text, metadata)
     on_closing, on_epoch, on_say = settings.on_closing, settings.on_epoch, settings.on_say
     tick = 0

@@ -18,8 +18,19 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame, layout_after
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import AddedEntity, Build, Delivered, Deliveries, Edit, Epoch, Order, Prepare, RobotPacket
-from foosim.protocol.start import initial_frame
+from foosim.protocol.messages import (
+    AddedEntity,
+    Build,
+    Commit,
+    Delivered,
+    Deliveries,
+    Edit,
+    Epoch,
+    Order,
+    Prepare,
+    RobotPacket,
+)
+from foosim.protocol.start import Start, first_frame
 from foosim.rehearsal.bus import Bus
 
 EPOCH = 1
@@ -29,8 +40,15 @@ SOURCE = "capture"
 class Replica:
     """Nodes of a deployment, fed tick by tick. `frame` is the world so far."""
 
-    def __init__(self, text: str, name: str, deployment: Deployment, factory: EngineFactory | None = None) -> None:
-        self.frame: Frame = initial_frame(deployment)
+    def __init__(
+        self,
+        text: str,
+        name: str,
+        deployment: Deployment,
+        factory: EngineFactory | None = None,
+        start: Start | None = None,
+    ) -> None:
+        self.frame: Frame = first_frame(deployment, start)
         self._deployment = deployment
         self._base = build_layout(deployment)
         self._bus = Bus()
@@ -40,12 +58,18 @@ class Replica:
             self._nodes[node] = core, Solver(core, factory)
             self._bus.subscribe(node, channels.NODE_READS)
         for node in self._nodes:
-            build = Build(node, "boot", "first", SOURCE, name, text, "fast", [])
+            origin = None if start is None else start.origin
+            build = Build(node, "boot", "first", SOURCE, name, text, "fast", self._added(self.frame.layout), origin)
             self._say(channels.BUILD, node, encode(build))
         self._settle()
         owners = sorted(deployment.owners().items())
-        epoch = Epoch(EPOCH, 0, self.frame.digest, sorted(deployment.nodes), owners, [], b"")
+        frame, added = self.frame, self._added(self.frame.layout)
+        epoch = Epoch(EPOCH, frame.tick, frame.digest, sorted(deployment.nodes), owners, added, b"")
         self._say(channels.EPOCH, SOURCE, encode(epoch))
+        if start is not None:
+            commit = Commit(EPOCH, frame.tick, frame.digest, start.values, start.outboxes, [], False)
+            for node in self._nodes:
+                self._say(channels.COMMIT, node, encode(commit))
         self._settle()
 
     @property

@@ -7,16 +7,13 @@ the virtual clock (`slow_ns`), may have its engines rebuilt, may be asked someth
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from heapq import heappop, heappush
 from typing import Any, Final
 
 from foosim.client.core import ClientCore
 from foosim.client.player import PlayerLoop, load_player
-from foosim.node.core import NodeCore
-from foosim.node.engines.interface import EngineFactory
 from foosim.node.solver import Solver
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish, Say
@@ -24,74 +21,28 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Answer, Epoch, Request
-from foosim.rehearsal.bus import CALM, Bus, Message, Observer, Traced, Weather
+from foosim.protocol.messages import Answer, Request
+from foosim.rehearsal.bus import Bus, Message, Traced
 from foosim.rehearsal.clock import Clock
-from foosim.supervisor.core import SupervisorCore
+from foosim.rehearsal.hub_journal import Ending, HubJournal
+from foosim.rehearsal.settings import Process, Settings
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
-from foosim.vhub.records import Closing
+
+__all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
 
 OPERATOR: Final = "operator"
 NEVER_NS: Final = limits.COUNTER_MAX
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
+HUB_BACK_NS: Final = 300_000_000
+"""After how long a vHub that ended is there again, as a launcher starts it."""
 
 
 class Stuck(AssertionError):
     """No commit for too long on the virtual clock."""
-
-
-@dataclass(slots=True)
-class Process:
-    """One process of the rehearsal: its core, and what a shell would know."""
-
-    name: str
-    core: Any
-    turn: Callable[[int], None]
-    slow_ns: int = 0
-    """Virtual time that each of its turns takes which says something."""
-    busy_until_ns: int = 0
-    wake_ns: int = 0
-    """When it is woken next, if nothing comes before."""
-    inbox: deque[Message] = field(default_factory=deque)
-    """What came while it was busy, in order of arrival."""
-    took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
-    """Told how long its turns took, as a shell tells."""
-    clock: Clock = field(default_factory=Clock)
-
-
-@dataclass(slots=True)
-class Settings:
-    """How to rehearse: everything beside the deployment. `slow_ns` is by process name."""
-
-    run: str = "rehearsal"
-    ticks: int = 0
-    weather: Weather = CALM
-    slow_ns: Mapping[str, int] = field(default_factory=dict)
-    clocks: Mapping[str, Clock] = field(default_factory=dict)
-    """By process; who has none here goes by virtual time."""
-    clients: Mapping[str, Callable[[ClientCore], Callable[[int], None]]] = field(default_factory=dict)
-    """Lockstep clients beside the players, by name: each gets its core and gives its turn."""
-    factory: EngineFactory | None = None
-    hub: type[HubCore] = HubCore
-    supervisor: type[SupervisorCore] = SupervisorCore
-    node: type[NodeCore] = NodeCore
-    """The cores' classes: tests plant faults by subclasses."""
-    keeps_journals: bool = False
-    """Whether the supervisor's journal is kept, so that it can be started again."""
-    restart_ns: int = 0
-    """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
-    observer: Observer | None = None
-    observes: Collection[str] = ("journal", "publish", "receive")
-    """What the observer is told of."""
-    on_commit: Callable[[Frame], None] | None = None
-    on_closing: Callable[[Closing], None] | None = None
-    on_epoch: Callable[[Epoch], None] | None = None
-    on_say: Callable[[str, str, str], None] | None = None
-    on_journal: Callable[[str, bytes], None] | None = None
 
 
 class System:
@@ -130,11 +81,11 @@ class System:
         """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, self._clock(channels.SUPERVISOR).at(0))
-        self.hub = rehearsal.hub("boot", fingerprint, self._clock(channels.VHUB).at(0))
         deployment = self.supervisor.deployment
         self._enter_supervisor()
-        self._enter(channels.VHUB, self.hub, self.hub.advance, channels.VHUB_READS)
-        self.processes[channels.VHUB].took = self.hub.waits.took
+        self.hub_journal = HubJournal()
+        self.hub: HubCore
+        self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
         for name, player in sorted(deployment.players.items()):
@@ -146,6 +97,7 @@ class System:
             core = ClientCore(name, "boot", self._clock(name).at(0))
             self._enter(name, core, client(core), channels.CLIENT_READS)
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
+        self._hub_back_ns = HUB_BACK_NS
 
     def _enter(
         self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
@@ -158,15 +110,33 @@ class System:
     def _clock(self, name: str) -> Clock:
         return self._clocks.setdefault(name, Clock())
 
+    def _now_of(self, name: str) -> int:
+        """Return what a process's clock shows now."""
+        return self._clock(name).at(self.bus.now_ns)
+
     def _enter_supervisor(self) -> None:
         core = self.supervisor
         core.on_commit = self._frames.append
         self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
         self.processes[channels.SUPERVISOR].took = core.watch.took
 
+    def _enter_hub(self, fingerprint: bytes) -> None:
+        """Let a vHub in, which goes on from the journal of the one before."""
+        self._boots += 1
+        hub = self.hub = self.settings.hub(f"boot-{self._boots}", fingerprint, self._now_of(channels.VHUB))
+
+        def turn(now_ns: int) -> None:
+            build = hub.member.build
+            if build is not None and hub.state is None:
+                hub.begin(self.hub_journal.past(hub, build.run), now_ns)
+            hub.advance(now_ns)
+
+        self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
+        self.processes[channels.VHUB].took = hub.waits.took
+
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
-        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self._clock(name).at(self.bus.now_ns))
+        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self._now_of(name))
         solver = self.solvers[name] = Solver(core, self.settings.factory)
 
         def turn(now_ns: int) -> None:
@@ -269,6 +239,11 @@ class System:
         self._plan_wake(process)
         assert process.wake_ns > self.bus.now_ns, f"{process.name} has a deadline that waking did not move"
 
+    def _turn(self, process: Process) -> None:
+        process.turn(process.clock.at(self.bus.now_ns))
+        self._perform(process)
+        self._plan_wake(process)
+
     def _core_deadline_ns(self, process: Process) -> int:
         """Return when a core has something to do next, in virtual time."""
         core, clock = process.core, process.clock
@@ -301,6 +276,11 @@ class System:
             process.busy_until_ns = leaves_ns
             process.took(process.clock.at(self.bus.now_ns), process.clock.at(leaves_ns))
         for action in actions:
+            if self.hub_journal.ending and type(action) is Journal and process.core is self.hub:
+                if self.hub_journal.ending == "unsaid":
+                    self._keep(leaves_ns, process, action)
+                self._end_hub()
+                return
             if type(action) is Publish:
                 self._trace(leaves_ns, process, "publish", action.channel.name, action.payload, action.name)
                 self.bus.put(process.name, action.channel, action.name, action.payload, leaves_ns)
@@ -324,14 +304,18 @@ class System:
         settings = self.settings
         if isinstance(action, Journal):
             self._trace(now_ns, process, "journal", "", action.record)
-            if settings.keeps_journals and process.core is self.supervisor:
+            if process.core is self.hub:
+                self.hub_journal.append(action.record)
+            elif settings.keeps_journals:
                 self._journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
         elif isinstance(action, Keep):
+            self.hub_journal.captured_tick = action.closing.frame.tick
             if settings.on_closing is not None:
                 settings.on_closing(action.closing)
         elif isinstance(action, KeepEpoch):
+            self.hub_journal.captured_epoch = action.epoch.epoch
             if settings.on_epoch is not None:
                 settings.on_epoch(action.epoch)
         elif isinstance(action, Say) and settings.on_say is not None:
@@ -381,14 +365,10 @@ class System:
         if name == channels.SUPERVISOR:
             return
         self.solvers.pop(name).close()
-        supervisor = self.processes.get(channels.SUPERVISOR)
-        if supervisor is None:
+        if channels.SUPERVISOR not in self.processes:
             return
-        now_ns = supervisor.clock.at(self.bus.now_ns)
-        self.supervisor.process_gone(name, now_ns)
-        supervisor.turn(now_ns)
-        self._perform(supervisor)
-        self._plan_wake(supervisor)
+        self.supervisor.process_gone(name, self._now_of(channels.SUPERVISOR))
+        self._turn(self.processes[channels.SUPERVISOR])
 
     def end_amid(self, name: str, actions: int) -> None:
         """End the supervisor amid its next turn, when it has performed so many of its actions."""
@@ -405,7 +385,7 @@ class System:
             self._boots += 1
             history = fold(self.supervisor.deployment, self._journal)
             boot = f"boot-{self._boots}"
-            now_ns = self._clock(name).at(self.bus.now_ns)
+            now_ns = self._now_of(name)
             self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)
             self._enter_supervisor()
         else:
@@ -420,6 +400,39 @@ class System:
         self.solvers.pop(name).close()
         self._enter_node(name, library_fingerprint())
         self.pause(name, self.settings.restart_ns)
+
+    def kill_hub(self, ending: Ending = "now", back_ns: int = HUB_BACK_NS) -> None:
+        """End the vHub's process, at once or at its next record; another one is started after a while."""
+        if channels.VHUB not in self.processes or self.hub_journal.ending or self.hub.ended is not None:
+            return
+        self._hub_back_ns = back_ns
+        if ending == "now":
+            self._end_hub()
+        else:
+            self.hub_journal.ending = ending
+
+    def _end_hub(self) -> None:
+        """What the vHub had not done yet is not done; the others see its connections close."""
+        self.hub_journal.ending = None
+        self._leave(channels.VHUB)
+        self.hub.actions.clear()
+        self.later(self._hub_back_ns, self._start_hub)
+        if channels.SUPERVISOR in self.processes:
+            self.supervisor.process_gone(channels.VHUB, self._now_of(channels.SUPERVISOR))
+            self._turn(self.processes[channels.SUPERVISOR])
+        for client in self._clients():
+            client.core.hub_gone(client.clock.at(self.bus.now_ns))
+            self._turn(client)
+
+    def _start_hub(self) -> None:
+        self._enter_hub(library_fingerprint())
+        self._wake(self.processes[channels.VHUB])
+        for client in self._clients():
+            client.core.hub_here(client.clock.at(self.bus.now_ns))
+            self._wake(client)
+
+    def _clients(self) -> list[Process]:
+        return [process for process in self.processes.values() if isinstance(process.core, ClientCore)]
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""

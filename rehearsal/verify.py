@@ -1,7 +1,8 @@
 """Verify a capture: simulate it again from orders and deliveries, compare the digest of every tick.
 
-The typed function behind `foosim-replay verify`. It starts at frame 0, never from a later frame, on any number of
-nodes, and names the first tick and entity that differ. Neighbours: `replica` computes, `vhub.capture_reader` reads.
+The typed function behind `foosim-replay verify`. It starts with the frame that the run began with, which is frame 0 but
+for a branch, never with a later one, on any number of nodes, and names the first tick and the entities that differ.
+Neighbours: `replica` computes, `vhub.capture_reader` reads.
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.frame import CHAIN_START, Frame, chain_next
+from foosim.protocol.frame import Frame, chain_next
+from foosim.protocol.start import Start, added_to, first_chain, start_with
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
-from foosim.vhub.capture_reader import CapturedTick, open_capture
+from foosim.vhub.capture_reader import CaptureData, CapturedTick, open_capture, origin_of
+from foosim.vhub.rows import CaptureError
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,32 +45,45 @@ def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
     """Verify a capture file. Raises CaptureError for one that cannot be read."""
     capture = open_capture(path)
     about = capture.about
-    found = verify(about.deployment_text, about.deployment_name, capture.captured_ticks(), nodes)
+    start = start_of(capture)
+    found = verify(about.deployment_text, about.deployment_name, capture.captured_ticks(), nodes, start)
     kept = {epoch.arithmetic for epoch in capture.epochs}
     return replace(found, other_arithmetic=tuple(sorted(kept - {"", found.arithmetic})))
 
 
-def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1) -> Verified:
-    """Simulate again what `ticks` (from 0 on, in order) say, on `nodes` nodes, and compare."""
+def start_of(capture: CaptureData) -> Start | None:
+    """Return the frame that a captured run began with, None where that was frame 0. Raises CaptureError."""
+    origin = origin_of(capture.about)
+    if origin is None:
+        return None
+    first = capture.frame_blocks[0].frame(0) if capture.frame_blocks and len(capture.frame_blocks[0]) else None
+    if first is None or first.digest != origin.digest:
+        raise CaptureError(f"{capture.path}: it does not have frame {origin.tick}, with which its run began")
+    return start_with(first, origin.source, origin.chain, added_to(capture.deployment, first.layout))
+
+
+def verify(text: str, name: str, ticks: Iterable[CapturedTick], nodes: int = 1, start: Start | None = None) -> Verified:
+    """Simulate again what `ticks` (from 0, or from that of `start` on, in order) say, on `nodes` nodes, and compare."""
     text = with_nodes(text, name, nodes)
-    replica = Replica(text, name, load_deployment(text, name))
+    replica = Replica(text, name, load_deployment(text, name), start=start)
+    chain = first_chain(None if start is None else start.origin)
     try:
-        return replace(_compare(replica, ticks, nodes), arithmetic=replica.arithmetic.hex())
+        return replace(_compare(replica, ticks, nodes, chain), arithmetic=replica.arithmetic.hex())
     finally:
         replica.close()
 
 
-def _compare(replica: Replica, ticks: Iterable[CapturedTick], nodes: int) -> Verified:
-    chain = CHAIN_START
+def _compare(replica: Replica, ticks: Iterable[CapturedTick], nodes: int, chain: bytes) -> Verified:
+    first = expected = replica.frame.tick
     for captured in ticks:
-        expected = replica.frame.tick + 1 if captured.tick > 0 else 0
         if captured.tick != expected:
             return Verified(replica.frame.tick, nodes, chain, missing_tick=expected)
-        frame = replica.frame if captured.tick == 0 else replica.step(captured.edits, captured.delivered)
+        frame = replica.frame if expected == first else replica.step(captured.edits, captured.delivered)
         if frame.digest != captured.digest:
             return Verified(frame.tick, nodes, chain, frame.tick, _differing(frame, captured))
-        if frame.tick > 0:
+        if expected > first:
             chain = chain_next(chain, frame.digest)
+        expected += 1
     return Verified(replica.frame.tick, nodes, chain)
 
 

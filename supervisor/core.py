@@ -19,7 +19,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, layout_after
+from foosim.protocol.frame import Frame, basis_of, chain_next, layout_after
 from foosim.protocol.layout import Layout, added_entities
 from foosim.protocol.messages import (
     AddedEntity,
@@ -41,7 +41,8 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.patience import Patience
-from foosim.protocol.start import initial_frame
+from foosim.protocol.start import first_chain, first_frame
+from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account
 from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.handshake import Handshake
@@ -87,17 +88,19 @@ class SupervisorCore:
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.requests = Requests(self)
         self.recovery = Recovery(self)
+        self.absence = Absence(self)
         self.handshake = Handshake(self)
-        self.frame: Frame = initial_frame(self.deployment)
-        self.chain = CHAIN_START
+        self.frame: Frame = first_frame(self.deployment, settings.start)
+        self.chain = first_chain(settings.origin)
+        self.first_tick = self.frame.tick
         self.epoch = 0
         self.is_open = False
         """Whether an epoch of this supervisor has begun."""
         self.owners = self.deployment.owners()
         self.members: tuple[str, ...] = ()
-        self.released = 0
+        self.released = self.first_tick
         """The first tick whose order is not released."""
-        self.stop_at = settings.ticks
+        self.stop_at = settings.last_tick
         self.end: End | None = None
         self.finished = False
         self.busy = 0.0
@@ -126,7 +129,7 @@ class SupervisorCore:
             Farewell: self.handshake.farewell,
         }
         text = settings.deployment_name, settings.deployment_text
-        self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.ticks, clock)
+        self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.last_tick, clock, settings.start)
         self.take_over = TakeOver(self, history, now_ns) if history is not None and history.epoch is not None else None
         self.actions.append(Journal(encode(self.run_record) if history is None else self.head()))
 
@@ -153,11 +156,11 @@ class SupervisorCore:
         while self._commit_next(now_ns):
             self._release(now_ns)
         if self.stop_at and self.frame.tick >= self.stop_at:
-            self.finish("done" if self.stop_at == self.settings.ticks else "stopped", failed=False)
+            self.finish("done" if self.stop_at == self.settings.last_tick else "stopped", failed=False)
 
     def wake(self, now_ns: int) -> None:
         """Look for who is silent or overdue, and for the end of an ended run."""
-        if self.end is None:
+        if self.end is None and not self.absence.is_over(now_ns):
             lost = self.watch.lost(self, now_ns)
             if lost and self.epoch == 0:
                 self.finish(_losses(lost), failed=True)
@@ -170,7 +173,7 @@ class SupervisorCore:
             if now_ns >= self._prepare_ns:
                 self.requests.prepare()
                 self._prepare_ns = now_ns + PREPARE_NS
-        elif not self.finished:
+        elif self.end is not None and not self.finished:
             hub = self.roster.by_name.get(channels.VHUB)
             self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
             if hub is not None and hub.gone_ns and now_ns > hub.gone_ns + GONE_NS:
@@ -209,7 +212,10 @@ class SupervisorCore:
             self._lose({name: "its connection closed"}, now_ns)
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
-        """Go on without the nodes among those who are lost; without any other the run ends."""
+        """Go on without the nodes among those who are lost, wait for the vHub; without any other the run ends."""
+        if channels.VHUB in lost:
+            self.absence.lose(lost[channels.VHUB], now_ns)
+            lost = {name: why for name, why in lost.items() if name != channels.VHUB}
         others = {name: why for name, why in lost.items() if name not in self.deployment.nodes}
         if others:
             self.finish(_losses(others), failed=True)
@@ -283,13 +289,6 @@ class SupervisorCore:
         """Return what people have set, for the journal."""
         return control_of(self)
 
-    def take_commit(self, frame: Frame, chain: bytes, commit: bytes) -> None:
-        """Stand at a frame that is committed and not in the journal, which begins anew with it."""
-        self.frame, self.chain = frame, chain
-        self.released, self.arrivals.delivered = frame.tick, frame.tick - 1
-        self.commits = {frame.tick: commit}
-        self.actions.append(Journal(self.head()))
-
     def say_last_commit(self, now_ns: int) -> None:
         """Say the last commit again: it may have been written and not said."""
         payload = self.commits.get(self.frame.tick)
@@ -321,7 +320,7 @@ class SupervisorCore:
             self.orders.pop(tick - limits.KEPT_TICKS, None)
             if tick == self.frame.tick:
                 self._patience.progress(self.deployment.tick_ns, now_ns)
-            if tick == 0:
+            if tick == self.first_tick:
                 self.started_ns = now_ns
             self.watch.released(tick, now_ns)
         self._say_orders(first, self.released)
@@ -372,6 +371,7 @@ class SupervisorCore:
         self.account.count(*solved)
         self.chain = chain_next(self.chain, frame.digest)
         self.recovery.committed(self.committed_ns, now_ns)
+        self.absence.committed(self.committed_ns, now_ns)
         self.committed_ns = now_ns
         self._patience.progress(self.deployment.tick_ns, now_ns)
         due_ns = self.pacer.release_ns(frame.tick - 1) or 0
@@ -441,7 +441,7 @@ class SupervisorCore:
         """Open the first epoch when every declared process has built the world."""
         if self.is_open or self.end is not None or self.roster.missing(self.frame.layout.digest):
             return
-        self.pacer.start(now_ns)
+        self.pacer.start(now_ns, self.frame.tick)
         self.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, self.tempo()))
         self.open_epoch(self.owners, now_ns, self.deployment.nodes)
         self.committed_ns = now_ns

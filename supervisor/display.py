@@ -65,6 +65,7 @@ def recovery_text(entry: dict[str, Any]) -> str:
         "node": f"lost node {name} ({entry['reason']})",
         "join": f"node {name} takes part",
         "supervisor": "the supervisor was started again",
+        "vhub": f"lost the vHub ({entry['reason']})",
     }
     what = texts[entry["what"]]
     after = "" if entry["outage_ms"] is None else f", went on after {entry['outage_ms']:.1f} ms"

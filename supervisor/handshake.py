@@ -35,7 +35,7 @@ class Handshake:
         core.roster.take(hello, now_ns)
         run, pace, added = core.settings, str(core.pacer.pace), core.added_to(core.frame.layout)
         deployment = run.deployment_name, run.deployment_text
-        build = Build(hello.name, hello.boot, core.boot, run.run, *deployment, pace, added)
+        build = Build(hello.name, hello.boot, core.boot, run.run, *deployment, pace, added, run.origin)
         core.actions.append(Publish(channels.BUILD, hello.name, encode(build)))
 
     def _has_ended(self) -> bool:
@@ -68,7 +68,9 @@ class Handshake:
             core.take_over.wake(now_ns)
         elif not core.is_open:
             core.start_if_ready(now_ns)
-        elif process.name in (*core.members, channels.VHUB):
+        elif process.name == channels.VHUB:
+            core.absence.ready(now_ns)
+        elif process.name in core.members:
             if ready.layout == core.frame.layout.digest:
                 core.say_epoch()
         elif ready.layout == core.frame.layout.digest:
@@ -87,7 +89,9 @@ class Handshake:
             core.count_repeat()
             return
         process.heard_ns = now_ns
-        if process.lost:
+        if process.lost and process.name == channels.VHUB:
+            core.absence.hear(now_ns)
+        elif process.lost:
             core.recovery.hear(process, now_ns)
         if not heartbeat.report:
             core.watch.told(heartbeat)

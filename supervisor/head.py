@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from foosim.protocol.actions import Journal
 from foosim.protocol.codec import encode
+from foosim.protocol.frame import Frame
 from foosim.protocol.layout import added_entities
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.records import Control, HeadRecord, History
@@ -65,3 +67,12 @@ def stand_on(core: SupervisorCore, history: History) -> None:
     core.roster.stopped = set(control.stopped)
     core.recovery.recovered, core.recovery.returns = history.recovered, dict(control.returns)
     core.requests.resume(history.edits, history.answers)
+    core.absence.go_on()
+
+
+def stand_at(core: SupervisorCore, frame: Frame, chain: bytes, commit: bytes) -> None:
+    """Put it at a frame that is committed and not in the journal, which begins anew with it."""
+    core.frame, core.chain = frame, chain
+    core.released, core.arrivals.delivered = frame.tick, frame.tick - 1
+    core.commits = {frame.tick: commit}
+    core.actions.append(Journal(head_of(core)))

@@ -90,8 +90,7 @@ class SupervisorProcess:
         if not self.core.actions:
             self._turn_journal()
         self.core.advance(now_ns)
-        if not self._info.radio:
-            self._note_radio()
+        self._note_radio()
 
     def _turn_journal(self) -> None:
         """Begin a new file when one is full; the one before it stays until the next turn, when this one is synced."""
@@ -101,10 +100,10 @@ class SupervisorProcess:
             self._turned_tick = tick
 
     def _note_radio(self) -> None:
-        """Write into the run file where clients find the vHub, once it has told."""
+        """Write into the run file where clients find the vHub, when it tells."""
         hub = self.core.roster.by_name.get(VHUB)
         address = "" if hub is None else hub.report.get("radio_address", "")
-        if isinstance(address, str) and address:
+        if isinstance(address, str) and address not in ("", self._info.radio):
             self._info = msgspec.structs.replace(self._info, radio=address)
             self._folder.write_info(self._info)
             self.core.actions.append(Say("info", f"clients find the vHub at {address}"))

@@ -12,6 +12,8 @@ from foosim.protocol.addresses import LOOPBACK, Address, check_listen
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
+from foosim.protocol.messages import Origin
+from foosim.protocol.start import Start
 from foosim.protocol.units import Pace, parse_ns, parse_pace
 
 
@@ -45,13 +47,26 @@ class RunOptions:
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """What a supervisor is started with. `ticks` ends the run; 0 is until it is asked to end."""
+    """What a supervisor is started with. `ticks` is how many there are; 0 is until it is asked to end.
+
+    `start` is the frame of another run that it begins with; None: frame 0.
+    """
 
     run: str
     deployment_name: str
     deployment_text: str
     pace: Pace
     ticks: int = 0
+    start: Start | None = None
+
+    @property
+    def origin(self) -> Origin | None:
+        return None if self.start is None else self.start.origin
+
+    @property
+    def last_tick(self) -> int:
+        """The tick of the frame that ends the run; 0: it ends when it is asked to."""
+        return self.ticks and self.ticks + (0 if self.start is None else self.start.origin.tick)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,13 +21,13 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
 from foosim.protocol.layout import BALL, Layout, build_layout
 from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, End, Epoch
-from foosim.protocol.start import initial_frame
+from foosim.protocol.start import Start, first_chain, first_frame
 from foosim.supervisor.account import Account, Recovered, close_outages
 from foosim.supervisor.pacing import Lags
 
 
 class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_unknown_fields=True):
-    """The first record of a journal: the run, its deployment, pace and end (0: none).
+    """The first record of a journal: the run, its deployment, pace, last tick (0: none), and what it begins with.
 
     `clock` names the monotonic clock whose times the records have: a machine's, since it was started.
     """
@@ -36,8 +36,9 @@ class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_
     deployment_name: str
     deployment: str
     pace: str
-    ticks: int
+    last_tick: int
     clock: str
+    start: Start | None = None
 
 
 class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbid_unknown_fields=True):
@@ -177,13 +178,14 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
 def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
     """Return the history that a file's first record stands for."""
     if isinstance(first, RunRecord):
-        control = Control(first.pace, False, 0, first.ticks, [], {})
+        control = Control(first.pace, False, 0, first.last_tick, [], {})
         account = Account(dict.fromkeys(sorted(deployment.nodes), 0))
-        frame, layout = initial_frame(deployment), build_layout(deployment)
-        return History(first, frame, layout, deployment.owners(), control, account)
+        frame = first_frame(deployment, first.start)
+        chain = first_chain(None if first.start is None else first.start.origin)
+        return History(first, frame, frame.layout, deployment.owners(), control, account, chain=chain)
     return History(
         first.run,
-        initial_frame(deployment),
+        first_frame(deployment, first.run.start),
         build_layout(deployment, [(entity.name, entity.model) for entity in first.added]),
         first.owners,
         first.control,
@@ -218,7 +220,12 @@ def _apply(history: History, record: Change) -> None:
     elif isinstance(record, OrderedRecord):
         history.edits.setdefault(record.tick, []).extend(record.edits)
     elif isinstance(record, RecoveredRecord):
-        history.recovered.append(record.entry)
+        known = [(entry.what, entry.name, entry.epoch) for entry in history.recovered]
+        entry = record.entry
+        if known and known[-1] == (entry.what, entry.name, entry.epoch):
+            history.recovered[-1] = entry
+        else:
+            history.recovered.append(entry)
     elif isinstance(record, Control):
         history.control = record
     else:
@@ -231,7 +238,7 @@ def _commit(history: History, record: CommitRecord) -> None:
     history.commits[commit.tick] = record.commit
     history.commits.pop(commit.tick - limits.KEPT_TICKS, None)
     history.edits.pop(commit.tick - 1, None)
-    if commit.tick == 0:
+    if commit.tick == history.frame.tick:  # the one that the run begins with
         history.started_ns = history.committed_ns = record.now_ns
         return
     history.chain = chain_next(history.chain, commit.digest)

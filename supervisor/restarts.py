@@ -27,15 +27,19 @@ class Restarts:
     def __init__(self) -> None:
         self._by_name: dict[str, _Restarts] = {}
 
-    def ended(self, name: str, now_s: float) -> float | None:
-        """A process has ended: return after how many seconds it is started again, None when it is given up."""
+    def ended(self, name: str, now_s: float, at_once: bool = False) -> float | None:
+        """A process has ended: return after how many seconds it is started again, None when it is given up.
+
+        `at_once`: the run stands still without it, so the first two times it is not waited at all.
+        """
         known = self._by_name.setdefault(name, _Restarts())
         while known.ended_s and known.ended_s[0] <= now_s - WINDOW_S:
             known.ended_s.popleft()
         if len(known.ended_s) >= len(WAITS_S):
             known.failed = True
             return None
-        wait_s = WAITS_S[len(known.ended_s)]
+        waits_s = (0.0, 0.0, *WAITS_S[:-2]) if at_once else WAITS_S
+        wait_s = waits_s[len(known.ended_s)]
         known.ended_s.append(now_s)
         known.due_s = now_s + wait_s
         return wait_s

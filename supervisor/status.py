@@ -39,18 +39,21 @@ def result(core: SupervisorCore) -> dict[str, Any]:
     red, blue = frame.score
     lags = core.pacer.lags
     fast = core.pacer.is_fast
+    origin = core.settings.origin
     return {
         "run": core.settings.run,
         "world": core.deployment.world,
         "seed": core.deployment.seed,
         "ticks": frame.tick,
+        "first_tick": core.first_tick,
         "tick_ns": core.deployment.tick_ns,
-        "rtf": round(frame.tick * core.deployment.tick_ns / wall_ns, 3) if wall_ns > 0 else None,
+        "rtf": round((frame.tick - core.first_tick) * core.deployment.tick_ns / wall_ns, 3) if wall_ns > 0 else None,
         "lag_ms": None
         if fast
         else {"p50": lags.quantile_ms(0.5), "p99": lags.quantile_ms(0.99), "max": lags.max_ns / 1e6},
         "digest": {"frame": frame.digest.hex(), "chain": core.chain.hex()},
         "packets": report.get("packets", NO_PACKETS),
+        "from": None if origin is None else {"capture": origin.source, "tick": origin.tick},
         "nodes": {
             name: {
                 "owned": sorted(robot for robot, owner in core.owners.items() if owner == name),

@@ -18,7 +18,7 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import frame_from_bytes
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit, Standing
-from foosim.supervisor.head import stand_on
+from foosim.supervisor.head import stand_at, stand_on
 from foosim.supervisor.records import History
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class TakeOver:
                 if frame.digest != commit.digest:
                     raise Malformed(f"commit {commit.tick} of the vHub has another digest than its frame")
                 core.say("warning", f"goes on from the vHub's commit {commit.tick}, the journal lost what led to it")
-                core.take_commit(frame, standing.chain, standing.commit)
+                stand_at(core, frame, standing.chain, standing.commit)
         core.epoch = max(core.epoch, standing.epoch)
         self._standing = standing
         return True

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from foosim.protocol import wall
+from foosim.protocol.addresses import Address, parse_address
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Refused
@@ -103,7 +104,7 @@ class Up:
         self._has_begun = self._has_ended = False
         self._restarts = Restarts()
         self._stalled: dict[str, tuple[int, float]] = {}
-        """Nodes that the run goes on without though their processes live: which process, since when."""
+        """Processes that are lost though their processes live: which process, since when."""
         self._stopped: set[str] = set()
         """Nodes that somebody stopped."""
         self._unanswered = 0
@@ -150,7 +151,9 @@ class Up:
 
     def _vhub_command(self, info: RunInfo) -> list[str]:
         options = self.plan.options
-        command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(self.plan.address.next_port())]
+        address = self.plan.address
+        listen = Address(address.host, parse_address(info.radio).port) if info.radio else address.next_port()
+        command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(listen)]
         command += ["--insecure"] if options.insecure else []
         command += ["--run-folder", str(self.folder.path)]
         return [*command, "--no-capture"] if self.capture is None else [*command, "--capture", str(self.capture)]
@@ -201,7 +204,7 @@ class Up:
         self._has_ended = status["state"] in ENDED
         self._start_stopped({name for name, process in status["processes"].items() if process["stopped"]})
         if self._has_begun and not self._has_ended and not self._ending_s:
-            self._restart_nodes(now_s, knows=True)
+            self._restart_ended(now_s, knows=True)
         self._end_stalled(status["processes"], now_s)
 
     def _start_stopped(self, stopped: set[str]) -> None:
@@ -239,7 +242,7 @@ class Up:
             self.display.say("the supervisor does not answer any more: it is killed")
             supervisor.process.kill()
 
-    def _comes_back(self, supervisor: Child, now_s: float) -> bool:
+    def _supervisor_comes_back(self, supervisor: Child, now_s: float) -> bool:
         """Start a supervisor again that ended before the run did; False when the run is over, or it is given up."""
         over = self._ending_s or self._has_ended or self.folder.info() is None or self.folder.result() is not None
         if over or supervisor.exit_code in (DONE, REFUSED):
@@ -249,15 +252,16 @@ class Up:
         self._start_due(now_s)
         return SUPERVISOR not in self._restarts.failed
 
-    def _restart_nodes(self, now_s: float, knows: bool = False) -> None:
-        """Start nodes again that ended while the run goes on; one that ends again and again is given up.
+    def _restart_ended(self, now_s: float, knows: bool = False) -> None:
+        """Start nodes and the vHub again that ended while the run goes on; who ends again and again is given up.
 
         `knows`: a status has just told which nodes are stopped.
         """
         for child in self._launcher.ended():
             name = child.name
-            is_node = name in self.plan.deployment.nodes
-            if not is_node or name in self._stopped or child.exit_code == DONE or self._restarts.is_known(name):
+            if not self._comes_back(name) or name in self._stopped or child.exit_code == DONE:
+                continue
+            if self._restarts.is_known(name):
                 continue
             if child.exit_code == REFUSED and not knows:
                 continue  # it may have been stopped since the last status
@@ -265,14 +269,25 @@ class Up:
         self._start_due(now_s)
 
     def _restart_later(self, child: Child, now_s: float) -> None:
-        wait_s = self._restarts.ended(child.name, now_s)
-        after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s"
+        wait_s = self._restarts.ended(child.name, now_s, at_once=child.name in (SUPERVISOR, VHUB))
+        after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s" if wait_s else "starts again"
         self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
 
     def _start_due(self, now_s: float) -> None:
         for name in self._restarts.due(now_s):
             child = self._launcher.children[name]
-            self._launcher.start(name, child.command, child.log)
+            command = self._vhub_again() if name == VHUB else child.command
+            self._launcher.start(name, command, child.log)
+
+    def _comes_back(self, name: str) -> bool:
+        """Whether the run waits for this process when it ends, and another one takes its place."""
+        return name == VHUB or name in self.plan.deployment.nodes
+
+    def _vhub_again(self) -> list[str]:
+        """Return how the vHub is started again: where clients know it to be."""
+        info = self.folder.info()
+        assert info is not None
+        return self._vhub_command(info)
 
     def _goes_on(self) -> bool:
         """Look after the children and the Ctrl-C; False when the supervisor has ended."""
@@ -282,7 +297,7 @@ class Up:
         supervisor = self._launcher.children[SUPERVISOR]
         now_s = time.monotonic()
         if supervisor.exit_code is not None:
-            if self._comes_back(supervisor, now_s):
+            if self._supervisor_comes_back(supervisor, now_s):
                 return True
             if supervisor.exit_code == FAILED:  # it may have noticed a loss, and ended, since we looked last
                 self._look_for_lost(now_s)
@@ -293,7 +308,7 @@ class Up:
         if self._has_begun and not self._has_ended and not self._ending_s:
             if self._lost is not None and not self._ends_run(self._lost):
                 self._lost = None  # it ended before we saw that the run had begun
-            self._restart_nodes(now_s)
+            self._restart_ended(now_s)
         if self._lost is None:
             self._look_for_lost(now_s)
         elif not self._ending_s and now_s > self._lost_s + LOST_S:
@@ -304,7 +319,7 @@ class Up:
 
     def _ends_run(self, child: Child) -> bool:
         """Whether the run cannot go on without this child, which has ended."""
-        return child.exit_code != 0 and not (self._has_begun and child.name in self.plan.deployment.nodes)
+        return child.exit_code != 0 and not (self._has_begun and self._comes_back(child.name))
 
     def _look_for_lost(self, now_s: float) -> None:
         """Note the first child that ended as none should; one that was killed before those that ended because of it."""

@@ -146,6 +146,9 @@ class Watch:
         silent = self.roster.silent(now_ns, deadlines.heartbeat_ns)
         if silent:
             return dict.fromkeys(silent, f"no heartbeat for {deadlines.heartbeat_ns / 1e9:g} s")
+        if core.absence.is_away:
+            self._progress_ns = now_ns  # nothing goes on without it, and nobody else is to blame
+            return {}
         names = [name for name in self.waiting_for(core) if name in core.members or name not in self.deployment.nodes]
         if all(name in self.deployment.players or name in self.deployment.clients for name in names):
             self._progress_ns = max(self._progress_ns, now_ns - deadlines.tick_named_ns)  # the vHub has their deadline

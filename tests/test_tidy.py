@@ -64,7 +64,9 @@ SHELLS = {
     "supervisor/plan.py",
     "supervisor/run_folder.py",
     "supervisor/up.py",
+    "vhub/capture_file.py",
     "vhub/capture_reader.py",
+    "vhub/capture_recovery.py",
     "vhub/capture_writer.py",
     "vhub/main.py",
 }

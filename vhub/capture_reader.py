@@ -26,13 +26,23 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import CHAIN_START, chain_next
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Delivered, Edit
+from foosim.protocol.messages import Delivered, Edit, Origin
 from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
+from foosim.protocol.start import first_chain
 from foosim.protocol.table_scene import build_scene
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
-from foosim.vhub.capture_writer import DEPLOYMENT, END_METADATA, METADATA, VERSIONS
-from foosim.vhub.mcap_file import McapFile, Message
+from foosim.vhub.capture_file import (
+    DEPLOYMENT,
+    END_METADATA,
+    METADATA,
+    ORIGIN,
+    ORIGIN_CHAIN,
+    ORIGIN_DIGEST,
+    ORIGIN_TICK,
+    VERSIONS,
+)
+from foosim.vhub.mcap_file import MAGIC, McapFile, Message
 from foosim.vhub.rows import (
     CLIENTS,
     EPOCHS,
@@ -88,8 +98,8 @@ class About:
         return self.metadata["deployment"]
 
 
-class _Scan:
-    """One pass over a file: it yields the messages of some topics and gathers what stands beside them."""
+class Scan:
+    """One pass over a file: it yields the messages of some topics and gathers what stands beside them (`about`)."""
 
     def __init__(self, path: Path) -> None:
         self.about = About(path)
@@ -195,7 +205,7 @@ class CaptureData:
         """Yield the rows of a topic, in the order of the file."""
         if topic not in ROW_TYPES:
             raise CaptureError(f"{self.path}: no rows of {topic!r}, there are {', '.join(sorted(ROW_TYPES))}")
-        for _, row in _Scan(self.path).rows(frozenset({topic})):
+        for _, row in Scan(self.path).rows(frozenset({topic})):
             yield row
 
     def captured_ticks(self) -> Iterator[CapturedTick]:
@@ -229,9 +239,31 @@ class CaptureData:
         return poses_of(found, link)
 
 
+def read_about(path: Path) -> About:
+    """Return what a capture, finished or not, says about itself before its first row. Raises CaptureError."""
+    scan = Scan(path)
+    for _ in scan.messages():
+        break
+    try:
+        with path.open("rb") as stream:
+            stream.seek(max(0, path.stat().st_size - len(MAGIC)))
+            scan.about.finished = stream.tell() > 0 and stream.read() == MAGIC
+    except OSError as error:
+        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+    return scan.about
+
+
+def deployment_of(about: About) -> Deployment:
+    """Return the deployment that a capture has attached. Raises CaptureError when it is not valid here."""
+    try:
+        return load_deployment(about.deployment_text, about.deployment_name)
+    except Refused as error:
+        raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
+
+
 def open_capture(path: Path | str) -> CaptureData:
     """Open a capture, also an unfinished one. Raises CaptureError when it is none, or damaged."""
-    scan = _Scan(Path(path))
+    scan = Scan(Path(path))
     ticks: list[int] = []
     digests: list[bytes] = []
     layouts: list[LayoutRow] = []
@@ -254,10 +286,10 @@ def open_capture(path: Path | str) -> CaptureData:
     for before, after in pairwise(ticks):
         if after <= before:
             raise CaptureError(f"{path}: tick {after} comes behind tick {before}")
-    deployment = _deployment_of(scan.about)
+    deployment = deployment_of(scan.about)
     blocks = []
     for layout_row, rows in zip(layouts, frames, strict=True):
-        layout = _layout_of(scan.about, deployment, layout_row)
+        layout = layout_of(scan.about.path, deployment, layout_row)
         for row in rows:
             if len(row.values) != 8 * layout.size or any(o.index >= len(layout.entities) for o in row.outboxes):
                 raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
@@ -273,21 +305,26 @@ def open_capture(path: Path | str) -> CaptureData:
     )
 
 
-def _deployment_of(about: About) -> Deployment:
+def origin_of(about: About) -> Origin | None:
+    """Return where the run of a capture began, None: at frame 0. Raises CaptureError."""
+    about_it = about.metadata
+    if ORIGIN_TICK not in about_it:
+        return None
     try:
-        return load_deployment(about.deployment_text, about.deployment_name)
-    except Refused as error:
-        raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
+        digest, chain = bytes.fromhex(about_it[ORIGIN_DIGEST]), bytes.fromhex(about_it[ORIGIN_CHAIN])
+        return Origin(int(about_it[ORIGIN_TICK]), about_it[ORIGIN], digest, chain)
+    except (KeyError, ValueError) as error:
+        raise CaptureError(f"{about.path}: it does not say in full where its run began: {error}") from None
 
 
-def _layout_of(about: About, deployment: Deployment, row: LayoutRow) -> Layout:
+def layout_of(path: Path, deployment: Deployment, row: LayoutRow) -> Layout:
     """Build the layout that a row names, and compare: what the numbers of its frames mean depends on it."""
     try:
         layout = build_layout(deployment, [(added.name, added.model) for added in row.added])
     except KeyError as error:
-        raise CaptureError(f"{about.path}: the layout at tick {row.tick} has an unknown model {error}") from None
+        raise CaptureError(f"{path}: the layout at tick {row.tick} has an unknown model {error}") from None
     if layout.digest.hex() != row.digest or layout.size != row.size:
-        raise CaptureError(f"{about.path}: the layout at tick {row.tick} is not what this version builds")
+        raise CaptureError(f"{path}: the layout at tick {row.tick} is not what this version builds")
     return layout
 
 
@@ -295,7 +332,8 @@ def _layout_of(about: About, deployment: Deployment, row: LayoutRow) -> Layout:
 class CaptureInfo:
     """A capture in short, for people and scripts. Digests are hex; `packets` counts fates.
 
-    `nodes` are those that took part; `arithmetic` has each digest of a fixed small run of their engine.
+    `first_tick` is that of the frame that the run began with, `ticks` that of the last one. `nodes` are those that took
+    part; `arithmetic` has each digest of a fixed small run of their engine.
     """
 
     path: str
@@ -306,6 +344,7 @@ class CaptureInfo:
     metadata: Mapping[str, str]
     end: Mapping[str, str]
     versions: Mapping[str, str]
+    first_tick: int
     ticks: int
     tick_ns: int
     duration_ns: int
@@ -320,10 +359,10 @@ class CaptureInfo:
 def capture_info(path: Path | str) -> CaptureInfo:
     """Return a capture in short, by one pass over the file."""
     path = Path(path)
-    scan = _Scan(path)
+    scan = Scan(path)
     topics: Counter[str] = Counter()
     fates: Counter[str] = Counter()
-    tick, digest, chain = 0, b"", CHAIN_START
+    first, tick, digest, chain = -1, 0, b"", CHAIN_START
     nodes: set[str] = set()
     arithmetic: set[str] = set()
     for message in scan.messages():
@@ -331,15 +370,16 @@ def capture_info(path: Path | str) -> CaptureInfo:
         if message.topic == TICK:
             row = scan.decode(_DECODERS[TICK], message)
             tick, digest = row.tick, bytes.fromhex(row.digest)
-            chain = chain_next(chain, digest) if tick > 0 else chain
+            chain = chain_next(chain, digest) if first >= 0 else first_chain(origin_of(scan.about))
+            first = tick if first < 0 else first
         elif message.topic == PACKETS:
             fates[scan.decode(_DECODERS[PACKETS], message).fate] += 1
         elif message.topic == EPOCHS:
             epoch = scan.decode(_DECODERS[EPOCHS], message)
             nodes.update(epoch.roster)
             arithmetic.add(epoch.arithmetic)
-    about = scan.about
-    tick_ns = _deployment_of(about).tick_ns
+    about, first = scan.about, max(0, first)
+    tick_ns = deployment_of(about).tick_ns
     return CaptureInfo(
         str(path),
         path.stat().st_size,
@@ -349,9 +389,10 @@ def capture_info(path: Path | str) -> CaptureInfo:
         about.metadata,
         about.end,
         about.versions,
+        first,
         tick,
         tick_ns,
-        tick * tick_ns,
+        (tick - first) * tick_ns,
         digest.hex(),
         chain.hex(),
         tuple(sorted(nodes)),

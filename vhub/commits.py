@@ -8,7 +8,9 @@ frames.
 from __future__ import annotations
 
 from foosim.protocol import limits
-from foosim.protocol.channels import VHUB
+from foosim.protocol.actions import Publish
+from foosim.protocol.channels import STANDING, VHUB
+from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
@@ -25,10 +27,22 @@ class Commits:
     def __init__(self) -> None:
         self.layout: Layout | None = None
         self.next_tick = 0
-        self.chain = CHAIN_START
-        """Over the digests of the frames from 1 on."""
+        self._chains = {-1: CHAIN_START}
+        """Over the digests of the frames behind the first, by tick."""
+        self._is_first = True
         self._frames: dict[int, Committed] = {}
         self._early: dict[int, tuple[bytes, Commit]] = {}
+
+    def start(self, layout: Layout | None, tick: int, chain: bytes, last: Committed | None = None) -> None:
+        """Begin with the frame of a tick and layout and chain before it.
+
+        `last` is the frame before; None when the run begins with that tick, whose digest is in the chain already.
+        """
+        self.layout, self.next_tick = layout, tick
+        self._chains = {tick - 1: chain}
+        self._is_first = last is None
+        if last is not None:
+            self._frames[tick - 1] = last
 
     def take(self, commit: Commit, payload: bytes) -> list[int]:
         """Take a commit; return the ticks whose frames are there by it, none for a repeat or one that came early.
@@ -54,16 +68,23 @@ class Commits:
     def __contains__(self, tick: int) -> bool:
         return tick in self._frames
 
-    def standing(self, deployment: Deployment, epoch: int) -> Standing:
-        """Return how far the world has come here."""
+    def standing(self, deployment: Deployment, epoch: int) -> Publish:
+        """Say how far the world has come here: a supervisor that was started again may have lost more."""
         assert self.layout is not None
         last = self._frames.get(self.next_tick - 1)
         added = added_entities(deployment, self.layout)
-        return Standing(VHUB, epoch, b"" if last is None else last[0], self.chain, added)
+        chain = self.chain_at(self.next_tick - 1)
+        standing = Standing(VHUB, epoch, b"" if last is None else last[0], chain, added)
+        return Publish(STANDING, VHUB, encode(standing))
+
+    def chain_at(self, tick: int) -> bytes:
+        """Return the chain over the frames up to one that is kept."""
+        return self._chains[tick]
 
     def forget(self, tick: int) -> None:
         """Nobody asks for this tick any more."""
         self._frames.pop(tick, None)
+        self._chains.pop(tick, None)
 
     def _read(self, commit: Commit, payload: bytes) -> int:
         assert self.layout is not None
@@ -73,7 +94,8 @@ class Commits:
             raise Malformed(f"commit {commit.tick} whose frame has another digest")
         self.layout = layout
         self.next_tick += 1
-        if commit.tick > 0:
-            self.chain = chain_next(self.chain, commit.digest)
+        before = self._chains[commit.tick - 1]
+        self._chains[commit.tick] = before if self._is_first else chain_next(before, commit.digest)
+        self._is_first = False
         self._frames[commit.tick] = payload, commit, frame
         return commit.tick

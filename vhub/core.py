@@ -3,13 +3,13 @@
 It sees committed frames only. Closing tick k waits for Commit(k) and the samples of every robot (world phase), then for
 the Dones of the lockstep clients that are due (clients phase); the record is written before the deliveries are spoken.
 `Go` alone may be spoken before: it is a function of what is already written, commit and samples.
-Neighbours: `state` (what a closing does), `sessions` (clients), `records` (journal), `protocol.member` (handshake).
+Neighbours: `state` (what a closing does), `door` and `sessions` (clients), `records` (journal), `resume` (what a vHub
+that is started again goes on from), `protocol.member` (handshake).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from foosim.protocol import channels, limits
@@ -18,7 +18,6 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
-from foosim.protocol.frame import Frame
 from foosim.protocol.layout import added_entities
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
@@ -30,6 +29,7 @@ from foosim.protocol.messages import (
     Commit,
     Deliveries,
     Done,
+    Down,
     End,
     Epoch,
     Farewell,
@@ -44,27 +44,18 @@ from foosim.protocol.messages import (
 from foosim.protocol.patience import Patience
 from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
+from foosim.vhub.door import Door
 from foosim.vhub.keeping import Keep, KeepEpoch, Keeping
 from foosim.vhub.packet import IN_FLIGHT, Flight
-from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record, world_packets
+from foosim.vhub.records import Closing, HeadRecord, World, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
 from foosim.vhub.report import HubStatistics, report, statistics
-from foosim.vhub.sessions import Session, Sessions, may_lockstep
-from foosim.vhub.state import HubState, Joining, received
+from foosim.vhub.resume import Past
+from foosim.vhub.sessions import Sessions
+from foosim.vhub.state import HubState, received
 from foosim.vhub.waits import Waits
 
 HubAction = Action | Keep | KeepEpoch
-
-
-@dataclass(slots=True)
-class _World:
-    """The tick that is being closed, after its world phase."""
-
-    frame: Frame
-    closing: Closing
-    commit: bytes
-    waited: list[str]
-    free: dict[str, list[Flight]]
 
 
 class HubCore:
@@ -74,38 +65,39 @@ class HubCore:
         self.actions: list[HubAction] = []
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
+        self.door = Door(self)
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
         self.ended: End | None = None
         self.finished = False
-        self.lost = self.capture = self.radio_address = ""
+        self.lost = self.failure = self.capture = self.radio_address = ""
         self.busy = 0.0
         self._epoch = self._epoch_tick = 0
+        self._epoch_payload = b""
         self._owners: dict[str, str] = {}
         self.waits = Waits()
         self._keeping = Keeping()
         self._commits = Commits()
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
-        self._world: _World | None = None
-        self._leaves: list[str] = []
+        self._world: World | None = None
         self._patience = Patience(now_ns)
         self._end_ns = 0
-        self._malformed = self._repeated = 0
+        self._malformed = self.repeated = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Commit: self._on_commit,
             Samples: self._on_samples,
             Epoch: self._on_epoch,
             Want: self._on_want,
-            Recall: self._on_recall,
+            Recall: self.member.recall,
             Build: self._on_build,
             Tempo: self._on_tempo,
             End: self._on_end,
-            ClientHello: self._on_hello,
-            Join: self._on_join,
-            Up: self._on_up,
-            Done: self._on_done,
+            ClientHello: self.door.hello,
+            Join: self.door.join,
+            Up: self.door.up,
+            Done: self.door.done,
         }
 
     # --- what the shell calls --------------------------------------------------------------------------------------
@@ -114,7 +106,7 @@ class HubCore:
         """Take one message as it came; what does not fit is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self._repeated += not self.member.refuse(payload)
+                self.repeated += not self.member.refuse(payload)
                 return
             message = channels.read(channel, name, payload)
             reader = self._readers.get(type(message))
@@ -145,7 +137,10 @@ class HubCore:
         if self._world is not None and self._world.waited and self.releases is not None:
             self.sessions.repeat(self._world.waited, now_ns)
             for late in self.sessions.overdue(self._world.waited, self.releases.paused, now_ns):
-                self._lose(late.name, f"no Done of tick {late.go_tick} within its deadline")
+                self.lose(late.name, f"no Done of tick {late.go_tick} within its deadline")
+        self.door.wake(now_ns)
+        if self.state is not None and self._epoch > 0:
+            self.sessions.acknowledge(self.state, now_ns)
         if self._patience.is_over(now_ns) and self._epoch > 0 and self.ended is None:
             self._ask_again(now_ns)
         self._release(now_ns)
@@ -161,22 +156,15 @@ class HubCore:
             deadline = min(deadline, self.releases.deadline_ns)
         if self._world is not None and self._world.waited:
             deadline = min(deadline, self.sessions.again_ns(self._world.waited))
-        return deadline
+        late_ns = self.sessions.late_ns
+        return deadline if late_ns is None else min(deadline, late_ns)
 
     def client_gone(self, name: str, now_ns: int) -> None:
-        """A client's presence has ended: a lockstep one ends the run, a free-running one leaves it."""
-        if name not in self.sessions.by_name or self.state is None or self.ended is not None:
-            return
-        member = self.sessions.joins.get(name) or self.state.members.get(name)
-        if member is not None and member.period > 0:
-            self._lose(name, "its connection closed")  # its session stays: a tick may be waiting for it
-            return
-        self.sessions.leave(name)
-        if name in self.state.members:
-            self._leaves.append(name)
+        """A client's presence has ended."""
+        self.door.gone(name, now_ns)
 
     def statistics(self) -> HubStatistics:
-        return statistics(self.state, self._malformed, self._repeated)
+        return statistics(self.state, self._malformed, self.repeated)
 
     @property
     def lacking(self) -> tuple[Channel, int]:
@@ -196,7 +184,7 @@ class HubCore:
         if self.state is None:
             return "start"
         if self._epoch == 0:
-            missing = self.sessions.missing(self.state.deployment)
+            missing = self.sessions.missing(self.state.deployment, self.state)
             return JOIN_OF + ", ".join(missing) if missing else "epoch"
         if self._world is not None:
             return DONE_OF + ", ".join(self._world.waited) if self._world.waited else ""
@@ -211,6 +199,10 @@ class HubCore:
     @property
     def is_between_ticks(self) -> bool:
         return self._world is None
+
+    def waits_for(self, client: str) -> bool:
+        """Whether a tick waits for this client's Done."""
+        return self._world is not None and client in self._world.waited
 
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
@@ -228,11 +220,7 @@ class HubCore:
         if packets is None or commit.last:
             return False
         self.waits.close_world(now_ns)
-        leaves: list[str] = []
-        joins: list[Joining] = []
-        if state.hears_clients:
-            leaves, self._leaves = self._leaves, leaves
-            joins = self.sessions.take_joins(tick)
+        joins, leaves = self.door.come_and_go(tick)
         for name in leaves:
             state.leave(name)
         for joining in joins:
@@ -244,7 +232,7 @@ class HubCore:
         due = state.due_members(tick)
         for name in due:
             self._go(name, tick, released.pop(name, []), now_ns)
-        self._world = _World(frame, closing, raw, [name for name in due if name in self.sessions.by_name], released)
+        self._world = World(frame, closing, raw, [name for name in due if name in self.sessions.by_name], released)
         return True
 
     def _go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
@@ -292,6 +280,8 @@ class HubCore:
         self._keeping.add(world.closing)
         self._release(now_ns)
         self._world = None
+        if (tick + 1) % limits.CHECKPOINT_TICKS == 0:
+            self.actions.append(Journal(self.head()))
         self._commits.forget(tick - limits.KEPT_TICKS)
         self._patience.progress(state.tick_ns, now_ns)
         return True
@@ -308,11 +298,13 @@ class HubCore:
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""
         assert self.state is not None and self.member.build is not None
-        committed = self._commits.get(self.state.closed)
-        layout = self._commits.layout if committed is None else committed[2].layout
+        commit, _, frame = self._commits.get(self.state.closed) or (b"", None, None)
+        layout = self._commits.layout if frame is None else frame.layout
         assert layout is not None
         added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
-        return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added))
+        run, chain = self.member.build.run, self._commits.chain_at(self.state.closed)
+        last = commit, self._epoch_payload, chain, self.capture
+        return encode(HeadRecord(run, self.state.snapshot(), added, *last))
 
     def _release(self, now_ns: int) -> None:
         """Say what is released to free-running clients by now; closings of which nothing waits go to the capture."""
@@ -322,78 +314,102 @@ class HubCore:
             for flight in release.flights:
                 flight.released_wall_ns = now_ns
             member = self.state.members[release.client]
-            self.sessions.say_down(
-                release.client, release.number, release.tick, received(release.flights), member.sequence
-            )
+            down = Down(release.number, release.tick, member.sequence, received(release.flights), False)
+            self.sessions.say_down(release.client, down, now_ns)
         self.actions += self._keeping.take(self.releases.waiting_tick)
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
     def _on_build(self, build: Build, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
-            self._repeated += 1
+            self.repeated += 1
             return
-        deployment = self.deployment = self.member.deployment
-        assert deployment is not None
+        self.deployment = self.member.deployment
         if self.state is not None:
             self.member.is_ready = False
-            self._ready_if_complete()
-            return
-        self._commits.layout = self.member.layout
-        self.state = HubState(deployment)
+            self.ready_if_complete()
+
+    def begin(self, past: Past | None, now_ns: int) -> None:
+        """Take part, once there is a build: from the start, or from where the vHub before ended, as its journal says.
+
+        The shell calls it, since only the shell can read the journal.
+        """
+        deployment = self.deployment
+        assert deployment is not None and self.state is None, "begin once, after the build"
         self.releases = Releases(deployment.tick_ns)
-        self.member.standing = self._standing
+        self.sessions.downlinks.kept_ns = deployment.deadlines.client_back_ns
+        self.member.standing = lambda: self._commits.standing(deployment, self._epoch)
+        if past is None:
+            self.state = HubState(deployment, self.member.first_tick)
+            self._commits.start(self.member.layout, self.member.first_tick, self.member.first_chain)
+        else:
+            self._go_on(past, now_ns)
         self.actions.append(Journal(self.head()))
-        self._ready_if_complete()
+        self.ready_if_complete()
 
-    def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
-        self._repeated += not self.member.recall(recall)
-
-    def _standing(self) -> Publish:
-        """Say how far the world has come here: a supervisor that was started again may have lost more."""
+    def _go_on(self, past: Past, now_ns: int) -> None:
+        """Be the vHub that was there before: say its last deliveries again, and ask for what comes after."""
         assert self.deployment is not None
-        return Publish(channels.STANDING, channels.VHUB, encode(self._commits.standing(self.deployment, self._epoch)))
+        state = self.state = past.state
+        self._commits.start(past.layout, state.closed + 1, past.chain, past.committed)
+        self._sent = past.sent
+        self.sessions.downlinks.restore(past.downlinks, now_ns)
+        self.door.go_on(past.inputs, now_ns)
+        self.actions += past.words()
+        if past.epoch is not None:
+            self._take_epoch(past.epoch)
+        self._patience.progress(self.deployment.tick_ns, now_ns)
 
-    def _ready_if_complete(self) -> None:
-        """The hub is ready when all declared lockstep clients have joined."""
+    def ready_if_complete(self) -> None:
+        """The hub is ready when all declared lockstep clients have joined, or had joined the one before it."""
         layout = self._commits.layout
-        if layout is None or self.deployment is None or self.member.is_ready:
+        if layout is None or self.deployment is None or self.state is None or self.member.is_ready:
             return
-        if not self.sessions.missing(self.deployment):
+        if self._epoch > 0 or not self.sessions.missing(self.deployment, self.state):
             self.member.ready(layout)
 
+    def _take_epoch(self, epoch: Epoch) -> None:
+        self._epoch, self._epoch_tick = epoch.epoch, epoch.tick
+        self._epoch_payload = encode(epoch)
+        self._owners = dict(epoch.owners)
+
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
-        if epoch.epoch <= self._epoch or self.state is None:
-            self._repeated += 1
+        if self.state is None:
+            return
+        if epoch.epoch <= self._epoch:
+            self.repeated += 1
             self.member.repeated(epoch.epoch == self._epoch)
             return
         self.member.check_epoch(epoch)
         first = self._epoch == 0
-        self._epoch, self._epoch_tick = epoch.epoch, epoch.tick
-        self._owners = dict(epoch.owners)
-        self.actions.append(KeepEpoch(epoch))
+        if first and epoch.tick > self.state.closed + 1:
+            self.failure = f"the run is at tick {epoch.tick}: the journal of the vHub that brought it there is not here"
+            return
+        self._take_epoch(epoch)
+        self.actions += [Journal(self._epoch_payload), KeepEpoch(epoch)]
         self.member.entered()
         if first:
-            self._sent[0] = encode(Deliveries(0, []))
-            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[0]))
+            tick = self.state.closed + 1
+            self._sent[tick] = encode(Deliveries(tick, []))
+            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[tick]))
             self._patience.progress(self.state.tick_ns, now_ns)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         # A commit up to the epoch's start is as good under its old epoch: what is committed never changes.
         fenced = commit.epoch < self._epoch and commit.tick > self._epoch_tick
         taken = [] if fenced else self._commits.take(commit, payload)
-        self._repeated += not taken
+        self.repeated += not taken
         if self.releases is not None:
             for tick in taken:
                 self.releases.committed(tick, now_ns)
 
     def _on_samples(self, samples: Samples, payload: bytes, now_ns: int) -> None:
         if self.state is None or not self.state.closed < samples.tick <= self.state.closed + limits.KEPT_TICKS:
-            self._repeated += 1
+            self.repeated += 1
             return
         kept = self._samples.setdefault(samples.tick, [])
         if any(raw == payload for raw, _ in kept):
-            self._repeated += 1
+            self.repeated += 1
         elif len(kept) < limits.NODES_MAX * 4:
             kept.append((payload, samples))
             self.waits.node = samples.node
@@ -402,49 +418,11 @@ class HubCore:
         if want.kind == channels.DELIVERIES.name and want.tick in self._sent:
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[want.tick]))
 
-    def _on_hello(self, hello: ClientHello, payload: bytes, now_ns: int) -> None:
-        if self.state is None or self.deployment is None or self.member.build is None:
-            return
-        self.sessions.hello(hello, self.member.build, self.deployment, self.state)
-
-    def _session(self, message: Join | Up | Done) -> Session | None:
-        session = self.sessions.by_name.get(message.name)
-        if session is None or session.boot != message.boot:
-            self._repeated += 1
-            return None
-        return session
-
-    def _on_join(self, join: Join, payload: bytes, now_ns: int) -> None:
-        if self._session(join) is None or self.state is None:
-            return
-        if join.period and not may_lockstep(self.state.deployment, join.name):
-            raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
-        known = self.state.members.get(join.name)
-        if known is not None and known.active and known.period == join.period and join.name not in self._leaves:
-            self._repeated += 1
-            return
-        self.sessions.join(join)
-        self._ready_if_complete()
-
-    def _on_up(self, up: Up, payload: bytes, now_ns: int) -> None:
-        session = self._session(up)
-        if session is None or self.state is None:
-            return
-        if len(session.inbox) + len(up.packets) > limits.INBOX_MESSAGES_MAX:
-            self.state.refuse_at_door("inbox_full", len(up.packets))
-            return
-        session.inbox += up.packets
-
-    def _on_done(self, done: Done, payload: bytes, now_ns: int) -> None:
-        session = self._session(done)
-        if session is None:
-            return
-        if self._world is None or done.name not in self._world.waited or done.tick != session.go_tick:
-            self._repeated += 1
-            return
-        self._world.waited.remove(done.name)
-        session.done = done
-        self.waits.client = done.name
+    def take_done(self, client: str) -> None:
+        """A tick waits for this client no more."""
+        assert self._world is not None
+        self._world.waited.remove(client)
+        self.waits.client = client
 
     def _on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
         """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
@@ -463,7 +441,8 @@ class HubCore:
             self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
         self._patience.asked(now_ns)
 
-    def _lose(self, name: str, why: str) -> None:
+    def lose(self, name: str, why: str) -> None:
+        """A client is lost that the run cannot do without."""
         if not self.lost:
             self.lost = f"{name}: {why}"
             self.actions.append(Say("error", f"lost {self.lost}"))
@@ -471,10 +450,8 @@ class HubCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = 0 if self.state is None else self.state.closed + 1
-        return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, self._report())
-
-    def _report(self) -> bytes:
-        return report(self.state, self.capture, self.radio_address)
+        told = report(self.state, self.capture, self.radio_address)
+        return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, told)
 
     # --- the end -----------------------------------------------------------------------------------------------------
 
@@ -505,8 +482,9 @@ class HubCore:
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1
-            self.sessions.say_down(name, number, self.ended.tick, [], 0, ended=True)
+            self.sessions.say_down(name, Down(number, self.ended.tick, 0, [], True), now_ns)
 
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""
-        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, self._report())))
+        told = report(self.state, self.capture, self.radio_address)
+        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, told)))

@@ -21,18 +21,22 @@ from foosim.protocol.addresses import LOOPBACK, check_listen
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, remove_journal
+from foosim.protocol.journal import Journal, read_journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
 from foosim.protocol.orphan import Orphan
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
+from foosim.vhub.capture_file import origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.records import Closing
+from foosim.vhub.resume import Captured, first_tick_of, recall, was_captured
 
 CONNECT_S = 60.0
 FORGET_EVERY_NS = 1_000_000_000
@@ -53,7 +57,6 @@ class HubProcess:
     def __init__(self, simulation: Session, radio: Session, inbox: Inbox, options: HubOptions) -> None:
         self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns())
         self.core.radio_address = radio.locator
-        self.failed = ""
         self._options = options
         self._inbox = inbox
         self._journal: Journal | None = None
@@ -89,9 +92,12 @@ class HubProcess:
             self._close()
         if self.core.member.refusal:
             return REFUSED
+        if self.core.failure:
+            self._log.error(self.core.failure)
+            return FAILED
         farewell = self.core.farewell()
         self._wire.put(farewell.channel, farewell.name, farewell.payload)
-        return FAILED if self._is_abandoned or self.failed else DONE
+        return FAILED if self._is_abandoned else DONE
 
     def stop(self) -> None:
         """Have `run` end what it has and return; a signal handler may call this."""
@@ -102,7 +108,7 @@ class HubProcess:
         core = self.core
         if core.state is None and (self._is_abandoned or core.ended is not None):
             return True
-        return core.finished or bool(core.member.refusal)
+        return core.finished or bool(core.member.refusal or core.failure)
 
     # --- rounds of the loop ------------------------------------------------------------------------------------------
 
@@ -110,7 +116,7 @@ class HubProcess:
         core = self.core
         core.busy = self._loop.busy
         if core.member.build is not None and self._journal is None:
-            self._begin(core.member.build)
+            self._begin(core.member.build, now_ns)
         if self._orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._is_abandoned:
             self._why_abandoned = "lost the supervisor, and it has not come back"
             core.actions.append(Say("error", self._why_abandoned))
@@ -123,34 +129,49 @@ class HubProcess:
             self._forget_ns = now_ns + FORGET_EVERY_NS
             self._turn_journal(self._journal, core.state.closed)
 
-    def _begin(self, build: Build) -> None:
-        """Be present, since the supervisor has let us in, and open the journal and the capture.
+    def _begin(self, build: Build, now_ns: int) -> None:
+        """Be present, since the supervisor has let us in, open the journal and the capture, and go on from them.
 
         Present first: whoever cannot open them ends, and the supervisor knows by the presence that it did.
         """
         self._wire.declare_alive()
-        options, core = self._options, self.core
-        assert core.deployment is not None
-        folder = options.folder or Path(f"{build.run}.vhub")
-        self._journal = self._loop.journal = Journal(folder / "journals", VHUB)
-        if options.keeps:
-            path = options.capture or Path("captures") / f"{core.deployment.world}-{wall.now_stamp()}.mcap"
-            metadata = {
-                "run": build.run,
-                "started": wall.now_text(),
-                "pace": build.pace,
-                "fingerprint": library_fingerprint().hex(),
-            }
-            self._capture = CaptureWriter(
-                path, core.deployment, build.deployment_name, build.deployment, metadata, self._say
-            )
-            core.capture = str(path)
+        core, deployment = self.core, self.core.deployment
+        assert deployment is not None
+        folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
+        self._journal = self._loop.journal = Journal(folder, VHUB)
+        records = list(read_journal(folder, VHUB))
+        captured = self._open_capture(build, deployment, records)
+        past = recall(deployment, build.run, records, captured, deployment.deadlines.client_back_ns)
+        if self._capture is not None and past is not None and past.known is not None:
+            self._capture.keep(Closing(past.known, past.known.digest, [], []))  # which it has: it goes on from there
+        core.begin(past, now_ns)
+
+    def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:
+        """Begin the capture, or go on with the one that the vHub before has begun; return how far it is."""
+        before, options = was_captured(records), self._options
+        if not (options.keeps if before is None else before):
+            return None
+        path = Path(before) if before else options.capture
+        path = path or Path("captures") / f"{deployment.world}-{wall.now_stamp()}.mcap"
+        metadata = {
+            "run": build.run,
+            "started": wall.now_text(),
+            "pace": build.pace,
+            "fingerprint": library_fingerprint().hex(),
+            **origin_metadata(build.origin),
+        }
+        described = build.deployment_name, build.deployment, metadata, self._say, first_tick_of(records)
+        self._capture = CaptureWriter(path, deployment, *described)
+        self.core.capture = str(path)
+        return self._capture.begun_with
 
     def _turn_journal(self, journal: Journal, closed: int) -> None:
         """Between ticks, begin a new file when one is full; what the capture has on the disk may go."""
         if self.core.is_between_ticks and not self.core.actions:
             journal.rotate_if_full(self.core.head, closed)
-        journal.forget_before(closed if self._capture is None else self._capture.synced_tick)
+        assert self.core.deployment is not None
+        kept = closed - self.core.deployment.deadlines.client_back_ns // self.core.deployment.tick_ns
+        journal.forget_before(kept if self._capture is None else min(kept, self._capture.synced_tick))
 
     def _keep(self, action: Keep | KeepEpoch) -> None:
         if self._capture is not None:

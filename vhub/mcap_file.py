@@ -3,7 +3,8 @@
 The format is https://mcap.dev/spec. The `mcap` library serialises here whatever is rare (schemas, channels, indexes,
 summary); messages and chunks are packed by this module, since the library's `add_message` costs several times what a
 hub has for a packet. A file that ends in the middle of a record is an unfinished one, and everything before is read.
-Neither half opens files. Neighbours: `capture_writer`, `capture_reader`.
+Neither half opens files. Neighbours: `mcap_scan` (to go on with an unfinished file), `capture_writer`,
+`capture_reader`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import struct
 import sys
 from array import array
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from io import BytesIO
 from typing import BinaryIO, Final, Protocol
@@ -32,11 +33,12 @@ CHUNK_BYTES_MAX: Final = 64 * 1024 * 1024
 COMPRESSION: Final = "zstd"
 COMPRESSION_LEVEL: Final = 1
 _MESSAGE: Final = struct.Struct("<BQHIQQ")
-_MESSAGE_FIELDS: Final = struct.Struct("<HIQQ")
-_RECORD: Final = struct.Struct("<BQ")
+MESSAGE_FIELDS: Final = struct.Struct("<HIQQ")
+RECORD: Final = struct.Struct("<BQ")
 _INDEX: Final = struct.Struct("<BQHI")
+INDEX_FIELDS: Final = struct.Struct("<HI")
 _CHUNK: Final = struct.Struct("<BQQQQII4sQ")
-_CHUNK_FIELDS: Final = struct.Struct("<QQQII")
+CHUNK_FIELDS: Final = struct.Struct("<QQQII")
 _FOOTER_START: Final = struct.Struct("<BQQQ")
 _U64: Final = struct.Struct("<Q")
 
@@ -52,25 +54,39 @@ class Record(Protocol):
 # --- writing ---------------------------------------------------------------------------------------------------------
 
 
-class McapWriter:
-    """Packs an MCAP file; `write` takes the bytes, in order. Messages are collected until `end_chunk`."""
+@dataclass(slots=True)
+class Book:
+    """What the summary of a file says in the end: kept while it is written, found again in one that has none."""
 
-    def __init__(self, write: Callable[[bytes], None], profile: str) -> None:
+    offset: int = 0
+    """How many bytes the file has."""
+    schemas: list[records.Schema] = field(default_factory=list)
+    channels: list[records.Channel] = field(default_factory=list)
+    chunks: list[records.ChunkIndex] = field(default_factory=list)
+    attachments: list[records.AttachmentIndex] = field(default_factory=list)
+    metadata: list[records.MetadataIndex] = field(default_factory=list)
+    counts: dict[int, int] = field(default_factory=dict)
+    """Messages by channel."""
+    start_ns: int = sys.maxsize
+    end_ns: int = 0
+    """Times of the first and the last message."""
+
+
+class McapWriter:
+    """Packs an MCAP file; `write` takes the bytes, in order. Messages are collected until `end_chunk`.
+
+    With the `book` of an unfinished file (`mcap_scan`) it goes on behind what that one has.
+    """
+
+    def __init__(self, write: Callable[[bytes], None], profile: str, book: Book | None = None) -> None:
         self._write = write
-        self._offset = 0
-        self._schemas: list[records.Schema] = []
-        self._channels: list[records.Channel] = []
-        self._chunks: list[records.ChunkIndex] = []
-        self._attachments: list[records.AttachmentIndex] = []
-        self._metadata: list[records.MetadataIndex] = []
-        self._counts: dict[int, int] = {}
+        self._book = book or Book()
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._chunk = bytearray()
-        self._index: dict[int, array[int]] = {}
-        self._start_ns, self._end_ns = sys.maxsize, 0
-        """Times of the first and the last message."""
-        self._put(MAGIC)
-        self._put_record(records.Header(profile, f"foosim {version('foosim')}, mcap {version('mcap')}"))
+        self._index: dict[int, array[int]] = {channel.id: array("Q") for channel in self._book.channels}
+        if book is None:
+            self._put(MAGIC)
+            self._put_record(records.Header(profile, f"foosim {version('foosim')}, mcap {version('mcap')}"))
 
     @property
     def chunk_bytes(self) -> int:
@@ -80,34 +96,34 @@ class McapWriter:
     @property
     def offset(self) -> int:
         """How many bytes the file has."""
-        return self._offset
+        return self._book.offset
 
     @property
     def messages(self) -> int:
         """How many messages are in chunks that have ended."""
-        return sum(self._counts.values())
+        return sum(self._book.counts.values())
 
     def add_channel(self, topic: str, message_encoding: str, schema: tuple[str, str, bytes]) -> int:
         """Declare a topic with its schema (name, encoding, data) and return the channel's number."""
-        number = len(self._channels) + 1
+        number = len(self._book.channels) + 1
         name, encoding, data = schema
-        self._schemas.append(records.Schema(id=number, name=name, encoding=encoding, data=data))
-        self._channels.append(
+        self._book.schemas.append(records.Schema(id=number, name=name, encoding=encoding, data=data))
+        self._book.channels.append(
             records.Channel(id=number, topic=topic, message_encoding=message_encoding, schema_id=number, metadata={})
         )
-        self._put_record(self._schemas[-1])
-        self._put_record(self._channels[-1])
+        self._put_record(self._book.schemas[-1])
+        self._put_record(self._book.channels[-1])
         self._index[number] = array("Q")
-        self._counts[number] = 0
+        self._book.counts[number] = 0
         return number
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Attach a file; it has no times, so that equal runs attach equally."""
-        offset = self._offset
+        offset = self._book.offset
         length = self._put_record(
             records.Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
         )
-        self._attachments.append(
+        self._book.attachments.append(
             records.AttachmentIndex(
                 offset=offset,
                 length=length,
@@ -121,9 +137,9 @@ class McapWriter:
 
     def add_metadata(self, name: str, content: Mapping[str, str]) -> None:
         """Add a table of texts."""
-        offset = self._offset
+        offset = self._book.offset
         length = self._put_record(records.Metadata(name=name, metadata=dict(content)))
-        self._metadata.append(records.MetadataIndex(offset=offset, length=length, name=name))
+        self._book.metadata.append(records.MetadataIndex(offset=offset, length=length, name=name))
 
     def add_message(self, channel: int, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
         """Add a message to the chunk. The hot path: see the bench before changing it."""
@@ -136,14 +152,14 @@ class McapWriter:
         """Compress and write what is collected, with its indexes; nothing if it is empty."""
         if not self._chunk:
             return
-        chunk, size, offset = bytes(self._chunk), len(self._chunk), self._offset
+        chunk, size, offset = bytes(self._chunk), len(self._chunk), self._book.offset
         times = [entries[::2] for entries in self._index.values() if entries]
         first_ns, last_ns = min(map(min, times)), max(map(max, times))
         data = self._compressor.compress(chunk)
         name = COMPRESSION.encode()
         head = _CHUNK.pack(
             Opcode.CHUNK,
-            _CHUNK.size - _RECORD.size + len(data),
+            _CHUNK.size - RECORD.size + len(data),
             first_ns,
             last_ns,
             size,
@@ -154,7 +170,7 @@ class McapWriter:
         )
         indexes, offsets = self._message_indexes(offset + len(head) + len(data))
         self._put(head + data + indexes)
-        self._chunks.append(
+        self._book.chunks.append(
             records.ChunkIndex(
                 chunk_start_offset=offset,
                 chunk_length=len(head) + len(data),
@@ -167,9 +183,18 @@ class McapWriter:
                 message_index_length=len(indexes),
             )
         )
-        self._start_ns = min(self._start_ns, first_ns)
-        self._end_ns = max(self._end_ns, last_ns)
+        self._book.start_ns = min(self._book.start_ns, first_ns)
+        self._book.end_ns = max(self._book.end_ns, last_ns)
         self._chunk.clear()
+
+    def index_last_chunk(self, entries: Mapping[int, array[int]]) -> None:
+        """Write the indexes of the last chunk, behind which the file was cut: (time, place) of the messages."""
+        for channel, pairs in entries.items():
+            self._index[channel].extend(pairs)
+        indexes, offsets = self._message_indexes(self._book.offset)
+        self._put(indexes)
+        last = self._book.chunks[-1]
+        last.message_index_offsets, last.message_index_length = offsets, len(indexes)
 
     def _message_indexes(self, offset: int) -> tuple[bytes, dict[int, int]]:
         """Return the chunk's message index records, to be written at `offset`, and where each channel's is."""
@@ -181,7 +206,7 @@ class McapWriter:
                 content = entries.tobytes()
                 parts.append(_INDEX.pack(Opcode.MESSAGE_INDEX, 6 + len(content), channel, len(content)) + content)
                 offset += len(parts[-1])
-                self._counts[channel] += len(entries) // 2
+                self._book.counts[channel] += len(entries) // 2
                 del entries[:]
         return b"".join(parts), offsets
 
@@ -189,14 +214,14 @@ class McapWriter:
         """Write the last chunk and the summary, which makes the file whole."""
         self.end_chunk()
         self._put_record(records.DataEnd(0))
-        summary_start = self._offset
+        summary_start = self._book.offset
         groups: tuple[tuple[Opcode, list[Record]], ...] = (
-            (Opcode.SCHEMA, [*self._schemas]),
-            (Opcode.CHANNEL, [*self._channels]),
+            (Opcode.SCHEMA, [*self._book.schemas]),
+            (Opcode.CHANNEL, [*self._book.channels]),
             (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, [*self._chunks]),
-            (Opcode.ATTACHMENT_INDEX, [*self._attachments]),
-            (Opcode.METADATA_INDEX, [*self._metadata]),
+            (Opcode.CHUNK_INDEX, [*self._book.chunks]),
+            (Opcode.ATTACHMENT_INDEX, [*self._book.attachments]),
+            (Opcode.METADATA_INDEX, [*self._book.metadata]),
         )
         summary = b""
         offsets: list[Record] = []
@@ -214,15 +239,15 @@ class McapWriter:
 
     def _statistics(self) -> records.Statistics:
         return records.Statistics(
-            attachment_count=len(self._attachments),
-            channel_count=len(self._channels),
-            channel_message_counts=self._counts,
-            chunk_count=len(self._chunks),
+            attachment_count=len(self._book.attachments),
+            channel_count=len(self._book.channels),
+            channel_message_counts=self._book.counts,
+            chunk_count=len(self._book.chunks),
             message_count=self.messages,
-            message_start_time=self._start_ns if self._chunks else 0,
-            message_end_time=self._end_ns,
-            metadata_count=len(self._metadata),
-            schema_count=len(self._schemas),
+            message_start_time=self._book.start_ns if self._book.chunks else 0,
+            message_end_time=self._book.end_ns,
+            metadata_count=len(self._book.metadata),
+            schema_count=len(self._book.schemas),
         )
 
     def _put_record(self, record: Record) -> int:
@@ -232,7 +257,7 @@ class McapWriter:
 
     def _put(self, content: bytes) -> None:
         self._write(content)
-        self._offset += len(content)
+        self._book.offset += len(content)
 
 
 def _serialised(record: Record) -> bytes:
@@ -291,7 +316,7 @@ class McapFile:
                 yield from self._read(opcode, content)
             except (EndOfFile, struct.error, ValueError, zstandard.ZstdError) as error:
                 raise self._damaged(str(error) or "it is too short") from None
-            self._at += _RECORD.size + len(content)
+            self._at += RECORD.size + len(content)
 
     def _damaged(self, what: str) -> CaptureError:
         return CaptureError(f"{self._name}: byte {self._at}: a damaged record, {what}")
@@ -313,11 +338,11 @@ class McapFile:
 
     def _next_record(self) -> tuple[int, bytes] | None:
         """Return opcode and content of the next record, None where the file ends within it."""
-        head = self._stream.read(_RECORD.size)
-        if len(head) < _RECORD.size:
+        head = self._stream.read(RECORD.size)
+        if len(head) < RECORD.size:
             return None
-        opcode, length = _RECORD.unpack(head)
-        if length > self._size - self._at - _RECORD.size:
+        opcode, length = RECORD.unpack(head)
+        if length > self._size - self._at - RECORD.size:
             return None
         if length > CHUNK_BYTES_MAX:
             raise CaptureError(
@@ -328,7 +353,7 @@ class McapFile:
 
     def _read(self, opcode: int, content: bytes) -> Iterator[Content]:
         if opcode == Opcode.CHUNK:
-            yield from self._messages(self._chunk_content(content))
+            yield from self._messages(unpack_chunk(content, f"{self._name}: byte {self._at}"))
         elif opcode == Opcode.MESSAGE:
             yield self._message(content, 0, len(content))
         elif opcode == Opcode.CHANNEL:
@@ -347,48 +372,56 @@ class McapFile:
         channel = records.Channel.read(_stream(content))
         self._topics[channel.id] = channel.topic
 
-    def _chunk_content(self, content: bytes) -> bytes:
-        """Return the records of a chunk; what it would unpack to is bounded before it is unpacked."""
-        _, _, size, checksum, name_length = _CHUNK_FIELDS.unpack_from(content)
-        at = _CHUNK_FIELDS.size + name_length
-        compression = content[_CHUNK_FIELDS.size : at].decode()
-        (length,) = _U64.unpack_from(content, at)
-        data = content[at + _U64.size :]
-        if size > CHUNK_BYTES_MAX:
-            raise CaptureError(
-                f"{self._name}: byte {self._at}: a chunk of {size} bytes, at most {CHUNK_BYTES_MAX} are read"
-            )
-        if length != len(data):
-            raise ValueError(f"a chunk of {length} bytes in a record with room for {len(data)}")
-        if compression == COMPRESSION:
-            data = zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
-        elif compression:
-            raise ValueError(f"compression {compression!r}, read are {COMPRESSION!r} and none")
-        if len(data) != size:
-            raise ValueError(f"a chunk that unpacks to {len(data)} bytes or more instead of {size}")
-        if checksum and crc32(data) != checksum:
-            raise ValueError("a chunk whose checksum is wrong")
-        return data
-
     def _messages(self, chunk: bytes) -> Iterator[Message]:
-        at, end = 0, len(chunk)
-        while at < end:
-            opcode, length = _RECORD.unpack_from(chunk, at)
-            at += _RECORD.size
-            if length > end - at:
-                raise ValueError(f"a record of {length} bytes in a chunk with {end - at} left")
+        for opcode, start, stop in chunk_records(chunk):
             if opcode == Opcode.MESSAGE:
-                yield self._message(chunk, at, at + length)
+                yield self._message(chunk, start, stop)
             elif opcode == Opcode.CHANNEL:
-                self._declare(chunk[at : at + length])
-            at += length
+                self._declare(chunk[start:stop])
 
     def _message(self, content: bytes, start: int, stop: int) -> Message:
-        channel, sequence, log_ns, publish_ns = _MESSAGE_FIELDS.unpack_from(content, start)
+        channel, sequence, log_ns, publish_ns = MESSAGE_FIELDS.unpack_from(content, start)
         topic = self._topics.get(channel)
         if topic is None:
             raise ValueError(f"a message of channel {channel}, which is not declared")
-        return Message(topic, log_ns, publish_ns, sequence, content[start + _MESSAGE_FIELDS.size : stop])
+        return Message(topic, log_ns, publish_ns, sequence, content[start + MESSAGE_FIELDS.size : stop])
+
+
+def unpack_chunk(content: bytes, place: str) -> bytes:
+    """Return the records of a chunk; what it would unpack to is bounded before it is unpacked.
+
+    Raises ValueError for a damaged one, CaptureError for one that is too large.
+    """
+    _, _, size, checksum, name_length = CHUNK_FIELDS.unpack_from(content)
+    at = CHUNK_FIELDS.size + name_length
+    compression = content[CHUNK_FIELDS.size : at].decode()
+    (length,) = _U64.unpack_from(content, at)
+    data = content[at + _U64.size :]
+    if size > CHUNK_BYTES_MAX:
+        raise CaptureError(f"{place}: a chunk of {size} bytes, at most {CHUNK_BYTES_MAX} are read")
+    if length != len(data):
+        raise ValueError(f"a chunk of {length} bytes in a record with room for {len(data)}")
+    if compression == COMPRESSION:
+        data = zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
+    elif compression:
+        raise ValueError(f"compression {compression!r}, read are {COMPRESSION!r} and none")
+    if len(data) != size:
+        raise ValueError(f"a chunk that unpacks to {len(data)} bytes or more instead of {size}")
+    if checksum and crc32(data) != checksum:
+        raise ValueError("a chunk whose checksum is wrong")
+    return data
+
+
+def chunk_records(chunk: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, start and stop of each record in an unpacked chunk. Raises ValueError for one that is cut."""
+    at, end = 0, len(chunk)
+    while at < end:
+        opcode, length = RECORD.unpack_from(chunk, at)
+        at += RECORD.size
+        if length > end - at:
+            raise ValueError(f"a record of {length} bytes in a chunk with {end - at} left")
+        yield opcode, at, at + length
+        at += length
 
 
 def _stream(content: bytes) -> ReadDataStream:

@@ -1,7 +1,9 @@
 """The vHub's journal: one record per closed tick, holding the inputs of the closing and what it gave.
 
 A fold of the records through the same state gives frames, fates, what is in flight and the next deliveries again, byte
-for byte. The first record of a file holds the whole state, so that older files can go. Neighbours: `state`, `core`.
+for byte. The first record of a file holds the whole state, so that older files can go; such a head also stands between
+the ticks now and then, so that a fold need not begin far back. Beside them are the epochs, and who joins and leaves at
+a tick whose Go is said before its record is written. Neighbours: `state`, `core`, `resume`.
 """
 
 from __future__ import annotations
@@ -14,20 +16,37 @@ import msgspec
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, frame_from_bytes, layout_after
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Commit, Delivered, Edit, RobotPacket, Samples, Sent
+from foosim.protocol.messages import Commit, Delivered, Edit, Epoch, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState, Joining
 
 
 class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
-    """Where a journal file starts: the run, the state after the last closed tick, the layout's added entities."""
+    """Where a journal file starts: the run, the state after the last closed tick, the layout's added entities.
+
+    Commit and epoch are the last ones as they came, empty before the first.
+    """
 
     run: str
     state: bytes
     added: list[tuple[str, str]]
+    commit: bytes = b""
+    epoch: bytes = b""
+    chain: bytes = CHAIN_START
+    """Over the frames up to that commit."""
+    capture: str = ""
+    """Where the capture is; empty when there is none."""
+
+
+class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", forbid_unknown_fields=True):
+    """Who joins and leaves at `tick`, written before its Go is said: what closes the tick then, whoever does it."""
+
+    tick: int
+    joins: list[Joining]
+    leaves: list[str]
 
 
 class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbid_unknown_fields=True):
@@ -46,7 +65,7 @@ class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbi
     deliveries: bytes
 
 
-HubRecord = HeadRecord | TickRecord
+HubRecord = HeadRecord | TickRecord | InputsRecord | Epoch
 
 
 @dataclass(slots=True)
@@ -62,6 +81,17 @@ class Closing:
     leaves: list[str] = field(default_factory=list)
     fates: list[Flight] = field(default_factory=list)
     wall_ns: int = 0
+
+
+@dataclass(slots=True)
+class World:
+    """The tick that is being closed, after its world phase."""
+
+    frame: Frame
+    closing: Closing
+    commit: bytes
+    waited: list[str]
+    free: dict[str, list[Flight]]
 
 
 def tick_record(
@@ -105,24 +135,52 @@ def missing_robots(samples: Iterable[Samples], digest: bytes, frame: Frame) -> l
     return [robot.name for robot in frame.layout.robots if robot.name not in covered]
 
 
-def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:
-    """Yield the state and the closing after every tick record; the first record is a head.
+@dataclass(frozen=True, slots=True)
+class Folded:
+    """One closing that a fold computed again: the state behind it, its record, what was released to each client."""
 
+    state: HubState
+    closing: Closing
+    record: TickRecord
+    released: dict[str, list[Flight]]
+
+
+class Fold:
+    """Computes again what the records of a journal, the first of which is a head, are about.
+
+    Iterating gives each closing; `state`, `layout`, `commit`, `chain`, `epoch` and `inputs` are then those behind it.
     Raises Malformed when the records are not those of one run of this version.
     """
-    iterator = iter(records)
-    head = decode_any(HubRecord, next(iterator, b""))
-    if not isinstance(head, HeadRecord):
-        raise Malformed("a journal of the vHub that does not start with its head")
-    state = HubState.restore(deployment, head.state)
-    layout = build_layout(deployment, head.added)
-    for raw in iterator:
-        record = decode_any(HubRecord, raw)
-        if isinstance(record, HeadRecord):
-            continue
+
+    def __init__(self, deployment: Deployment, records: Iterable[bytes]) -> None:
+        self._records = iter(records)
+        head = decode_any(HubRecord, next(self._records, b""))
+        if not isinstance(head, HeadRecord):
+            raise Malformed("a journal of the vHub that does not start with its head")
+        self.run = head.run
+        self.state = HubState.restore(deployment, head.state)
+        self.layout = build_layout(deployment, head.added)
+        self.commit = head.commit
+        self.epoch = head.epoch
+        self.chain = head.chain
+        self.inputs: InputsRecord | None = None
+        """Who joins and leaves at the tick behind the last closed one, where that was written."""
+
+    def __iter__(self) -> Iterator[Folded]:
+        for raw in self._records:
+            record = decode_any(HubRecord, raw)
+            if isinstance(record, TickRecord):
+                yield self._close(record)
+            elif isinstance(record, InputsRecord):
+                self.inputs = record
+            elif isinstance(record, Epoch):
+                self.epoch = raw
+
+    def _close(self, record: TickRecord) -> Folded:
+        state = self.state
         commit = decode(Commit, record.commit)
-        layout = layout_after(layout, commit.edits)
-        frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+        self.layout = layout_after(self.layout, commit.edits)
+        frame = frame_from_bytes(commit.tick, self.layout, commit.values, commit.outboxes)
         samples = [decode(Samples, raw) for raw in record.samples]
         packets = world_packets(samples, commit.digest, frame, state.sampling)
         if packets is None or frame.tick != state.closed + 1 or record.tick != frame.tick:
@@ -140,7 +198,19 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[Hub
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
-        yield state, closing
+        if self.commit:  # else it is the frame that the run begins with
+            self.chain = chain_next(self.chain, commit.digest)
+        self.commit, self.inputs = record.commit, None
+        return Folded(state, closing, record, released)
+
+
+def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:
+    """Yield the state and the closing after every tick record; the first record is a head.
+
+    Raises Malformed when the records are not those of one run of this version.
+    """
+    for folded in Fold(deployment, records):
+        yield folded.state, folded.closing
 
 
 def count_downlinks(state: HubState, tick: int, released: dict[str, list[Flight]]) -> None:

@@ -67,6 +67,10 @@ class Releases:
         self._waiting = self._waiting[len(due) :]
         return due
 
+    def first_number(self, client: str) -> int | None:
+        """Return the number of the oldest downlink that waits for a client."""
+        return min((release.number for release in self._waiting if release.client == client), default=None)
+
     @property
     def waiting_tick(self) -> int | None:
         """The oldest tick of which something waits."""

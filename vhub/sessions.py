@@ -1,13 +1,13 @@
 """The clients' side of the hub: who is let in, what was said to each and is kept until answered.
 
 A lockstep client gets `Go(k)` and answers `Done(k)`, stop and wait; a free-running one gets numbered `Down`s. What is
-said to a client is numbered and kept. Sessions are about processes; what the world must remember of a client is in
-`state`. Neighbours: `core`.
+said to a client is numbered and kept, so that it can go on after it was away. Sessions are about processes; what the
+world must remember of a client is in `state`. Neighbours: `core`, `door` (what clients say), `downlinks`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from foosim.protocol import channels, limits
@@ -22,11 +22,13 @@ from foosim.protocol.messages import (
     Done,
     Down,
     Go,
+    Heard,
     Join,
     Received,
     Sent,
 )
 from foosim.protocol.names import nearest_name
+from foosim.vhub.downlinks import Downlinks
 from foosim.vhub.state import HubState, Joining
 
 
@@ -42,16 +44,51 @@ class Session:
 
     name: str
     boot: str
+    """Empty while the client that the state knows has not come to this vHub yet."""
+    is_present: bool = False
+    """Whether it has joined since its last hello: only then it is told anything."""
+    received: int = 0
+    """The last downlink up to which it had all at its hello."""
+    is_behind: bool = True
+    """Whether it is to be told what it had not received then."""
+    away_ns: int = -1
+    """Until when a client that is away may come back; -1 while it is here."""
+    next_sequence: int = 1
+    """The number of its next packet: nothing behind a gap is taken."""
+    heard: int = 0
+    """What it was told to be recorded."""
+    heard_ns: int = 0
     go: bytes = b""
     go_tick: int = -1
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
+    allowed_ns: int = 0
     done: Done | None = None
     inbox: list[Sent] = field(default_factory=list)
 
+    def come(self, boot: str, received: int, sequence: int) -> None:
+        """A process of the client is here; it goes on behind these numbers."""
+        if boot != self.boot:
+            self.inbox, self.next_sequence = [], 1
+        self.is_present = self.is_present and boot == self.boot
+        self.boot, self.received, self.is_behind, self.away_ns = boot, received, True, -1
+        self.next_sequence = max(self.next_sequence, sequence + 1)
+
+    def take(self, packets: Sequence[Sent]) -> int:
+        """Take what the client sends, each number once and in order; return how many were taken before."""
+        repeated = 0
+        for packet in packets:
+            if packet.sequence == self.next_sequence:
+                self.next_sequence += 1
+                self.inbox.append(packet)
+            elif packet.sequence < self.next_sequence:
+                repeated += 1
+        return repeated
+
     def wait(self, now_ns: int, allowed_ns: int, again_after_ns: int) -> None:
         """Begin to wait for a Done."""
+        self.allowed_ns = allowed_ns
         self.deadline_ns = now_ns + allowed_ns
         self.again_after_ns = again_after_ns
         self.again_ns = now_ns + again_after_ns
@@ -64,30 +101,47 @@ class Sessions:
         self.by_name: dict[str, Session] = {}
         self.joins: dict[str, Joining] = {}
         """Joins that wait for a tick, by client."""
+        self.downlinks = Downlinks()
         self._left_behind: dict[str, list[Sent]] = {}
         """What clients had sent before they went."""
         self._hub_boot = hub_boot
         self._actions = actions
 
-    def hello(self, hello: ClientHello, build: Build, deployment: Deployment, state: HubState) -> None:
-        """Let a client in, or say why not. A repeat gets the same answer."""
+    def hello(
+        self, hello: ClientHello, build: Build, deployment: Deployment, state: HubState, said: int | None = None
+    ) -> None:
+        """Let a client in, or say why not. A repeat gets the same answer.
+
+        `said` is the last downlink that was said to its name, None when that is the last one of all.
+        """
         reason = self._reason_against(hello, deployment)
         if reason:
             refusal = encode(ClientRefusal(hello.name, hello.boot, reason))
             self._actions.append(Publish(channels.CLIENT_REFUSAL, hello.name, refusal))
             return
-        session = self.by_name.get(hello.name)
-        if session is None or session.boot != hello.boot:
-            self.by_name[hello.name] = Session(hello.name, hello.boot)
         member = state.members.get(hello.name)
+        sequence = 0 if member is None else member.sequence
+        downlink = 0 if member is None else member.downlink if said is None else said
+        session = self.by_name.get(hello.name)
+        if session is None:
+            session = self.by_name[hello.name] = Session(hello.name, hello.boot)
+        if hello.again:
+            downlink = min(hello.received, downlink)
+        else:  # another process: the numbers of what the one before has sent are taken
+            waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
+            sequence = max([sequence, *(packet.sequence for packet in waiting)])
+        if session.boot != hello.boot:
+            self._left_behind.setdefault(hello.name, []).extend(session.inbox)
+        session.come(hello.boot, downlink, sequence)
         welcome = ClientWelcome(
             hello.name,
             hello.boot,
             self._hub_boot,
-            0 if member is None else member.sequence,
-            0 if member is None else member.downlink,
+            sequence,
+            downlink,
             build.deployment_name,
             build.deployment,
+            build.run,
         )
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
 
@@ -102,14 +156,29 @@ class Sessions:
             hint = f", nearest is {nearest}" if nearest else ""
             return f"no client {hello.name} is declared; declared are {', '.join(sorted(declared)) or 'none'}{hint}"
         session = self.by_name.get(hello.name)
-        if session is not None and session.boot != hello.boot:
+        if session is not None and session.boot not in ("", hello.boot) and session.away_ns < 0:
             return f"a client {hello.name} is already here"
         return ""
 
-    def missing(self, deployment: Deployment) -> list[str]:
+    def missing(self, deployment: Deployment, state: HubState) -> list[str]:
         """Return the declared lockstep clients that have not joined yet, in name order."""
         declared = sorted([*deployment.players, *deployment.clients])
-        return [name for name in declared if may_lockstep(deployment, name) and name not in self.joins]
+        here = {name for name, member in state.members.items() if member.active} | self.joins.keys()
+        return [name for name in declared if may_lockstep(deployment, name) and name not in here]
+
+    def expect(self, names: Iterable[str], until_ns: int) -> None:
+        """These clients come back, by then, to this vHub, which is another one."""
+        for name in sorted(names):
+            self.by_name[name] = Session(name, "", away_ns=until_ns)
+
+    def late(self, now_ns: int) -> list[str]:
+        """Return the clients that were away for too long, in name order."""
+        return [name for name, session in sorted(self.by_name.items()) if 0 <= session.away_ns <= now_ns]
+
+    @property
+    def late_ns(self) -> int | None:
+        """When the next client has been away for too long."""
+        return min((session.away_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
 
     def join(self, join: Join) -> None:
         """Note a join; it takes effect when the hub closes a tick that suits its period."""
@@ -145,18 +214,40 @@ class Sessions:
         return taken
 
     def say_go(self, session: Session, number: int, tick: int, packets: Sequence[Received], acknowledged: int) -> None:
-        """Give a lockstep client its tick."""
+        """Give a lockstep client its tick; to one that is away it is said when it is back."""
         session.go = encode(Go(number, tick, acknowledged, list(packets)))
         session.go_tick = tick
         session.done = None
-        self._actions.append(Publish(channels.DOWN, session.name, session.go))
+        if session.is_present:
+            self._actions.append(Publish(channels.DOWN, session.name, session.go))
 
-    def say_down(
-        self, name: str, number: int, tick: int, packets: Sequence[Received], acknowledged: int, ended: bool = False
-    ) -> None:
-        """Give a client what is released to it outside of lockstep, or the news of the end."""
-        payload = encode(Down(number, tick, acknowledged, list(packets), ended))
-        self._actions.append(Publish(channels.DOWN, name, payload))
+    def say_down(self, name: str, down: Down, now_ns: int) -> None:
+        """Give a client what is released to it outside of lockstep, or the news of the end; and keep it."""
+        payload = encode(down)
+        self.downlinks.keep(name, down.number, payload, now_ns)
+        session = self.by_name.get(name)
+        if session is not None and (session.is_present or down.ended):
+            session.heard = max(session.heard, down.acknowledged)
+            self._actions.append(Publish(channels.DOWN, name, payload))
+
+    def catch_up(self, session: Session, waits: bool, now_ns: int) -> None:
+        """A client has joined (again): say what it had not received; `waits` is whether a tick waits for its Done."""
+        session.is_present = True
+        if session.is_behind:
+            session.deadline_ns = now_ns + session.allowed_ns
+            session.is_behind = False
+            missed = [*self.downlinks.behind(session.name, session.received), *([session.go] if waits else [])]
+            self._actions += [Publish(channels.DOWN, session.name, payload) for payload in missed]
+
+    def acknowledge(self, state: HubState, now_ns: int) -> None:
+        """Tell free-running clients what is recorded of what they sent, ten times a second at most."""
+        for name, session in self.by_name.items():
+            member = state.members.get(name)
+            if member is None or member.period or not session.is_present or member.sequence <= session.heard:
+                continue
+            if now_ns >= session.heard_ns + limits.HEARTBEAT_NS:
+                session.heard, session.heard_ns = member.sequence, now_ns
+                self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence))))
 
     def overdue(self, waited: Sequence[str], paused: bool, now_ns: int) -> list[Session]:
         """Return those whose deadline has passed; while the run is paused none passes."""
@@ -164,7 +255,7 @@ class Sessions:
         if paused:
             for session in sessions:
                 session.deadline_ns = max(session.deadline_ns, now_ns + limits.WANT_EVERY_NS_MAX)
-        return [session for session in sessions if now_ns >= session.deadline_ns]
+        return [session for session in sessions if now_ns >= session.deadline_ns and session.away_ns < 0]
 
     def again_ns(self, waited: Sequence[str]) -> int:
         """When the next Go is said again."""
@@ -175,6 +266,7 @@ class Sessions:
         for name in waited:
             session = self.by_name[name]
             if now_ns >= session.again_ns:
-                self._actions.append(Publish(channels.DOWN, name, session.go))
+                if session.is_present:
+                    self._actions.append(Publish(channels.DOWN, name, session.go))
                 session.again_after_ns = min(2 * session.again_after_ns, limits.WANT_EVERY_NS_MAX)
                 session.again_ns = now_ns + session.again_after_ns

@@ -73,18 +73,19 @@ class Packets:
 class HubState:
     """Links, members, what is in flight. All of it plain values; nothing here knows time but as ticks."""
 
-    def __init__(self, deployment: Deployment) -> None:
+    def __init__(self, deployment: Deployment, first_tick: int = 0) -> None:
+        """`first_tick` is that of the frame that the run begins with."""
         self.deployment = deployment
         self.tick_ns = deployment.tick_ns
-        self.closed = -1
+        self.closed = first_tick - 1
         """The last tick whose closing is complete."""
         self.packets = Packets()
         self.refusals: dict[str, int] = {}
         self.members: dict[str, Member] = {}
         self.links: dict[tuple[str, str], Link] = {}
-        self.deliveries: dict[int, list[Delivered]] = {-1: [], 0: []}
+        self.deliveries: dict[int, list[Delivered]] = {first_tick - 1: [], first_tick: []}
         """What reaches robots at the last closed tick and at the next one."""
-        self.final = 0
+        self.final = first_tick
         """The last tick whose deliveries are final. Behind the next one they are without packets."""
         self.was_final = False
         """Whether the deliveries of the next tick were final before the last closing."""
@@ -147,9 +148,7 @@ class HubState:
                 self._send(flight, tick, fates)
         return self._arrive_at_clients(tick, fates)
 
-    def close_clients(
-        self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]
-    ) -> Deliveries:
+    def close_clients(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]) -> Deliveries:
         """Phase two: judge what clients sent, in (source, sequence) order. Return the deliveries of the next tick."""
         tick = frame.tick
         sent_ns = tick * self.tick_ns

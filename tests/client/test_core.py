@@ -63,6 +63,7 @@ class Air:
         self.deliveries: list[Deliveries] = []
         self._said: list[Publish] = []
         self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot", "first", "run-1", NAME, TEXT, "fast", [])))
+        self.hub.begin(None, 0)
 
     def tell(self, channel: channels.Channel, name: str, payload: bytes) -> None:
         """Give the hub one message."""

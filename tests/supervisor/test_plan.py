@@ -13,9 +13,7 @@ from foosim.supervisor.plan import Plan, RunOptions, make_plan
 from foosim.supervisor.run_folder import RunFolder
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
-EVERYTHING = RunOptions(
-    TABLE, "2x", "1.5 s", 7, ("engine=pure", "table.ball.mass=27 g"), "0.0.0.0:7447", insecure=True
-)
+EVERYTHING = RunOptions(TABLE, "2x", "1.5 s", 7, ("engine=pure", "table.ball.mass=27 g"), "0.0.0.0:7447", insecure=True)
 
 
 def test_a_plan_has_what_was_asked_for() -> None:

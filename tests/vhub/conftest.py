@@ -35,6 +35,7 @@ from foosim.protocol.messages import (
     End,
     Epoch,
     Go,
+    Heard,
     Join,
     Push,
     Remove,
@@ -45,11 +46,11 @@ from foosim.protocol.messages import (
     Up,
 )
 from foosim.protocol.start import initial_numbers
-from foosim.vhub import capture_writer
+from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
-from foosim.vhub.records import Closing
+from foosim.vhub.records import Closing, HubRecord, TickRecord
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NAME = "table.yaml"
@@ -74,12 +75,14 @@ def noise(size: int, *key: object) -> bytes:
 
 @dataclass
 class HubRun:
-    """What a driven hub gave: the journal's records, the closings, and the state's bytes after each record."""
+    """What a driven hub gave: its first head and a record for each tick, the closings, the state's bytes after each
+    record; and the whole journal, in which there is more."""
 
     text: str
     deployment: Deployment
     core: HubCore
     records: list[bytes] = field(default_factory=list)
+    journal: list[bytes] = field(default_factory=list)
     snapshots: list[bytes] = field(default_factory=list)
     closings: list[Closing] = field(default_factory=list)
     epochs: list[Epoch] = field(default_factory=list)
@@ -114,7 +117,9 @@ class Driver:
         self.core.actions.clear()
         for action in actions:
             if isinstance(action, Journal):
-                self.run.records.append(action.record)
+                self.run.journal.append(action.record)
+                if not self.run.records or isinstance(decode_any(HubRecord, action.record), TickRecord):
+                    self.run.records.append(action.record)
             elif isinstance(action, Keep):
                 self.run.closings.append(action.closing)
             elif isinstance(action, KeepEpoch):
@@ -123,7 +128,9 @@ class Driver:
                 deliveries = decode(Deliveries, action.payload)
                 self.run.deliveries.setdefault(deliveries.tick, []).append(action.payload)
             elif isinstance(action, Publish) and action.channel is channels.DOWN:
-                message = decode_any(Go | Down, action.payload)
+                message = decode_any(Go | Down | Heard, action.payload)
+                if isinstance(message, Heard):
+                    continue
                 self.run.downs.append((action.name, message))
                 if isinstance(message, Go) and self.answers:
                     self._done(action.name, message.tick)
@@ -131,6 +138,8 @@ class Driver:
     def start(self) -> None:
         build = Build("vhub", "boot", "first", "run-1", NAME, self.run.text, "fast", [])
         self.say(channels.BUILD, "vhub", encode(build))
+        self.core.begin(None, self._now_ns)
+        self._perform()
         for name, player in self.deployment.players.items():
             wanted = [Subscription(robot, heard) for robot, names in player.robots.items() for heard in names]
             self.join(name, self.deployment.ticks(player.rate_hz), wanted)
@@ -304,5 +313,5 @@ def chunked(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The same in a file of many small chunks."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(capture_writer, "BATCH_ROWS", 40)
-        patch.setattr(capture_writer, "CHUNK_BYTES", 1)
+        patch.setattr(capture_file, "CHUNK_BYTES", 1)
         return write_capture(tmp_path_factory.mktemp("captures") / "chunked.mcap", hub_run).read_bytes()

@@ -18,7 +18,7 @@ from mcap.writer import CompressionType, Writer
 
 from foosim.protocol import limits
 from foosim.protocol.errors import Refused
-from foosim.vhub import capture_writer
+from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_reader import capture_info, open_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.mcap_file import CHUNK_BYTES_MAX, McapWriter
@@ -223,29 +223,31 @@ def test_a_lagging_writer_slows_the_run_says_so_once_and_loses_nothing(
     assert len(capture.ticks) == 65 and len(capture.packets) == hub_run.core.statistics().offered
 
 
-class Failing(CaptureWriter):
-    """A writer whose disk is full after a while."""
+class Disk:
+    """A disk that is full after a while."""
 
-    room = 40_000
+    def __init__(self, room: int, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.room = room
+        self._write = capture_file.write_all
+        monkeypatch.setattr(capture_file, "write_all", self.write)
 
-    def _write_bytes(self, content: bytes) -> None:
+    def write(self, file: int, content: bytes) -> None:
         self.room -= len(content)
         if self.room < 0:
             raise OSError(28, os.strerror(28))
-        super()._write_bytes(content)
+        self._write(file, content)
 
 
 def test_a_disk_error_is_raised_to_the_owner_and_said_once(
     hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(capture_writer, "CHUNK_BYTES", 1)
+    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
     monkeypatch.setattr(capture_writer, "BATCH_ROWS", 40)
     monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 100)
     said: list[tuple[str, str]] = []
     path = tmp_path / "full.mcap"
-    writer = Failing(
-        path, hub_run.deployment, "table.yaml", hub_run.text, {}, lambda level, text: said.append((level, text))
-    )
+    Disk(40_000, monkeypatch)
+    writer = new_writer(path, hub_run, lambda level, text: said.append((level, text)))
     error = rf"{path.name}: cannot be written, No space left on device"
     with pytest.raises(CaptureError, match=error):
         for closing in hub_run.closings:
@@ -262,9 +264,9 @@ def test_a_disk_error_is_raised_to_the_owner_and_said_once(
 def test_a_disk_that_is_full_at_the_start_is_told_at_once(
     hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Failing, "room", 100)
+    Disk(100, monkeypatch)
     with pytest.raises(CaptureError, match="cannot be written, No space left on device"):
-        Failing(tmp_path / "full.mcap", hub_run.deployment, "table.yaml", hub_run.text, {})
+        new_writer(tmp_path / "full.mcap", hub_run)
 
 
 def test_a_process_that_ends_without_finishing_is_not_held_up(hub_run: HubRun, tmp_path: Path) -> None:

@@ -64,6 +64,7 @@ class Hub:
         self.core = HubCore("boot", bytes(32), 0)
         self.now_ns = 0
         self.say(channels.BUILD, "vhub", BUILD)
+        self.core.begin(None, 0)
 
     def say(self, channel: Channel, name: str, message: msgspec.Struct | bytes) -> None:
         payload = message if isinstance(message, bytes) else encode(message)
@@ -145,7 +146,7 @@ def test_who_does_not_fit_is_refused_with_the_reason(what: str) -> None:
 
 
 def test_who_is_let_in_gets_the_deployment_and_its_numbers() -> None:
-    assert greeted(HELLO) == ClientWelcome("ear", "boot-1", "hub-boot", 0, 0, "table.yaml", TEXT)
+    assert greeted(HELLO) == ClientWelcome("ear", "boot-1", "hub-boot", 0, 0, "table.yaml", TEXT, "run")
     state = HubState(DEPLOYMENT)
     state.join(Joining("ear", 0, []), 0)
     state.members["ear"].sequence, state.members["ear"].downlink = 17, 4

@@ -1,0 +1,217 @@
+"""Law 3 and 5: a run whose vHub was killed and came back is the run that would have been, to the last packet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from foosim.protocol import channels, limits
+from foosim.protocol.codec import decode, decode_any, encode
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.messages import Deliveries, Epoch, Go
+from foosim.rehearsal import hub_journal
+from foosim.rehearsal.bus import Traced, Weather
+from foosim.rehearsal.hub_journal import Ending
+from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.system import Settings, System
+from foosim.vhub.core import HubCore
+from foosim.vhub.records import Closing
+from foosim.vhub.rows import plan_of, rows_of
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TICKS: Final = 240
+MS: Final = 1_000_000
+DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
+SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms")
+ENDINGS: Final[tuple[Ending, ...]] = ("now", "torn", "unsaid")
+Fault = tuple[int, Callable[[System], object]]
+
+
+@dataclass
+class Seen:
+    """What a run gave to the world outside: rows of the capture, deliveries, and what each player was told."""
+
+    run: Rehearsed = field(default_factory=lambda: Rehearsed({}))
+    closings: list[Closing] = field(default_factory=list)
+    deliveries: dict[int, set[bytes]] = field(default_factory=dict)
+    told: dict[str, dict[int, set[bytes]]] = field(default_factory=dict)
+    """Go by player and number."""
+
+    def watch(self, traced: Traced) -> None:
+        if traced.what == "publish" and traced.channel == channels.DELIVERIES.name:
+            self.deliveries.setdefault(decode(Deliveries, traced.payload).tick, set()).add(traced.payload)
+        elif traced.what == "receive" and traced.channel == channels.DOWN.name:
+            message = decode_any(channels.DOWN.message, traced.payload)
+            if isinstance(message, Go):
+                self.told.setdefault(traced.process, {}).setdefault(message.number, set()).add(traced.payload)
+
+    def rows(self) -> list[Any]:
+        """The rows of all closings in their order, without the wall's time."""
+        rows: list[Any] = []
+        known = None
+        plan = plan_of(DEPLOYMENT)
+        for closing in self.closings:
+            for topic, at_ns, _, number, row in rows_of(closing, plan, known):
+                fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
+                rows.append((topic, at_ns, number, fields))
+            known = closing.frame
+        return rows
+
+
+def fly(faults: Sequence[Fault], ticks: int = TICKS, sets: Sequence[str] = SETS, **chosen: Any) -> Seen:
+    seen = Seen()
+
+    def prepare(system: System) -> None:
+        for tick, fault in faults:
+            system.at_tick(tick, partial(fault, system))
+
+    chosen = {"observer": seen.watch, "on_closing": seen.closings.append, **chosen}
+    seen.run = rehearse(TABLE.read_text(), TABLE.name, ticks, 2, sets, Settings(**chosen), prepare=prepare)
+    return seen
+
+
+@cache
+def undisturbed(ticks: int = TICKS) -> Seen:
+    return fly([], ticks)
+
+
+def kill_hub(ending: Ending = "now", back_ns: int = 300 * MS) -> Callable[[System], object]:
+    return lambda system: system.kill_hub(ending, back_ns)
+
+
+def assert_the_same(seen: Seen, usual: Seen) -> None:
+    """Equal frames, fates and deliveries; each tick was captured once; each player was told everything once."""
+    assert seen.run.json["reason"] == "done" and not seen.run.json["failed"]
+    assert seen.run.digests == usual.run.digests
+    assert [c.frame.tick for c in seen.closings] == [c.frame.tick for c in usual.closings]
+    assert seen.rows() == usual.rows(), "every packet with its fate, every delivery, every join"
+    assert seen.run.json["packets"] == usual.run.json["packets"]
+    for tick, payloads in seen.deliveries.items():
+        assert len(payloads) == 1, f"deliveries {tick} are said in {len(payloads)} ways"
+    assert seen.told == usual.told, "the same Gos with the same numbers, byte for byte"
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_vhub_that_is_killed_comes_back_and_nothing_is_lost(ending: Ending) -> None:
+    seen = fly([(1, kill_hub(ending)), (73, kill_hub(ending)), (150, kill_hub(ending, 5 * MS)), (151, kill_hub("now"))])
+    assert_the_same(seen, undisturbed())
+    told = [(entry["what"], entry["name"]) for entry in seen.run.json["recoveries"]]
+    assert set(told) == {("vhub", "vhub")} and len(told) in (3, 4), "the last one may come before anything is committed"
+    assert all(entry["outage_ms"] is not None for entry in seen.run.json["recoveries"])
+    assert max(entry["outage_ms"] for entry in seen.run.json["recoveries"]) >= 300
+
+
+def test_with_bullet_it_is_the_same() -> None:
+    sets = SETS[1:]
+    seen, usual = fly([(40, kill_hub()), (90, kill_hub("torn"))], 120, sets), fly([], 120, sets)
+    assert_the_same(seen, usual)
+
+
+def test_a_journal_whose_files_began_anew_gives_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Heads between the ticks: a fold begins at one of them, and older ones go."""
+    monkeypatch.setattr(limits, "CHECKPOINT_TICKS", 7)
+    monkeypatch.setattr(hub_journal, "HEADS_KEPT", 22)
+    seen = fly([(100, kill_hub("torn")), (180, kill_hub("unsaid"))], sets=(*SETS, "deadlines.client_back=250 ms"))
+    assert_the_same(seen, undisturbed())
+
+
+def test_a_vhub_that_does_not_come_back_ends_the_run_in_order() -> None:
+    seen = fly([(100, kill_hub("now", 10_000 * MS))], sets=(*SETS, "deadlines.vhub_back=3 s"))
+    json = seen.run.json
+    assert json["failed"] and json["reason"] == "lost vhub: its connection closed; it did not come back within 3 s"
+    assert seen.run.digests == undisturbed().run.digests[: len(seen.run.digests)] and 100 <= json["ticks"] <= 106
+    (entry,) = json["recoveries"]
+    assert (entry["what"], entry["outage_ms"]) == ("vhub", None)
+
+
+def test_a_node_is_lost_while_the_vhub_is_away() -> None:
+    faults: list[Fault] = [
+        (60, kill_hub("unsaid")),
+        (60, lambda system: system.after(100 * MS, partial(system.kill, "n2"))),
+        (120, lambda system: system.start("n2")),
+        (150, lambda system: system.kill("n1")),
+        (150, kill_hub("torn")),
+    ]
+    seen = fly(faults)
+    assert seen.run.digests == undisturbed().run.digests and seen.rows() == undisturbed().rows()
+    assert [entry["what"] for entry in seen.run.json["recoveries"]] == ["vhub", "node", "join", "node", "vhub"]
+
+
+def test_a_ball_is_added_while_the_vhub_is_away() -> None:
+    """Then the layout of its last record is not that of the last commit."""
+
+    def add(system: System) -> None:
+        system.request("add", name="b2", position=[0.1, 0.0, 0.02])
+
+    usual = fly([(50, add), (120, lambda system: system.request("remove", name="b2"))])
+    seen = fly([(50, add), (53, kill_hub("torn")), (120, lambda system: system.request("remove", name="b2"))])
+    assert seen.run.json["reason"] == "done" and len({c.frame.layout.digest for c in seen.closings}) == 2
+    assert len(seen.run.digests) == len(usual.run.digests) == TICKS
+
+
+def test_an_epoch_that_is_older_than_the_newest_in_the_journal_is_refused() -> None:
+    cores: list[HubCore] = []
+    epochs: list[int] = []
+
+    def forge(system: System) -> None:
+        cores.append(system.hub)
+        epochs.append(system.supervisor.epoch)
+        owners = [(robot, "n2") for robot in system.supervisor.owners]
+        old = Epoch(1, 0, bytes(32), ["n1", "n2"], owners, [], b"")
+        system.bus.put("nobody", channels.EPOCH, channels.SUPERVISOR, encode(old), system.bus.now_ns)
+
+    move: Fault = (20, lambda system: system.request("move", robot="camera", node="n2"))
+    seen = fly([move, (60, kill_hub()), (100, forge), (130, kill_hub()), (160, forge)])
+    assert_the_same(seen, undisturbed())
+    assert cores[0] is not cores[1] and epochs == [2, 2]
+    assert all(core._epoch == 2 and set(core._owners.values()) == {"n1", "n2"} for core in cores)
+
+
+KILLS: Final = st.lists(
+    st.tuples(st.integers(1, TICKS - 1), st.sampled_from(ENDINGS), st.sampled_from([1, 40, 300])),
+    min_size=1,
+    max_size=8,
+)
+
+
+@settings(max_examples=8)
+@given(kills=KILLS, weather=st.sampled_from([None, 1, 2]))
+@example(kills=[(5, "unsaid", 1), (6, "torn", 1), (9, "now", 40)], weather=3)
+def test_whenever_it_is_killed_the_world_is_the_same(kills: list[Any], weather: int | None) -> None:
+    """Also on a bus that delays, repeats and loses."""
+    bad = Weather(weather, 100_000, 2 * MS, loss=0.02, repeat=0.05) if weather is not None else Weather()
+    planned = [(tick, kill_hub(ending, back_ms * MS)) for tick, ending, back_ms in kills]
+    seen = fly(planned, sets=(*SETS, "deadlines.lockstep_fast=1 h", "deadlines.client_back=1 h"), weather=bad)
+    assert_the_same(seen, undisturbed())
+
+
+class _Forgetful(HubCore):
+    """Goes on with the state of the journal, and has forgotten what it said to whom."""
+
+    def begin(self, past: Any, now_ns: int) -> None:
+        if past is not None:
+            for member in past.state.members.values():
+                member.downlink += 1
+        super().begin(past, now_ns)
+
+
+class _Hasty(HubCore):
+    """Takes its capture to be complete."""
+
+    def begin(self, past: Any, now_ns: int) -> None:
+        if past is not None:
+            past.kept.clear()
+        super().begin(past, now_ns)
+
+
+@pytest.mark.parametrize("planted", [_Forgetful, _Hasty])
+def test_a_planted_fault_is_found(planted: type[HubCore]) -> None:
+    with pytest.raises(AssertionError):
+        assert_the_same(fly([(73, kill_hub("unsaid"))], hub=planted), undisturbed())

@@ -1,0 +1,229 @@
+"""Captures that a killed writer left: recovered to valid files, cut anywhere, with a journal and without."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import pytest
+from mcap.reader import make_reader
+
+from foosim.protocol.errors import Refused
+from foosim.protocol.journal import Journal, JournalError
+from foosim.vhub.capture_reader import capture_info, open_capture
+from foosim.vhub.capture_recovery import UNCLEAN, Recovered, recover_capture
+from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.mcap_file import MAGIC, McapFile, Message
+from foosim.vhub.rows import CaptureError
+
+if TYPE_CHECKING:
+    from tests.vhub.conftest import HubRun
+
+LAST = 63
+"""The last tick that the journal has; frame 64 ended the run and was committed only."""
+
+
+@pytest.fixture
+def journals(hub_run: HubRun, tmp_path: Path) -> Path:
+    """The folder of the run's whole journal."""
+    with Journal(tmp_path / "journals", "vhub") as journal:
+        for record in hub_run.records:
+            journal.append(record)
+    return tmp_path / "journals"
+
+
+def cut(tmp_path: Path, content: bytes) -> Path:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(content)
+    return path
+
+
+def recovered(path: Path, journals: Path | None = None) -> Recovered:
+    found = recover_capture(path, journals)
+    assert found is not None
+    return found
+
+
+def rows(path: Path, last: int = LAST) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows up to a tick of all topics but the log, without what only a clock knew, and views as they are."""
+    kept: dict[str, list[dict[str, Any]]] = {}
+    with path.open("rb") as stream:
+        for content in McapFile(stream, path.stat().st_size, str(path)).contents():
+            if isinstance(content, Message) and content.topic != "/log" and content.log_ns <= last * 2_000_000:
+                row: dict[str, Any] = {"data": content.data}
+                if content.data[:1] == b"{":
+                    row = {k: v for k, v in msgspec.json.decode(content.data).items() if not k.startswith("wall_")}
+                row["place"] = content.log_ns, content.publish_ns, content.sequence
+                kept.setdefault(content.topic, []).append(row)
+    return kept
+
+
+def read_by_others(path: Path) -> int:
+    """Read a file by its summary and its indexes, as viewers do; return the number of messages."""
+    with path.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None and summary.statistics is not None
+        by_channel: dict[int, int] = {}
+        for _, channel, _ in reader.iter_messages():
+            by_channel[channel.id] = by_channel.get(channel.id, 0) + 1
+        counts = summary.statistics.channel_message_counts
+        assert {number: count for number, count in counts.items() if count} == by_channel
+        assert len(summary.chunk_indexes) == summary.statistics.chunk_count
+        assert len(list(reader.iter_attachments())) == 2 and len(list(reader.iter_metadata())) >= 2
+        return summary.statistics.message_count
+
+
+def first_chunk(content: bytes) -> int:
+    """Return how many bytes of a capture describe it."""
+    return content.index(b"versions.json") + 2000
+
+
+def cuts(content: bytes) -> Sequence[int]:
+    return [*range(first_chunk(content), len(content) - 1, 12_973), len(content) - 1]
+
+
+def test_cut_anywhere_the_journal_gives_what_is_missing(
+    chunked: bytes, path: Path, journals: Path, hub_run: HubRun, tmp_path: Path
+) -> None:
+    whole = rows(path)
+    starts: set[int] = set()
+    for size in cuts(chunked):
+        found = recovered(cut(tmp_path, chunked[:size]), journals)
+        made = rows(found.path)
+        made["/epochs"] = whole["/epochs"]  # the journal of these tests has none
+        last = [row for row in made["/frame"] if row not in whole["/frame"]]
+        assert [row["tick"] for row in last] in ([], [LAST]), size  # the last one stands in every capture
+        made["/frame"] = [row for row in made["/frame"] if row not in last]
+        assert made == whole, size
+        capture = open_capture(found.path)
+        assert capture.finished and capture.about.end["reason"] == UNCLEAN and found.problem == ""
+        assert len(capture.packets) == hub_run.core.statistics().offered
+        assert read_by_others(found.path) == sum(capture_info(found.path).topics.values())
+        assert found.tick == int(capture.ticks[-1]) >= LAST
+        starts.add(found.tick + 1 - found.added_ticks)
+        assert recover_capture(found.path, journals) is None
+    assert len(starts) > 3
+
+
+def test_cut_anywhere_without_a_journal_every_whole_chunk_stays(chunked: bytes, tmp_path: Path) -> None:
+    for size in cuts(chunked)[::2]:
+        path = cut(tmp_path, chunked[:size])
+        before = rows(path, 64)
+        found = recovered(path)
+        after = rows(path, 64)
+        assert open_capture(path).finished and read_by_others(path) > 0
+        assert found.problem == "there is no journal of it" and found.added_ticks == 0
+        assert after == before and found.tick == len(before.get("/tick", ())) - 1
+
+
+def test_a_chunk_whose_indexes_were_cut_stays(chunked: bytes, tmp_path: Path) -> None:
+    """Every byte between a chunk and the end of its indexes."""
+    with (tmp_path / "whole").open("wb+") as stream:
+        stream.write(chunked)
+        stream.seek(0)
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    chunk = summary.chunk_indexes[3]
+    end = chunk.chunk_start_offset + chunk.chunk_length
+    for size in range(end, end + chunk.message_index_length + 1, 61):
+        path = cut(tmp_path, chunked[:size])
+        before = rows(path)
+        found = recovered(path)
+        assert (rows(path) == before and found.torn_bytes == size - end) or size == end + chunk.message_index_length
+        assert read_by_others(path) == sum(map(len, before.values())) + 1  # the line about the recovery
+
+
+def test_bytes_that_were_never_written_are_cut_off(chunked: bytes, journals: Path, tmp_path: Path) -> None:
+    """A machine without power leaves zeros; they are no record that is cut, so the journal has to cover them."""
+    size = len(chunked) * 2 // 3
+    with pytest.raises(CaptureError, match=r"damaged; \d+ bytes from there on would be lost, no journal has tick \d+"):
+        recover_capture(cut(tmp_path, chunked[:size] + bytes(5000)))
+    path = cut(tmp_path, chunked[:size] + bytes(5000))
+    assert recovered(path, journals).tick == LAST and open_capture(path).finished
+
+
+def test_damage_before_the_end_loses_nothing_that_no_journal_has(
+    chunked: bytes, journals: Path, tmp_path: Path
+) -> None:
+    content = bytearray(chunked[: len(chunked) * 3 // 4])
+    content[len(chunked) // 2] ^= 1
+    path = cut(tmp_path, bytes(content))
+    with pytest.raises(CaptureError, match="damaged"):
+        recover_capture(path)
+    assert path.read_bytes() == content
+    found = recovered(path, journals)
+    assert found.added_ticks > 20 and open_capture(path).ticks.tolist() == list(range(LAST + 1))
+
+
+def test_what_was_in_flight_is_written_once(path: Path, journals: Path, hub_run: HubRun, tmp_path: Path) -> None:
+    """The end was written, the summary was not."""
+    content = path.read_bytes()
+    for size in range(len(content) - 4000, len(content) - 1, 499):
+        found = recovered(cut(tmp_path, content[:size]), journals)
+        assert found.tick == 64 and found.added_ticks == 0
+        assert len(open_capture(found.path).packets) == hub_run.core.statistics().offered
+
+
+def test_a_journal_that_does_not_fit_is_told_and_changes_nothing(
+    chunked: bytes, hub_run: HubRun, journals: Path, tmp_path: Path
+) -> None:
+    half = chunked[: len(chunked) // 2]
+    before = rows(cut(tmp_path, half))
+    other = tmp_path / "other"
+    with Journal(other, "vhub") as journal:
+        head = msgspec.msgpack.decode(hub_run.records[0])
+        head[1] = "run-2"
+        journal.append(msgspec.msgpack.encode(head))
+    found = recovered(cut(tmp_path, half), other)
+    assert found.problem == "its journal cannot be used: it is not that of run run-1"
+    assert rows(found.path) == before and "run-1" in str(found)
+    late = tmp_path / "late"
+    with Journal(late, "vhub") as journal:
+        for record in (hub_run.head, *hub_run.records[65:]):
+            journal.append(record)
+    found = recovered(cut(tmp_path, half), late)
+    assert found.problem == "its journal starts at tick 64 only" and rows(found.path) == before
+    with Journal(journals, "vhub"), pytest.raises(JournalError, match="being written by another process"):
+        recover_capture(cut(tmp_path, half), journals)
+    assert found.path.read_bytes() == half
+
+
+def test_a_journal_that_is_damaged_gives_what_is_before(chunked: bytes, hub_run: HubRun, tmp_path: Path) -> None:
+    with Journal(tmp_path / "gap", "vhub") as journal:
+        for record in [*hub_run.records[:51], *hub_run.records[52:]]:
+            journal.append(record)
+    found = recovered(cut(tmp_path, chunked[: len(chunked) // 2]), tmp_path / "gap")
+    assert found.tick == 49 and "record 51 of the vHub's journal does not follow on tick 49" in found.problem
+    assert open_capture(found.path).ticks.tolist() == list(range(50))
+
+
+def test_no_capture_is_refused(tmp_path: Path) -> None:
+    for content in (b"", MAGIC, b"#!/bin/sh\n"):
+        with pytest.raises(Refused, match=r"cut\.mcap: "):
+            recover_capture(cut(tmp_path, content))
+        assert (tmp_path / "cut.mcap").read_bytes() == content
+
+
+def test_a_writer_goes_on_with_what_it_left(chunked: bytes, path: Path, hub_run: HubRun, tmp_path: Path) -> None:
+    """As a vHub does that was killed and started again: it feeds all of its journal, and the run goes on."""
+    whole = rows(path, 64)
+    for size in (10, first_chunk(chunked), len(chunked) // 2, len(chunked) - 3000):
+        going = cut(tmp_path, chunked[:size])
+        metadata = {"run": "run-1", "fingerprint": "00"}
+        writer = CaptureWriter(going, hub_run.deployment, "table.yaml", hub_run.text, metadata, None, 0)
+        for epoch in hub_run.epochs:
+            writer.keep(epoch)
+        for closing in hub_run.closings:
+            writer.keep(closing)
+        writer.finish({"reason": "enough"})
+        made = rows(going, 64)
+        assert {topic: sorted(map(str, found)) for topic, found in made.items()} == {
+            topic: sorted(map(str, found)) for topic, found in whole.items()
+        }
+        assert open_capture(going).about.metadata == open_capture(path).about.metadata
+        read_by_others(going)
+    with pytest.raises(CaptureError, match="is finished; a capture is never overwritten"):
+        CaptureWriter(going, hub_run.deployment, "table.yaml", hub_run.text, {}, None, 0)

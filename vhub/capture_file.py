@@ -1,0 +1,311 @@
+"""The file of a capture: closings, epochs and lines become rows in it, one after the other, in the caller's thread.
+
+A new file is never written over an old one. A file that its writer left unfinished is gone on with behind its last
+whole chunk: what it has already is not written again, so a whole journal may be fed to it. Neighbours: `rows` and
+`viewing` (what is written), `mcap_file` and `mcap_scan` (how), `capture_writer` (the thread), `capture_recovery`.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from foosim.protocol.codec import decode_json, encode_json
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import Frame
+from foosim.protocol.messages import Epoch, Origin
+from foosim.vhub.mcap_file import McapWriter
+from foosim.vhub.mcap_scan import Scanned, scan
+from foosim.vhub.packet import IN_FLIGHT
+from foosim.vhub.records import Closing
+from foosim.vhub.rows import (
+    EPOCHS,
+    FORMAT,
+    FRAME,
+    PACKETS,
+    PROFILE,
+    ROW_TYPES,
+    TICK,
+    CaptureError,
+    epoch_entry,
+    frame_row,
+    plan_of,
+    row_schema,
+    rows_of,
+)
+from foosim.vhub.viewing import LOG, POSES, SCENE, VIEW_TYPES, View
+
+METADATA: Final = "foosim"
+END_METADATA: Final = "foosim.end"
+DEPLOYMENT: Final = "deployment.yaml"
+VERSIONS: Final = "versions.json"
+ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
+"""Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
+CHUNK_BYTES: Final = 4 * 1024 * 1024
+"""A chunk is ended at this size, or when it is to be flushed; a reader holds one at a time."""
+_LIBRARIES: Final = (
+    *("foosim", "eclipse-zenoh", "foxglove-sdk", "mcap", "msgspec", "numpy", "pybullet", "pydantic", "zstandard"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of the log, on its way to the capture."""
+
+    level: str
+    text: str
+    tick: int
+
+
+Item = Closing | Epoch | Line
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """What a capture says of its run beside the rows. `metadata` joins what the deployment tells."""
+
+    deployment: Deployment
+    name: str
+    text: str
+    metadata: Mapping[str, str]
+
+
+@dataclass(slots=True)
+class Progress:
+    """How far a file is. What is -1 has not been written."""
+
+    tick: int = -1
+    """The last tick with a row of its own."""
+    frame: int = -1
+    epoch: int = -1
+    in_flight: bool = False
+    """Whether what was in flight at the end of the run is written."""
+
+
+def origin_metadata(origin: Origin | None) -> dict[str, str]:
+    """Return what a capture says of where its run began."""
+    if origin is None:
+        return {}
+    digest, chain = origin.digest.hex(), origin.chain.hex()
+    return {ORIGIN: origin.source, ORIGIN_TICK: str(origin.tick), ORIGIN_DIGEST: digest, ORIGIN_CHAIN: chain}
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions that a run depends on, for the capture."""
+    versions = {"python": platform.python_version(), "platform": platform.platform()}
+    for name in _LIBRARIES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions
+
+
+def write_all(file: int, content: bytes) -> None:
+    """Write to a file descriptor until all of it is written."""
+    written = os.write(file, content)
+    while written < len(content):
+        written += os.write(file, content[written:])
+
+
+class CaptureFile:
+    """One capture on the disk. Raises CaptureError when it exists already, or cannot be written.
+
+    With `journal_tick`, a file that is there is one that this run left unfinished: it is gone on with, and `torn_bytes`
+    of it were cut off. A journal has all ticks from that one on: bytes that are damaged, not just cut, are only given
+    up when it does. A file that ends before its description is begun anew; one that has its end is refused.
+    """
+
+    def __init__(self, path: Path, described: Described, journal_tick: int | None = None) -> None:
+        self.path = path
+        self.done = Progress()
+        self.torn_bytes = 0
+        self._plan = plan_of(described.deployment)
+        self._view = View(described.deployment)
+        self._encode = msgspec.json.Encoder().encode
+        self._known: Frame | None = None
+        """The frame of the last closing, written or not."""
+        self._file = self._open(journal_tick is not None)
+        try:
+            found = None if journal_tick is None else self._scanned(journal_tick)
+            self.mcap = McapWriter(self._write_bytes, PROFILE, None if found is None else found.book)
+            if found is None:
+                self._channels = self._declare()
+                self._describe(described)
+            else:
+                self._channels = {channel.topic: channel.id for channel in found.book.channels}
+                if found.to_index:
+                    self.mcap.index_last_chunk(found.to_index)
+        except OSError as error:
+            os.close(self._file)
+            raise self.disk_error(error) from None
+        except CaptureError:
+            os.close(self._file)
+            raise
+
+    # --- writing -----------------------------------------------------------------------------------------------------
+
+    def write(self, item: Item) -> None:
+        """Write the rows of a closing, an epoch or a line; of what the file has already, none."""
+        if isinstance(item, Line):
+            self._write_view(LOG, item.tick, self._view.log_line(item.level, item.text, item.tick))
+        elif isinstance(item, Epoch):
+            if item.epoch > self.done.epoch:
+                topic, log_ns, publish_ns, sequence, row = epoch_entry(item, self._plan)
+                self.mcap.add_message(self._channels[topic], log_ns, publish_ns, sequence, self._encode(row))
+                self.done.epoch = item.epoch
+        elif item.frame.tick <= self.done.tick and (self._known is None or item.frame.tick > self._known.tick):
+            self._pass(item.frame)
+        else:
+            self._write_closing(item)
+
+    def _write_closing(self, closing: Closing) -> None:
+        add, encode, channels, done = self.mcap.add_message, self._encode, self._channels, self.done
+        tick = closing.frame.tick
+        for topic, log_ns, publish_ns, sequence, row in rows_of(closing, self._plan, self._known):
+            add(channels[topic], log_ns, publish_ns, sequence, encode(row))
+            if topic == FRAME:
+                done.frame = tick
+        self._write_views(closing.frame)
+        self._known = closing.frame
+        done.tick = tick
+
+    def _pass(self, frame: Frame) -> None:
+        """Take notice of a frame that the file has."""
+        known = self._known
+        if known is None or known.layout.digest != frame.layout.digest:
+            self._view.turn_to(frame)
+        self._known = frame
+
+    def _write_views(self, frame: Frame) -> None:
+        known = self._known
+        if known is not None and known.tick == frame.tick:
+            return
+        changed = known is None or known.layout.digest != frame.layout.digest
+        if changed:
+            self._write_view(SCENE, frame.tick, self._view.turn_to(frame))
+        if changed or frame.tick % self._view.poses_every == 0:
+            self._write_view(POSES, frame.tick, self._view.poses(frame))
+
+    def _write_view(self, topic: str, tick: int, data: bytes) -> None:
+        at_ns = tick * self._plan.tick_ns
+        self.mcap.add_message(self._channels[topic], at_ns, at_ns, tick & 0xFFFF_FFFF, data)
+
+    def finish(self, metadata: Mapping[str, str]) -> None:
+        """Write the last frame, how it ended, and the summary; the file is on the disk then."""
+        frame = self._known
+        if frame is not None and self.done.frame < frame.tick == self.done.tick:
+            self._write_view(FRAME, frame.tick, self._encode(frame_row(frame)))
+        self.mcap.end_chunk()
+        self.mcap.add_metadata(END_METADATA, metadata)
+        self.mcap.finish()
+        self.sync()
+
+    def sync(self) -> None:
+        """Bring to the disk what was written."""
+        os.fdatasync(self._file)
+
+    def close(self) -> None:
+        """Let go of the file, as it is."""
+        os.close(self._file)
+
+    def disk_error(self, error: OSError) -> CaptureError:
+        """Return what to tell people of a disk that refuses."""
+        return CaptureError(f"{self.path}: cannot be written, {error.strerror}")
+
+    def _write_bytes(self, content: bytes) -> None:
+        write_all(self._file, content)
+
+    # --- a new file --------------------------------------------------------------------------------------------------
+
+    def _open(self, go_on: bool) -> int:
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            if go_on:
+                return os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            if not os.path.lexists(self.path):
+                return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise CaptureError(f"{self.path}: cannot be created, {error.strerror}") from None
+        raise CaptureError(f"{self.path}: exists already; a capture is never overwritten")
+
+    def _declare(self) -> dict[str, int]:
+        """Declare all topics, also those that stay empty."""
+        channels = {}
+        for topic, kind in ROW_TYPES.items():
+            schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(row_schema(kind)))
+            channels[topic] = self.mcap.add_channel(topic, "json", schema)
+        for topic, message in VIEW_TYPES.items():
+            view_schema = message.get_schema()
+            content = (view_schema.name, view_schema.encoding, view_schema.data)
+            channels[topic] = self.mcap.add_channel(topic, "protobuf", content)
+        return channels
+
+    def _describe(self, described: Described) -> None:
+        """Write what a run depended on beside its inputs; the versions last."""
+        deployment = described.deployment
+        content = {
+            **described.metadata,
+            "format": str(FORMAT),
+            "world": deployment.world,
+            "seed": str(deployment.seed),
+            "tick_ns": str(deployment.tick_ns),
+            "deployment": described.name,
+        }
+        self.mcap.add_metadata(METADATA, content)
+        self.mcap.add_attachment(DEPLOYMENT, "application/yaml", described.text.encode())
+        self.mcap.add_attachment(VERSIONS, "application/json", encode_json(library_versions()))
+
+    # --- a file that was left unfinished -----------------------------------------------------------------------------
+
+    def _scanned(self, journal_tick: int) -> Scanned | None:
+        """Return what the file has, cut at its last whole record; None when it has to be begun anew."""
+        with os.fdopen(os.dup(self._file), "rb") as stream:
+            found = scan(stream, os.fstat(self._file).st_size, str(self.path))
+        if found.finished:
+            raise CaptureError(f"{self.path}: is finished; a capture is never overwritten")
+        is_described = VERSIONS in {attachment.name for attachment in found.book.attachments}
+        if found.book.chunks and not is_described:
+            raise CaptureError(f"{self.path}: no capture of foosim, it lacks {VERSIONS}")
+        self.done = _progress(found)
+        end = found.book.offset if is_described else 0
+        if not found.is_cut and journal_tick > self.done.tick + 1:
+            raise CaptureError(
+                f"{self.path}: byte {end}: damaged; {found.torn_bytes} bytes from there on would be lost, "
+                f"no journal has tick {self.done.tick + 1}"
+            )
+        self.torn_bytes = found.torn_bytes
+        os.ftruncate(self._file, end)
+        os.lseek(self._file, end, os.SEEK_SET)
+        return found if is_described else None
+
+
+def _progress(found: Scanned) -> Progress:
+    """Return how far a file is, by the last rows of its topics."""
+    return Progress(
+        _last_number(found, TICK, "tick"),
+        _last_number(found, FRAME, "tick"),
+        _last_number(found, EPOCHS, "epoch"),
+        _last_row(found, PACKETS).get("fate") == IN_FLIGHT,
+    )
+
+
+def _last_row(found: Scanned, topic: str) -> dict[str, object]:
+    try:
+        row = decode_json(found.last.get(topic, b"{}"))
+    except Malformed:
+        return {}
+    return row if isinstance(row, dict) else {}
+
+
+def _last_number(found: Scanned, topic: str, field: str) -> int:
+    number = _last_row(found, topic).get(field, -1)
+    return number if isinstance(number, int) else -1

@@ -1,0 +1,173 @@
+"""What clients say to the vHub: hello, join, packets, Done; and that they are gone.
+
+A client that is gone may come back: one that the run waits for within `deadlines.client_back`, any other at any time as
+one that joins. After a restart of the vHub all that it knew are away, and come back in the same way.
+Neighbours: `core` closes the ticks, `sessions` has the clients.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from foosim.protocol import limits
+from foosim.protocol.actions import Journal
+from foosim.protocol.codec import encode
+from foosim.protocol.errors import Malformed
+from foosim.protocol.messages import ClientHello, Done, Join, Up
+from foosim.vhub.records import InputsRecord
+from foosim.vhub.sessions import Session, may_lockstep
+from foosim.vhub.state import Joining, Member
+
+if TYPE_CHECKING:
+    from foosim.vhub.core import HubCore
+
+
+class Door:
+    """Takes what clients say, for one core."""
+
+    def __init__(self, core: HubCore) -> None:
+        self._core = core
+        self.written: InputsRecord | None = None
+        """Who joins and leaves at the tick that is closed next, where that is written already."""
+        self._leaves: list[str] = []
+
+    def go_on(self, written: InputsRecord | None, now_ns: int) -> None:
+        """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick."""
+        core = self._core
+        assert core.state is not None and core.deployment is not None
+        self.written = written
+        here = {name for name, member in core.state.members.items() if member.active}
+        if written is not None:
+            here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
+        core.sessions.expect(here, now_ns + core.deployment.deadlines.client_back_ns)
+
+    def _known(self, name: str) -> Member | Joining | None:
+        """Return what is known of a client, the latest first: as it joins, or as the state has it."""
+        core = self._core
+        written = [] if self.written is None else self.written.joins
+        for joining in (core.sessions.joins.get(name), *written):
+            if joining is not None and joining.name == name:
+                return joining
+        return None if core.state is None else core.state.members.get(name)
+
+    def come_and_go(self, tick: int) -> tuple[list[Joining], list[str]]:
+        """Take who joins and leaves at a tick. Its Go depends on it, and is said before the record is written."""
+        core = self._core
+        assert core.state is not None
+        written, self.written = self.written, None
+        if written is not None and written.tick == tick:
+            return written.joins, written.leaves
+        if not core.state.hears_clients:
+            return [], []
+        joins = core.sessions.take_joins(tick)
+        leaves, self._leaves = self._leaves, []
+        if joins or leaves:
+            core.actions.append(Journal(encode(InputsRecord(tick, joins, leaves))))
+        return joins, leaves
+
+    # --- messages ----------------------------------------------------------------------------------------------------
+
+    def hello(self, hello: ClientHello, payload: bytes, now_ns: int) -> None:
+        """Let a client in, or say why not."""
+        core = self._core
+        if core.state is not None and core.deployment is not None and core.member.build is not None:
+            core.sessions.hello(hello, core.member.build, core.deployment, core.state, self._said(hello.name))
+
+    def join(self, join: Join, payload: bytes, now_ns: int) -> None:
+        """A client takes part, from a tick that suits it; one that does already is told what it has missed."""
+        core = self._core
+        session = self._session(join)
+        if session is None or core.state is None:
+            return
+        if join.period and not may_lockstep(core.state.deployment, join.name):
+            raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
+        core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
+        known = self._known(join.name)
+        if known is not None and join.name not in self._leaves and _is_member(known, join):
+            core.repeated += 1
+            return
+        core.sessions.join(join)
+        core.ready_if_complete()
+
+    def up(self, up: Up, payload: bytes, now_ns: int) -> None:
+        """Packets of a free-running client."""
+        core = self._core
+        session = self._session(up)
+        if session is None or core.state is None:
+            return
+        if len(session.inbox) + len(up.packets) > limits.INBOX_MESSAGES_MAX:
+            core.state.refuse_at_door("inbox_full", len(up.packets))
+            return
+        repeated = session.take(up.packets)
+        if repeated:
+            core.state.refuse_at_door("duplicate", repeated)
+            session.heard = 0  # it does not know what is recorded
+
+    def done(self, done: Done, payload: bytes, now_ns: int) -> None:
+        """The answer to a Go."""
+        core = self._core
+        session = self._session(done)
+        if session is None:
+            return
+        if not core.waits_for(done.name) or done.tick != session.go_tick:
+            core.repeated += 1
+            return
+        core.take_done(done.name)
+        session.done = done
+
+    def _session(self, message: Join | Up | Done) -> Session | None:
+        session = self._core.sessions.by_name.get(message.name)
+        if session is None or session.boot != message.boot:
+            self._core.repeated += 1
+            return None
+        return session
+
+    def _said(self, name: str) -> int | None:
+        """Return the last downlink that was said to a client: not the Go that it has not answered, nor what waits."""
+        core = self._core
+        member = None if core.state is None else core.state.members.get(name)
+        if member is None or core.releases is None:
+            return None
+        waiting = core.releases.first_number(name)
+        return member.downlink - core.waits_for(name) if waiting is None else waiting - 1
+
+    # --- who is away -------------------------------------------------------------------------------------------------
+
+    def gone(self, name: str, now_ns: int) -> None:
+        """A client's presence has ended: a free-running one leaves the run, for one in lockstep it waits a while."""
+        core = self._core
+        session = core.sessions.by_name.get(name)
+        if session is None or core.state is None or core.deployment is None or core.ended is not None:
+            return
+        known = self._known(name)
+        if known is not None and known.period > 0:
+            session.away_ns = now_ns + core.deployment.deadlines.client_back_ns
+            return
+        self._leave(name)
+
+    def wake(self, now_ns: int) -> None:
+        """Give up who was away for too long."""
+        core = self._core
+        if core.state is None:
+            return
+        for name in core.sessions.late(now_ns):
+            session = core.sessions.by_name[name]
+            known = self._known(name)
+            if known is not None and known.period > 0:
+                session.away_ns = -1  # its session stays: a tick may be waiting for it
+                core.lose(name, "its connection closed" if session.boot else "it did not come back to the vHub")
+            else:
+                self._leave(name)
+
+    def _leave(self, name: str) -> None:
+        core = self._core
+        core.sessions.leave(name)
+        if self._known(name) is not None:
+            self._leaves.append(name)
+
+
+def _is_member(known: Member | Joining, join: Join) -> bool:
+    """Whether a client takes part as it asks to."""
+    wanted = {(item.robot, item.channel) for item in join.subscriptions}
+    active = isinstance(known, Joining) or known.active
+    return active and known.period == join.period and {(robot, name) for robot, name in known.subscriptions} == wanted

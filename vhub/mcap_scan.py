@@ -1,0 +1,190 @@
+"""The whole records of an MCAP file that has no end, so that a writer can go on behind them.
+
+A process that is killed leaves a record that is cut; a machine that loses its power may leave bytes that were never
+written. Everything before is kept, chunk by chunk, each with its checksum; nothing behind is. Neighbours: `mcap_file`
+(the container), `capture_writer` (goes on), `capture_recovery` (completes).
+"""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import BinaryIO
+
+import zstandard
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+
+from foosim.vhub.mcap_file import (
+    CHUNK_BYTES_MAX,
+    CHUNK_FIELDS,
+    INDEX_FIELDS,
+    MAGIC,
+    MESSAGE_FIELDS,
+    RECORD,
+    Book,
+    chunk_records,
+    unpack_chunk,
+)
+from foosim.vhub.rows import CaptureError
+
+
+@dataclass(slots=True)
+class Scanned:
+    """What a file holds up to its last whole record. `book.offset` is where that ends."""
+
+    book: Book
+    size: int
+    finished: bool = False
+    """Whether the file has an end: then there is nothing to go on with."""
+    is_cut: bool = True
+    """Whether nothing but one record that is cut stands behind the whole ones; else bytes there are damaged."""
+    last: dict[str, bytes] = field(default_factory=dict)
+    """The last message of each topic."""
+    to_index: dict[int, array[int]] = field(default_factory=dict)
+    """What the last chunk holds by channel, (time, place) each, when the file was cut within its indexes."""
+
+    @property
+    def torn_bytes(self) -> int:
+        """Bytes behind the last whole record."""
+        return self.size - self.book.offset
+
+
+def scan(stream: BinaryIO, size: int, name: str) -> Scanned:
+    """Read a file's records up to the first that is cut or damaged, or its end.
+
+    Raises CaptureError when it does not start as an MCAP file does, with as much as it has.
+    """
+    return _Scan(stream, size, name).run()
+
+
+class _Scan:
+    def __init__(self, stream: BinaryIO, size: int, name: str) -> None:
+        self._stream = stream
+        self._name = name
+        self._found = Scanned(Book(), size)
+        self._book = self._found.book
+        self._topics: dict[int, str] = {}
+        self._chunk = b""
+        """The records of the last chunk."""
+        self._indexed = 0
+        """How many of its messages are indexed."""
+
+    def run(self) -> Scanned:
+        start = self._stream.read(len(MAGIC))
+        if not MAGIC.startswith(start):
+            raise CaptureError(f"{self._name}: no MCAP file, it does not start with {MAGIC!r}")
+        self._book.offset = len(MAGIC) if start == MAGIC else 0
+        while self._book.offset and self._next():
+            continue
+        self._look_at_the_last_chunk()
+        return self._found
+
+    def _next(self) -> bool:
+        """Take the next record; False at the first that is not whole, and where the data end."""
+        left = self._found.torn_bytes - RECORD.size
+        head = self._stream.read(RECORD.size)
+        if len(head) < RECORD.size:
+            return False
+        opcode, length = RECORD.unpack(head)
+        if length > left:
+            return False
+        content = self._stream.read(length) if length <= CHUNK_BYTES_MAX else b""
+        if len(content) < length or not 1 <= opcode <= Opcode.DATA_END:
+            self._found.is_cut = False
+            return False
+        if opcode == Opcode.DATA_END:
+            self._stream.seek(max(0, self._found.size - len(MAGIC)))
+            self._found.finished = left > length and self._stream.read(len(MAGIC)) == MAGIC
+            return False
+        try:
+            self._take(opcode, content)
+        except (EndOfFile, struct.error, ValueError, KeyError, IndexError, CaptureError, zstandard.ZstdError):
+            self._found.is_cut = False
+            return False
+        self._book.offset += RECORD.size + length
+        return True
+
+    def _take(self, opcode: int, content: bytes) -> None:
+        book, offset, length = self._book, self._book.offset, RECORD.size + len(content)
+        if opcode == Opcode.SCHEMA:
+            book.schemas.append(records.Schema.read(_stream(content)))
+        elif opcode == Opcode.CHANNEL:
+            channel = records.Channel.read(_stream(content))
+            book.channels.append(channel)
+            book.counts[channel.id] = 0
+            self._topics[channel.id] = channel.topic
+        elif opcode == Opcode.ATTACHMENT:
+            attachment = records.Attachment.read(_stream(content))
+            size, kind = len(attachment.data), attachment.media_type
+            book.attachments.append(
+                records.AttachmentIndex(offset, length, 0, 0, data_size=size, name=attachment.name, media_type=kind)
+            )
+        elif opcode == Opcode.METADATA:
+            metadata = records.Metadata.read(_stream(content))
+            book.metadata.append(records.MetadataIndex(offset=offset, length=length, name=metadata.name))
+        elif opcode == Opcode.CHUNK:
+            self._take_chunk(content, offset, length)
+        elif opcode == Opcode.MESSAGE_INDEX:
+            self._take_index(content, offset, length)
+
+    def _take_chunk(self, content: bytes, offset: int, length: int) -> None:
+        chunk = unpack_chunk(content, self._name)
+        first_ns, last_ns, size, _, name_length = CHUNK_FIELDS.unpack_from(content)
+        name = content[CHUNK_FIELDS.size : CHUNK_FIELDS.size + name_length].decode()
+        self._chunk, self._indexed = chunk, 0
+        book = self._book
+        book.start_ns, book.end_ns = min(book.start_ns, first_ns), max(book.end_ns, last_ns)
+        book.chunks.append(
+            records.ChunkIndex(
+                chunk_start_offset=offset,
+                chunk_length=length,
+                compression=name,
+                compressed_size=len(content) - CHUNK_FIELDS.size - name_length - 8,
+                uncompressed_size=size,
+                message_start_time=first_ns,
+                message_end_time=last_ns,
+                message_index_offsets={},
+                message_index_length=0,
+            )
+        )
+
+    def _take_index(self, content: bytes, offset: int, length: int) -> None:
+        """Count a channel's messages of the last chunk, and keep the last of them."""
+        channel, size = INDEX_FIELDS.unpack_from(content)
+        entries = array("Q", content[INDEX_FIELDS.size :])
+        if size != 8 * len(entries) or not entries or channel not in self._topics:
+            raise ValueError(f"an index of {size} bytes for channel {channel}")
+        _, start, stop = next(chunk_records(self._chunk[entries[-1] :]))
+        at = entries[-1]
+        self._found.last[self._topics[channel]] = self._chunk[at + start + MESSAGE_FIELDS.size : at + stop]
+        self._book.counts[channel] += len(entries) // 2
+        self._indexed += len(entries) // 2
+        last = self._book.chunks[-1]
+        last.message_index_offsets[channel] = offset
+        last.message_index_length += length
+
+    def _look_at_the_last_chunk(self) -> None:
+        """A chunk that is whole counts, also when the file was cut within its indexes: they are written again."""
+        entries: dict[int, array[int]] = {}
+        for opcode, start, stop in chunk_records(self._chunk):
+            if opcode == Opcode.MESSAGE:
+                channel, _, log_ns, _ = MESSAGE_FIELDS.unpack_from(self._chunk, start)
+                entries.setdefault(channel, array("Q")).extend((log_ns, start - RECORD.size))
+                self._found.last[self._topics[channel]] = self._chunk[start + MESSAGE_FIELDS.size : stop]
+        if self._found.finished or self._indexed == sum(len(pairs) // 2 for pairs in entries.values()):
+            return
+        book, last = self._book, self._book.chunks[-1]
+        for channel in last.message_index_offsets:
+            book.counts[channel] -= len(entries[channel]) // 2
+        last.message_index_offsets, last.message_index_length = {}, 0
+        book.offset = last.chunk_start_offset + last.chunk_length
+        self._found.to_index = entries
+
+
+def _stream(content: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(content))

@@ -1,0 +1,172 @@
+"""What a vHub that is started again takes from the journal of the one before it.
+
+A fold of the journal gives the state behind the last closed tick; on the way it gives what others may still ask for
+(deliveries, numbered downlinks) and what the capture lacks. Pure: the shell reads the journal and knows how far the
+capture is. Neighbours: `records` (the fold), `core` goes on from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.codec import decode, decode_any, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import Frame, frame_from_bytes
+from foosim.protocol.layout import Layout
+from foosim.protocol.messages import Commit, Deliveries, Down, Epoch, Want
+from foosim.vhub.commits import Committed
+from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.records import Fold, Folded, HeadRecord, HubRecord, InputsRecord, TickRecord
+from foosim.vhub.state import HubState, received
+
+
+@dataclass(frozen=True, slots=True)
+class Captured:
+    """How far a capture is: its last tick and its last epoch; -1 and 0 when it has none yet."""
+
+    tick: int = -1
+    epoch: int = 0
+
+
+@dataclass(slots=True)
+class Past:
+    """The vHub as it was behind its last record, and what it had said."""
+
+    state: HubState
+    layout: Layout
+    chain: bytes = b""
+    """Over the frames up to the last closed tick."""
+    committed: Committed | None = None
+    """The commit of the last closed tick; None before the first."""
+    epoch: Epoch | None = None
+    inputs: InputsRecord | None = None
+    sent: dict[int, bytes] = field(default_factory=dict)
+    """Deliveries by tick, as they were published or as others take them to be."""
+    published: bytes = b""
+    """The last deliveries that were published."""
+    downlinks: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
+    """Numbered downlinks outside of lockstep, by client."""
+    known: Frame | None = None
+    """The last frame that the capture has."""
+    kept: list[Keep | KeepEpoch] = field(default_factory=list)
+    """What the capture lacks, in order."""
+
+    def words(self) -> list[Action | Keep | KeepEpoch]:
+        """Return what there is to do and to say before anything else: complete the capture, say the last deliveries
+        again, ask for all that may have come since."""
+        words: list[Action | Keep | KeepEpoch] = [*self.kept]
+        if self.epoch is None:
+            return words
+        epoch, state = self.epoch.epoch, self.state
+        words.append(Say("info", f"goes on behind tick {state.closed} in epoch {epoch}"))
+        words.append(Publish(channels.DELIVERIES, channels.VHUB, self.published))
+        for tick in range(state.closed + 1, state.final + 2):
+            for kind in (channels.COMMIT, channels.SAMPLES):
+                want = Want(channels.VHUB, kind.name, tick, epoch)
+                words.append(Publish(channels.WANT, channels.VHUB, encode(want)))
+        return words
+
+
+def recall(
+    deployment: Deployment, run: str, records: Sequence[bytes], captured: Captured | None, kept_ns: int
+) -> Past | None:
+    """Return what the records of a journal say; None when they are of no run or hold nothing.
+
+    `captured` is how far the capture is, None when there is none; downlinks of the last `kept_ns` of simulated time
+    are said again. Raises Malformed for the journal of another run, and for one that contradicts itself.
+    """
+    if not records:
+        return None
+    found = [decode_any(HubRecord, raw) for raw in records]
+    first = found[0]
+    if not isinstance(first, HeadRecord) or first.run != run:
+        whose = f"of run {first.run}" if isinstance(first, HeadRecord) else "one that does not start with its head"
+        raise Malformed(f"the journal of the vHub is {whose}, this is run {run}")
+    start = _start(found, captured, max(limits.KEPT_TICKS, kept_ns // deployment.tick_ns))
+    fold = Fold(deployment, records[start:])
+    past = Past(fold.state, fold.layout)
+    _remember(past, *_deliveries_of(fold.state))
+    if captured is not None and captured.tick == fold.state.closed:
+        past.known = _frame(fold)
+    for folded in fold:
+        _remember(past, folded.record.tick + 1, folded.record.deliveries)
+        _number(past, folded)
+        if captured is not None and folded.record.tick > captured.tick:
+            past.kept.append(Keep(folded.closing))
+        elif captured is not None and folded.record.tick == captured.tick:
+            past.known = folded.closing.frame
+    if captured is not None:
+        if captured.tick > fold.state.closed:
+            raise Malformed(f"the capture has tick {captured.tick}, its journal ends at {fold.state.closed}")
+        untold = [record for record in found if isinstance(record, Epoch) and record.epoch > captured.epoch]
+        past.kept[:0] = [KeepEpoch(epoch) for epoch in untold]
+    past.layout, past.chain, past.inputs = fold.layout, fold.chain, fold.inputs
+    past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
+    frame = _frame(fold)
+    if frame is not None:
+        past.committed = fold.commit, decode(Commit, fold.commit), frame
+    return past
+
+
+def _start(found: Sequence[object], captured: Captured | None, kept_ticks: int) -> int:
+    """Return the index of the last head from which a fold passes all that is wanted; the first one where none does."""
+    closed = max((record.tick for record in found if isinstance(record, TickRecord)), default=-1)
+    wanted = closed - kept_ticks if captured is None else min(closed - kept_ticks, captured.tick)
+    start, tick = 0, -1
+    for index, record in enumerate(found):
+        if isinstance(record, TickRecord):
+            tick = record.tick
+        elif isinstance(record, HeadRecord) and 0 <= tick <= wanted:
+            start = index
+    return start
+
+
+def _frame(fold: Fold) -> Frame | None:
+    """Return the frame of the last closed tick; None before the first."""
+    if not fold.commit:
+        return None
+    commit = decode(Commit, fold.commit)
+    return frame_from_bytes(commit.tick, fold.layout, commit.values, commit.outboxes)
+
+
+def _deliveries_of(state: HubState) -> tuple[int, bytes]:
+    """Return the deliveries that are behind a state, as they were published where they were."""
+    tick = state.closed + 1
+    following = 0 if state.was_final else state.final - tick
+    return tick, encode(Deliveries(tick, state.deliveries[tick], following))
+
+
+def _remember(past: Past, tick: int, payload: bytes) -> None:
+    """Note the deliveries of a tick, and that those behind it are final where they are."""
+    past.sent[tick] = past.sent.get(tick, payload)
+    for following in range(tick + 1, past.state.final + 1):
+        past.sent.setdefault(following, encode(Deliveries(following, [])))
+    past.sent.pop(tick - limits.KEPT_TICKS, None)
+    if not past.state.was_final:
+        past.published = payload
+
+
+def _number(past: Past, folded: Folded) -> None:
+    """Note what a tick released outside of lockstep, numbered as it was."""
+    tick, members = folded.record.tick, folded.state.members
+    for name, flights in sorted(folded.released.items()):
+        member = members[name]
+        if not member.is_due(tick):
+            down = Down(member.downlink, tick, member.sequence, received(flights), False)
+            past.downlinks.setdefault(name, []).append((member.downlink, encode(down)))
+
+
+def first_tick_of(records: Sequence[bytes]) -> int | None:
+    """Return the first tick of which a journal has a record, or would have; None when there is no journal."""
+    ticks = (record.tick for raw in records if isinstance(record := decode_any(HubRecord, raw), TickRecord))
+    return next(ticks, limits.COUNTER_MAX) if records else None
+
+
+def was_captured(records: Sequence[bytes]) -> str | None:
+    """Return the path of the capture that a journal is of, empty when there is none; None when there is no journal."""
+    heads = (record for raw in records[:1] if isinstance(record := decode_any(HubRecord, raw), HeadRecord))
+    return next((head.capture for head in heads), None)
