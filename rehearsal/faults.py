@@ -254,7 +254,7 @@ def _when_answered(system: System, asked: Sequence[str], do: Callable[[System], 
         system.later(ASK_AGAIN_NS, partial(_when_answered, system, asked, do))
 
 
-# --- supervisor and vHub --------------------------------------------------------------------------------------------------
+# --- supervisor and vHub ----------------------------------------------------------------------------------------------
 
 
 def _supervisor(dice: Dice, names: Sequence[str]) -> Fault:

@@ -88,14 +88,7 @@ class System:
         self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
-        for name, player in sorted(deployment.players.items()):
-            assert player.lockstep, "a rehearsal has lockstep players only"
-            core = ClientCore(name, "boot", self._clock(name).at(0))
-            loop = self.players[name] = PlayerLoop(core, load_player)
-            self._enter(name, core, loop.step, channels.CLIENT_READS)
-        for name, client in sorted(rehearsal.clients.items()):
-            core = ClientCore(name, "boot", self._clock(name).at(0))
-            self._enter(name, core, client(core), channels.CLIENT_READS)
+        self._enter_clients()
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
         self._hub_back_ns = HUB_BACK_NS
 
@@ -133,6 +126,16 @@ class System:
 
         self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
         self.processes[channels.VHUB].took = hub.waits.took
+
+    def _enter_clients(self) -> None:
+        for name, player in sorted(self.supervisor.deployment.players.items()):
+            assert player.lockstep, "a rehearsal has lockstep players only"
+            core = ClientCore(name, "boot", self._now_of(name))
+            loop = self.players[name] = PlayerLoop(core, load_player)
+            self._enter(name, core, loop.step, channels.CLIENT_READS)
+        for name, client in sorted(self.settings.clients.items()):
+            core = ClientCore(name, "boot", self._now_of(name))
+            self._enter(name, core, client(core), channels.CLIENT_READS)
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
