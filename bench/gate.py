@@ -33,13 +33,13 @@ class Found:
     cpu_s: float
 
 
-def find(name: str, seeds: int) -> Found:
-    """Fly seeds from 1 on until one finds a bug."""
+def find(name: str, seeds: Sequence[int]) -> Found:
+    """Fly seeds, one after the other, until one finds a bug."""
     mutant = next(mutant for mutant in MUTANTS if mutant.name == name)
     text = TABLE.read_text()
     begun_s = time.process_time()
     with mutant.planted():
-        for seed in range(1, seeds + 1):
+        for seed in seeds:
             broken = fly(text, TABLE.name, seed).broken
             if broken:
                 recorded = seed == mutant.seed or bool(fly(text, TABLE.name, mutant.seed).broken)
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"{'planted bug':42}{'seed':>5}  {'cpu s':>6}  found by")
     with ProcessPoolExecutor(chosen.jobs, mp_context=get_context("spawn")) as pool:
         wanted = chosen.names or names
-        for found in pool.map(find, wanted, [chosen.seeds] * len(wanted)):
+        for found in pool.map(find, wanted, [range(1, chosen.seeds + 1)] * len(wanted)):
             missed += found.seed < 0 or not found.recorded_finds
             seed = str(found.seed) if found.seed >= 0 else "none"
             stale = "" if found.recorded_finds else "  (the recorded seed does not find it)"

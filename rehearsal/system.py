@@ -123,6 +123,8 @@ class System:
             if build is not None and hub.state is None:
                 hub.begin(self.hub_journal.past(hub, build.run), now_ns)
             hub.advance(now_ns)
+            if hub.member.refusal and self.settings.restart_ns and self.hub is hub:
+                self._next.append(lambda: self._hub_again(hub))
 
         self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
         self.processes[channels.VHUB].took = hub.waits.took
@@ -416,16 +418,25 @@ class System:
 
     def _end_hub(self) -> None:
         """What the vHub had not done yet is not done; the others see its connections close."""
+        self._leave_hub()
+        if channels.SUPERVISOR in self.processes:
+            self.supervisor.process_gone(channels.VHUB, self._now_of(channels.SUPERVISOR))
+            self._turn(self.processes[channels.SUPERVISOR])
+
+    def _leave_hub(self) -> None:
         self.hub_journal.ending = None
         self._leave(channels.VHUB)
         self.hub.actions.clear()
         self.later(self._hub_back_ns, self._start_hub)
-        if channels.SUPERVISOR in self.processes:
-            self.supervisor.process_gone(channels.VHUB, self._now_of(channels.SUPERVISOR))
-            self._turn(self.processes[channels.SUPERVISOR])
         for client in self._clients():
             client.core.hub_gone(client.clock.at(self.bus.now_ns))
             self._turn(client)
+
+    def _hub_again(self, refused: HubCore) -> None:
+        """A vHub that is refused ends, was never present to the supervisor, and is started again after a while."""
+        if self.hub is refused and channels.VHUB in self.processes:
+            self._hub_back_ns = self.settings.restart_ns
+            self._leave_hub()
 
     def _start_hub(self) -> None:
         self._enter_hub(library_fingerprint())
