@@ -15,6 +15,7 @@ from foosim.client.core import ClientCore, Outgoing
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.names import CHANNEL_ECHO
 from foosim.protocol.units import Pace
@@ -283,8 +284,8 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks
         if not CHANGES_THE_WORLD & {*plan.kinds}:
             same = flight.system.supervisor.chain == undisturbed(text, name, seed % WORLDS, ticks)
             hold(same, "the world is not the one that would have been")
-    except AssertionError as error:
-        flown.broken = f"{type(error).__name__}: {error}"
+    except (AssertionError, Refused, ArithmeticError, LookupError, TypeError, ValueError) as error:
+        flown.broken = f"{type(error).__name__}: {error}"  # what a core raises would have ended its process
     system, told = flight.system, flight.system.supervisor.recovery.recovered
     flown.ticks, flown.chain, flown.seen = flight.laws.ticks, system.supervisor.chain.hex(), flight.seen
     flown.epochs, flown.virtual_s = flight.laws.epoch, system.bus.now_ns / 1e9

@@ -29,7 +29,7 @@ def _old_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 7)
+@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 9)
 def _new_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch <= self.epoch and bool(before(self, channel, message, payload))
@@ -37,7 +37,7 @@ def _new_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node goes back to an old epoch", "epochs only grow", 32)
+@register("node goes back to an old epoch", "epochs only grow", 0)
 def _epochs_fall(planting: Planting) -> None:
     def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
         if self.epoch > epoch.epoch and self.name in epoch.roster:
@@ -52,12 +52,12 @@ def _any_basis(planting: Planting) -> None:
     planting.swap(NodeCore, "_take_part", lambda self, barrier, part: barrier.add(part))
 
 
-@register("node does not ask again", "who has had no progress asks again (node)", 1)
+@register("node does not ask again", "who has had no progress asks again (node)", 2)
 def _patient_node(planting: Planting) -> None:
     planting.swap(NodeCore, "_ask_again", lambda self, now_ns: self._patience.asked(now_ns))
 
 
-@register("node does not answer who asks", "senders keep what is not yet committed (node)", 2)
+@register("node does not answer who asks", "senders keep what is not yet committed (node)", 3)
 def _mute_node(planting: Planting) -> None:
     planting.swap(NodeCore, "_on_want", lambda self, want, payload, now_ns: None)
 
@@ -164,7 +164,7 @@ def _ready_once(planting: Planting) -> None:
     before: Any = planting.swap(Member, "wake", wake)
 
 
-@register("lost node does not say ready again", "an epoch without a node is no answer to its ready", 30)
+@register("lost node does not say ready again", "an epoch without a node is no answer to its ready", 24)
 def _answered_by_another(planting: Planting) -> None:
     def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
         is_present = epoch.epoch == self.epoch

@@ -36,7 +36,7 @@ class _AnyBasis(bytes):
     __hash__ = bytes.__hash__
 
 
-@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 2)
+@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 6)
 def _old_epochs(planting: Planting) -> None:
     def on_part(self: Any, part: Any, payload: bytes, now_ns: int) -> None:
         self.arrivals.take_part(part, self.frame.tick, self.members)
@@ -111,7 +111,7 @@ def _unwritten(planting: Planting) -> None:
     before: Any = planting.swap(Requests, "_accept", accept)
 
 
-@register("requests are done each time they come", "the same id gets the same answer", 2)
+@register("requests are done each time they come", "the same id gets the same answer", 1)
 def _each_time(planting: Planting) -> None:
     def take(self: Any, request: Any, payload: bytes, now_ns: int) -> None:
         self._answers.pop((request.sender, request.id), None)
@@ -120,12 +120,12 @@ def _each_time(planting: Planting) -> None:
     before: Any = planting.swap(Requests, "take", take)
 
 
-@register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 5)
+@register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 8)
 def _forgotten(planting: Planting) -> None:
     planting.swap(Requests, "resume", lambda self, edits, answers: None)
 
 
-@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 4)
+@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 2)
 def _other_orders(planting: Planting) -> None:
     def open_epoch(self: Any, *given: Any) -> None:
         for tick in range(self.frame.tick, self.released):
@@ -192,7 +192,7 @@ def _kept_robots(planting: Planting) -> None:
     before: Any = planting.swap(Recovery, "join", join)
 
 
-@register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 10)
+@register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 13)
 def _unmoved(planting: Planting) -> None:
     planting.swap(Recovery, "moved", lambda self, robot: None)
 
@@ -202,7 +202,7 @@ def _never_lost(planting: Planting) -> None:
     planting.swap(Roster, "lose", lambda self, process: None)
 
 
-@register("a stopped node comes back", "who was stopped is not let in until it is started", 1)
+@register("a stopped node comes back", "who was stopped is not let in until it is started", 8)
 def _unstopped(planting: Planting) -> None:
     def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
         self._core.roster.stopped.discard(hello.name)
@@ -211,7 +211,7 @@ def _unstopped(planting: Planting) -> None:
     before: Any = planting.swap(Handshake, "hello", hello)
 
 
-@register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 9)
+@register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 22)
 def _untold(planting: Planting) -> None:
     def say_epoch(self: Any) -> None:
         self.count_repeat()

@@ -32,12 +32,12 @@ def _hasty(planting: Planting) -> None:
     before: Any = planting.swap(HubCore, "_close_clients", close_clients)
 
 
-@register("vHub does not ask again", "who has had no progress asks again (vHub)", 2)
+@register("vHub does not ask again", "who has had no progress asks again (vHub)", 1)
 def _patient(planting: Planting) -> None:
     planting.swap(HubCore, "_ask_again", lambda self, now_ns: self._patience.asked(now_ns))
 
 
-@register("vHub does not answer who asks", "supervisor and vHub keep the last 16 ticks", 1)
+@register("vHub does not answer who asks", "supervisor and vHub keep the last 16 ticks", 2)
 def _mute(planting: Planting) -> None:
     planting.swap(HubCore, "_on_want", lambda self, want, payload, now_ns: None)
 
@@ -55,7 +55,7 @@ def _not_final(planting: Planting) -> None:
     before: Any = planting.swap(HubCore, "_on_want", on_want)
 
 
-@register("samples of any frame", "samples with that D(k) of every robot in frame k", 0)
+@register("samples of any frame", "samples with that D(k) of every robot in frame k", 24)
 def _any_frame(planting: Planting) -> None:
     def world_packets(samples: Any, digest: bytes, frame: Any, sampling: Any) -> Any:
         told = list(samples)
