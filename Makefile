@@ -9,7 +9,7 @@ SEEDS ?= 100
 # One worker per core. The shell's PYTHONPATH (ROS sets one) would load other people's pytest plugins.
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses auto --maxprocesses 8
 
-.PHONY: help up test play swarm swarm-gate lint bench clean environment
+.PHONY: help up test play swarm swarm-gate machines lint bench clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
@@ -17,6 +17,7 @@ help:
 	@echo 'make play    minutes of the table as deployed that make test leaves out: goals, hand-overs'
 	@echo 'make swarm   runs under random faults, by seed (SEEDS=100; ARGS: --seed N, --json)'
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
+	@echo 'make machines  further cuts between machines: needs root, see docs/testing.md'
 	@echo 'make lint    ruff and mypy alone'
 	@echo 'make bench   measure speed, latency and throughput (ARGS: options of the bench)'
 	@echo 'make clean   remove environments, caches and builds; captures stay'
@@ -26,6 +27,9 @@ up: environment
 
 play: environment
 	@$(PYTEST) -m campaign tests/rehearsal $(ARGS)
+
+machines: environment
+	@$(PYTEST) -m campaign tests/wire/test_machines.py tests/wire/test_ssh.py $(ARGS)
 
 swarm: environment
 	@.venv/bin/foosim-rehearse deploy/table.yaml --swarm --seeds $(SEEDS) $(ARGS)

@@ -130,11 +130,15 @@ def watch(
     sets: Sequence[str] = (),
     every_s: float = 0.25,
     helpers: Helpers | None = None,
+    pki: Path | None = None,
 ) -> Watched:
-    """Run the table with a capture, and with the helpers beside it. Raises BenchError when it did not end in order."""
+    """Run the table with a capture, with the helpers beside it, with certificates where `pki` has them.
+
+    Raises BenchError when it did not end in order.
+    """
     port = free_ports()
     options = RunOptions(
-        TABLE, pace, f"{round(duration_s * 1000)} ms", None, tuple(sets), listen=f"tcp/127.0.0.1:{port}"
+        TABLE, pace, f"{round(duration_s * 1000)} ms", None, tuple(sets), listen=f"127.0.0.1:{port}", pki=pki
     )
     begun_s = time.monotonic()
     plan = make_plan(options)

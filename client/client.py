@@ -17,11 +17,13 @@ Neighbours: `core` decides, `payloads` has the values, `protocol.loop` carries; 
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Generic, Self, TypeVar
 
@@ -394,20 +396,34 @@ class Client:
         )
 
 
-def connect(address: str, name: str, world: str = "", timeout_s: float = CONNECT_S) -> Client:
+def connect(
+    address: str,
+    name: str,
+    world: str = "",
+    timeout_s: float = CONNECT_S,
+    pki: str | os.PathLike[str] | None = None,
+    password: str = "",
+) -> Client:
     """Connect to a run as the declared client `name`; `address` is the vHub's radio plane, `tcp/HOST:PORT`.
 
-    `world` refuses any other world than this one. Raises BadValue for a name or address that is none, ConnectionFailed
-    when nobody answers within `timeout_s` (wall time), ConnectionRefused, with the reason, when the vHub will not have
-    the client.
+    `world` refuses any other world than this one. Where the run has certificates the address is `tls/HOST:PORT`, and
+    `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key; or, where clients
+    have passwords, `password` is the one of the user `name`. Raises BadValue for a name or address that is none,
+    CertificateError for a folder with which nobody would be let in, ConnectionFailed when nobody answers within
+    `timeout_s` (wall time), NotAuthorised and ConnectionRefused, with the reason, when the vHub will not have the
+    client.
     """
     if not is_name(name):
         raise BadValue("not a name for a client", name)
+    from foosim.protocol.certificates import load_credentials
     from foosim.protocol.session import ConnectError, Session
+    from foosim.protocol.session_settings import Security
 
+    credentials = load_credentials(None if pki is None else Path(pki), f"client.{name}", password)
+    security = None if credentials is None else Security(credentials)
     begun_ns = time.monotonic_ns()
     try:
-        session = Session.client(address, timeout_s, limits.RADIO_MESSAGE_BYTES_MAX)
+        session = Session.client(address, timeout_s, limits.RADIO_MESSAGE_BYTES_MAX, security=security)
     except ConnectError as error:
         raise ConnectionFailed(error.what) from None
     try:
@@ -418,8 +434,9 @@ def connect(address: str, name: str, world: str = "", timeout_s: float = CONNECT
         if core.refusal:
             raise ConnectionRefused(f"{name} at {session.locator}: {core.refusal}")
         if core.deployment is None:
+            who = "" if security is None else f", and is {security.credentials.identity} authorised?"
             raise ConnectionFailed(
-                f"no vHub answers at {session.locator} within {timeout_s:g} s: is it the radio plane's address?"
+                f"no vHub answers at {session.locator} within {timeout_s:g} s: is it the radio plane's address?{who}"
             )
         link.be_present()
         return Client(link, core.deployment)

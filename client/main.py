@@ -7,22 +7,26 @@ One address is all that it needs: its class, rate, robots and parameters come wi
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from foosim.client.core import ClientCore
 from foosim.client.player import PlayerLoop
-from foosim.protocol import channels, limits
+from foosim.protocol import channels, identity, limits
 from foosim.protocol.actions import Say
+from foosim.protocol.admission import Admission
+from foosim.protocol.certificates import Credentials, load_credentials, warn_of_end
 from foosim.protocol.channels import VHUB, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
+from foosim.protocol.session_settings import Security
 
 CONNECT_S = 60.0
 
@@ -30,14 +34,19 @@ CONNECT_S = 60.0
 class PlayerProcess:
     """One player on one session, until the run ends, the vHub is gone for good, or `stop`."""
 
-    def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
+    def __init__(
+        self, name: str, session: Session, inbox: Inbox, world: str = "", credentials: Credentials | None = None
+    ) -> None:
         self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
         self.stopped = False
         self._player = PlayerLoop(self.core)
         self._inbox = inbox
         self._is_present = False
+        self._admission = Admission(credentials, VHUB, session.locator, time.monotonic_ns())
         self._wire = Wire(session, Plane.RADIO, inbox, name)
-        self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
+        log = start_log(name)
+        warn_of_end(credentials, log)
+        self._loop = Loop(self.core, inbox, log, self._deadline_ns)
         self._loop.connect(self._wire)
         self._loop.turn = self._turn
         self._loop.on_alive = self._on_alive
@@ -63,6 +72,7 @@ class PlayerProcess:
         return self.stopped or self.core.ended or self.core.lost or bool(self.core.refusal)
 
     def _turn(self, now_ns: int) -> None:
+        self._admission.check(now_ns)
         if self.core.deployment is not None and not self._is_present:
             self._is_present = True
             self._wire.declare_alive()
@@ -72,22 +82,25 @@ class PlayerProcess:
         return min(self.core.deadline_ns(), self._player.deadline_ns())
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        self._admission.heard(name, is_alive)
         if name == VHUB:
             (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
 
 
-def run_player(name: str, connect: str, world: str = "") -> int:
-    """Run a declared player until its run ends; return the exit code.
+def run_player(name: str, connect: str, world: str = "", pki: Path | None = None) -> int:
+    """Run a declared player until its run ends; return the exit code. `pki` has its certificate, or its password.
 
     Raises Refused when there is nobody to connect to, PlayerError when its class cannot be loaded or fails.
     """
     if not is_name(name):
         raise BadValue("not a name for a player", name)
+    credentials = load_credentials(pki, identity.client(name))
+    security = None if credentials is None else Security(credentials)
     use_client_runtime()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    with Session.client(connect, CONNECT_S, limits.RADIO_MESSAGE_BYTES_MAX, stop.is_set) as session:
-        player = PlayerProcess(name, session, inbox, world)
+    with Session.client(connect, CONNECT_S, limits.RADIO_MESSAGE_BYTES_MAX, stop.is_set, security) as session:
+        player = PlayerProcess(name, session, inbox, world, credentials)
         stop.then(player.stop)
         return player.run()
 
@@ -100,15 +113,16 @@ def player(
     name: Annotated[str, typer.Option(help="Its name, as the deployment declares it under players.")],
     connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT.")],
     world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    pki: PkiOption = None,
     version: VersionOption = False,
 ) -> None:
     """Play in a run: load the class that the deployment names and let it act.
 
     The process ends with the run; it exits with 0 when the run ended, with 1 when the player failed or the vHub was
-    lost, and with 3 when the vHub would not have it.
+    gone for longer than a run waits for it, and with 3 when the vHub would not have it.
     """
     die_with_parent()
-    raise typer.Exit(run_player(name, connect, world))
+    raise typer.Exit(run_player(name, connect, world, pki))
 
 
 def main() -> None:

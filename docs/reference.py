@@ -22,6 +22,9 @@ from foosim.protocol.deployment import deployment_schema
 from foosim.rehearsal.rehearse_command import app as rehearse_app
 from foosim.rehearsal.replay_command import app as replay_app
 from foosim.supervisor.cli import app as supervisor_app
+from foosim.supervisor.doctor_command import app as doctor_app
+from foosim.supervisor.guard import app as guard_app
+from foosim.supervisor.pki_command import app as pki_app
 from foosim.vhub.main import app as vhub_app
 from foosim.vhub.rows import ROW_TYPES, row_schema
 
@@ -33,6 +36,9 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-vhub": vhub_app,
     "foosim-node": node_app,
     "foosim-player": player_app,
+    "foosim-guard": guard_app,
+    "foosim-pki": pki_app,
+    "foosim-doctor": doctor_app,
 }
 _PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
 

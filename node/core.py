@@ -39,6 +39,7 @@ from foosim.protocol.messages import (
     Outbox,
     Part,
     Prepare,
+    Recall,
     Samples,
     Want,
 )
@@ -107,7 +108,7 @@ class NodeCore:
             channels.EPOCH.name: self._on_epoch,
             channels.COMMIT.name: self._on_commit,
             channels.WANT.name: self._on_want,
-            channels.RECALL.name: self.member.recall,
+            channels.RECALL.name: self._on_recall,
             channels.BUILD.name: self._on_build,
             channels.PREPARE.name: self._on_prepare,
             channels.END.name: self._on_end,
@@ -392,6 +393,9 @@ class NodeCore:
         self.deployment, layout = self.member.deployment, self.member.layout
         assert layout is not None
         self.member.want_layout(layout)
+
+    def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
+        self._repeated += not self.member.recall(recall)
 
     def _on_prepare(self, prepare: Prepare, payload: bytes, now_ns: int) -> None:
         if self.deployment is not None:

@@ -7,24 +7,29 @@ has the engines, `protocol.loop` is the loop.
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from foosim.node.core import NodeCore
 from foosim.node.solver import Solver
-from foosim.protocol import channels, limits
+from foosim.protocol import channels, identity, limits
 from foosim.protocol.actions import Say
+from foosim.protocol.admission import Admission
+from foosim.protocol.certificates import Credentials, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
+from foosim.protocol.notify import Notify
 from foosim.protocol.orphan import Orphan
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
+from foosim.protocol.session_settings import Security
 
 CONNECT_S = 60.0
 
@@ -32,7 +37,9 @@ CONNECT_S = 60.0
 class NodeProcess:
     """One node on one session, until the run ends, the supervisor is gone for too long, or `stop`."""
 
-    def __init__(self, name: str, session: Session, inbox: Inbox, world: str = "") -> None:
+    def __init__(
+        self, name: str, session: Session, inbox: Inbox, world: str = "", credentials: Credentials | None = None
+    ) -> None:
         self.core = NodeCore(name, new_boot(), library_fingerprint(), time.monotonic_ns(), world)
         self.stopped = False
         self._orphan = Orphan()
@@ -40,8 +47,12 @@ class NodeProcess:
         self._wire = Wire(session, Plane.SIMULATION, inbox, name)
         self._inbox = inbox
         self._is_present = False
-        self._loop = Loop(self.core, inbox, start_log(name), self._deadline_ns)
+        self._admission = Admission(credentials, SUPERVISOR, session.locator, time.monotonic_ns())
+        log = start_log(name)
+        warn_of_end(credentials, log)
+        self._loop = Loop(self.core, inbox, log, self._deadline_ns)
         self._loop.connect(self._wire)
+        self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
@@ -69,6 +80,7 @@ class NodeProcess:
         """Compute ticks as far as the inputs allow; what a tick says first is said before it is solved."""
         core = self.core
         core.busy = self._loop.busy
+        self._admission.check(now_ns)
         if core.member.build is not None and not self._is_present:
             self._is_present = True
             self._wire.declare_alive()
@@ -89,6 +101,7 @@ class NodeProcess:
         return now_ns if self._solver.is_building else self.core.deadline_ns()
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        self._admission.heard(name, is_alive)
         if name != SUPERVISOR or self.core.ended is not None:
             return
         if not is_alive:
@@ -96,15 +109,20 @@ class NodeProcess:
         self._orphan.hear(is_alive, time.monotonic_ns())
 
 
-def run_node(name: str, connect: str, world: str = "") -> int:
-    """Run a node until its run ends; return the exit code. Raises Refused when there is nobody to connect to."""
+def run_node(name: str, connect: str, world: str = "", pki: Path | None = None) -> int:
+    """Run a node until its run ends; return the exit code. Raises Refused when there is nobody to connect to.
+
+    `pki` is the folder with its certificate.
+    """
     if not is_name(name):
         raise BadValue("not a name for a node", name)
+    credentials = load_credentials(pki, identity.node(name))
+    security = None if credentials is None else Security(credentials)
     use_client_runtime()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    with Session.client(connect, CONNECT_S, give_up=stop.is_set) as session:
-        node = NodeProcess(name, session, inbox, world)
+    with Session.client(connect, CONNECT_S, give_up=stop.is_set, security=security) as session:
+        node = NodeProcess(name, session, inbox, world, credentials)
         stop.then(node.stop)
         return node.run()
 
@@ -117,6 +135,7 @@ def node(
     name: Annotated[str, typer.Option(help="Its name, as the deployment declares it.")],
     connect: Annotated[str, typer.Option(help="Address of the supervisor: tcp/HOST:PORT.")],
     world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
+    pki: PkiOption = None,
     version: VersionOption = False,
 ) -> None:
     """Take part in a run as a node.
@@ -126,7 +145,7 @@ def node(
     with 3 when the supervisor would not have it.
     """
     die_with_parent()
-    raise typer.Exit(run_node(name, connect, world))
+    raise typer.Exit(run_node(name, connect, world, pki))
 
 
 def main() -> None:

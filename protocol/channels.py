@@ -1,7 +1,8 @@
 """The table of channels: key, message, direction, plane, service, whether the journal or capture has it.
 
 Nothing else in the code spells a key. `{name}` stands for the sender where many write, and for the receiver where one
-is addressed; a message that names its sender must come on that sender's key. Neighbours: `messages`, `session`.
+is addressed; a message that names its sender must come on that sender's key. Who may write and read what is derived
+from here, too. Neighbours: `messages`, `session`, `access`.
 """
 
 from __future__ import annotations
@@ -41,30 +42,40 @@ class Channel:
         return self.key.replace("{name}", "*")
 
 
-def _simulation(name: str, message: Any, writers: str, readers: str, rate: str, named: bool = True) -> Channel:
+def _simulation(
+    name: str,
+    message: Any,
+    writers: str,
+    readers: str,
+    rate: str,
+    named: bool = True,
+    bytes_max: int = limits.MESSAGE_BYTES_MAX,
+) -> Channel:
     key = f"foosim/simulation/{name}" + ("/{name}" if named else "")
-    return Channel(name, key, message, Plane.SIMULATION, writers, readers, rate, express=True)
+    return Channel(name, key, message, Plane.SIMULATION, writers, readers, rate, True, bytes_max)
 
 
-def _radio(name: str, message: Any, writers: str, readers: str, rate: str) -> Channel:
-    return Channel(
-        name,
-        f"foosim/radio/{name}/{{name}}",
-        message,
-        Plane.RADIO,
-        writers,
-        readers,
-        rate,
-        express=True,
-        bytes_max=limits.RADIO_MESSAGE_BYTES_MAX,
-    )
+def _radio(
+    name: str,
+    message: Any,
+    writers: str,
+    readers: str,
+    rate: str,
+    bytes_max: int = limits.RADIO_MESSAGE_BYTES_MAX,
+) -> Channel:
+    key = f"foosim/radio/{name}/{{name}}"
+    return Channel(name, key, message, Plane.RADIO, writers, readers, rate, True, bytes_max)
 
 
-HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered")
+_SMALL: Final = limits.SMALL_MESSAGE_BYTES_MAX
+
+HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL)
 RECALL: Final = _simulation("recall", messages.Recall, "supervisor", "node, vhub", "an unknown heartbeat", named=False)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
-READY: Final = _simulation("ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch")
+READY: Final = _simulation(
+    "ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch", bytes_max=_SMALL
+)
 STANDING: Final = _simulation("standing", messages.Standing, "vhub", "supervisor", "with each ready")
 PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
 EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
@@ -73,15 +84,17 @@ PART: Final = _simulation("part", messages.Part, "node", "node, supervisor", "ti
 SAMPLES: Final = _simulation("samples", messages.Samples, "node", "vhub", "tick")
 COMMIT: Final = _simulation("commit", messages.Commit, "supervisor", "the named one", "tick (vhub)")
 DELIVERIES: Final = _simulation("deliveries", messages.Deliveries, "vhub", "node, supervisor", "tick", named=False)
-WANT: Final = _simulation("want", messages.Want, "all", "all", "20 ms doubling to 1 s without progress")
+WANT: Final = _simulation(
+    "want", messages.Want, "all", "all", "20 ms doubling to 1 s without progress", bytes_max=_SMALL
+)
 HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
 TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a change, and an answer", named=False)
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
-REQUEST: Final = _simulation("request", messages.Request, "operator", "supervisor", "a request")
+REQUEST: Final = _simulation("request", messages.Request, "operator", "supervisor", "a request", bytes_max=_SMALL)
 ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named one", "an answer")
 
-CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered")
+CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
 CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
 UP: Final = _radio("up", messages.Join | messages.Up | messages.Done, "client", "vhub", "the client's rate")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from importlib.metadata import version
+from pathlib import Path
 from typing import Annotated, Final
 
 import typer
@@ -20,6 +21,8 @@ BAD_INPUT: Final = 2
 REFUSED: Final = 3
 INTERRUPTED: Final = 130
 HELP_WIDTH_MAX: Final = 100
+PKI_VARIABLE: Final = "FOOSIM_PKI"
+"""Says, where `--pki` does not, which folder has the certificates."""
 
 
 def _show_version(wanted: bool) -> None:
@@ -31,6 +34,12 @@ def _show_version(wanted: bool) -> None:
 VersionOption = Annotated[
     bool,
     typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
+]
+
+
+PkiOption = Annotated[
+    Path | None,
+    typer.Option("--pki", envvar=PKI_VARIABLE, help="The folder with ca.pem and its own certificate and key."),
 ]
 
 

@@ -14,20 +14,22 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
 
 from foosim.protocol import limits, names, units
+from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.errors import BadValue
+from foosim.protocol.hosts import Host, Listen, Name, Placed
 from foosim.protocol.names import LineName, Team
 from foosim.protocol.references import LINK_RULES_MAX, SELECTORS_MAX
 from foosim.protocol.table import Part, Table
 from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks
 
 __all__ = [
-    "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "Jitter", "LinkRule", "Network",
-    "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor", "deployment_schema",
-    "deployment_schema_text", "parse_pace", "period_ticks",
+    "AccessSpec", "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "Jitter", "LinkRule",
+    "Network", "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor",
+    "deployment_schema", "deployment_schema_text", "parse_pace", "period_ticks",
 ]  # fmt: skip
 
-Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
+OperatorName = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.OPERATOR_LENGTH_MAX)]
 Selector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
 ClassPath = Annotated[str, StringConstraints(pattern=names.CLASS_PATTERN, max_length=200)]
 
@@ -84,15 +86,15 @@ class CameraRobot(Part):
 Robot = Annotated[RodRobot | CameraRobot, Field(discriminator="model")]
 
 
-class NodeSpec(Part):
-    """A process that computes: the robots that it owns at the start, who starts it, whether the run needs it."""
+class NodeSpec(Placed):
+    """A process that computes: where, who starts it, whether the run needs it, the robots that it owns at the start."""
 
-    launch: Literal["local", "manual"] = "local"
+    launch: Literal["local", "manual", "systemd"] = "local"
     required: bool = False
     robots: list[RobotName] = Field(max_length=limits.ENTITIES_MAX)
 
 
-class Player(Part):
+class Player(Placed):
     """A controller that `up` starts: a class with `act(tick, samples) -> commands`."""
 
     class_: ClassPath = Field(alias="class")
@@ -100,6 +102,10 @@ class Player(Part):
     lockstep: bool = True
     robots: dict[RobotName, list[Name]] = Field(max_length=limits.ENTITIES_MAX)
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
+
+
+class VHubSpec(Placed):
+    """The process that judges every packet and writes the capture: where it runs."""
 
 
 class ClientSpec(Part):
@@ -168,6 +174,13 @@ class Capture(Part):
     flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = _default("100 ms", "flush")
 
 
+class AccessSpec(Part):
+    """Who may control the run, and how clients prove who they are: where the run has certificates."""
+
+    operators: list[OperatorName] = Field(default=["admin"], max_length=limits.OPERATORS_MAX)
+    radio: Literal["certificate", "password"] = "certificate"
+
+
 class Deadlines(Part):
     """How long the run waits for whom, in wall time."""
 
@@ -204,11 +217,15 @@ class Deployment(Part):
     on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
     table: Table
     robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
+    listen: Listen = LOOPBACK
+    hosts: dict[Name, Host] = Field(default={}, max_length=limits.NODES_MAX)
     nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)
+    vhub: VHubSpec = Field(default_factory=VHubSpec)
     players: dict[Name, Player] = Field(default={}, max_length=limits.CLIENTS_MAX)
     clients: dict[Name, ClientSpec] = Field(default={}, max_length=limits.CLIENTS_MAX)
     network: Network = Field(default_factory=Network)
     capture: Capture = Field(default_factory=Capture)
+    access: AccessSpec = Field(default_factory=AccessSpec)
     deadlines: Deadlines = Field(default_factory=Deadlines)
 
     def endpoints(self) -> list[str]:

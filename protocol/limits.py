@@ -13,6 +13,9 @@ NAME_LENGTH_MAX: Final = 32
 ENTITIES_MAX: Final = 4096
 NODES_MAX: Final = 256
 CLIENTS_MAX: Final = 1024
+OPERATORS_MAX: Final = 64
+OPERATOR_LENGTH_MAX: Final = 24
+"""Of an operator's name: each of his sessions adds a dot and seven characters."""
 
 COUNTER_MAX: Final = 2**63 - 1
 """Ticks, epochs, nanoseconds and sequence numbers: what every MessagePack reader holds in a signed 64-bit integer."""
@@ -23,6 +26,8 @@ MESSAGE_BYTES_MAX: Final = 4 * 1024 * 1024
 """One message of the simulation plane (a commit of a large world, a build with models)."""
 RADIO_MESSAGE_BYTES_MAX: Final = 1024 * 1024
 """One message from or to a client."""
+SMALL_MESSAGE_BYTES_MAX: Final = 64 * 1024
+"""One message of those that have no list of packets, numbers or entities: what anybody who is let in may say first."""
 PACKETS_PER_MESSAGE_MAX: Final = 65_536
 DEPLOYMENT_BYTES_MAX: Final = 64 * 1024
 TEXT_LENGTH_MAX: Final = 8 * 1024

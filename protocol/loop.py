@@ -16,6 +16,7 @@ from typing import Any, Final, Protocol
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
 from foosim.protocol.inbox import Inbox
+from foosim.protocol.notify import Notify
 from foosim.protocol.session import Publisher, Session
 
 BUSY_WINDOW_NS: Final = 1_000_000_000
@@ -117,6 +118,8 @@ class Loop:
         not wake the loop."""
         self.on_alive: Callable[[Plane, str, bool], None] = lambda plane, name, is_alive: None
         """Somebody has come or gone."""
+        self.notify = Notify({})
+        """Tells a service manager that the loop goes round; of itself it knows of none."""
         self.on_say: Callable[[Say], None] = lambda say: None
         self.took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
         """Told how long a turn took, with all that was performed: when it began, when the loop slept again."""
@@ -142,8 +145,10 @@ class Loop:
         gc.collect()
         gc.freeze()
         gc.set_threshold(*GC_THRESHOLDS)
+        self.notify.ready(time.monotonic_ns())
         while not until():
             self.go_round()
+        self.notify.stopping()
 
     def go_round(self) -> None:
         """Sleep until there is something, and do it."""
@@ -156,6 +161,7 @@ class Loop:
         items = self._inbox.take(timeout_s, lacks, count)
         now_ns = self._turn_ns = time.monotonic_ns()
         self._measure(now_ns, now_ns - slept_ns)
+        self.notify.goes_on(now_ns)
         channels = self._channels
         for key, name, payload in items:
             channel = channels.get(key)

@@ -18,7 +18,6 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Recall, Refusal
-from foosim.protocol.start import first_chain
 
 AGAIN_NS: Final = 200_000_000
 
@@ -78,6 +77,11 @@ class Member:
         self._world = deployment.world
         return True
 
+    @property
+    def first_tick(self) -> int:
+        """The tick of the frame that the run began with."""
+        return 0 if self.build is None or self.build.origin is None else self.build.origin.tick
+
     def _take_again(self, known: Build, build: Build) -> bool:
         """Take the answer of the supervisor that has recalled this process, if it is about the same run."""
         if not self._recalled_by or self.deployment is None:
@@ -92,24 +96,15 @@ class Member:
         self.deadline_ns = 0
         return True
 
-    def recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
+    def recall(self, recall: Recall) -> bool:
         """A supervisor does not know this process: say hello to it, unless it is the one that is known."""
         if self.build is None or recall.boot in (self.build.supervisor, self._recalled_by):
-            return
+            return False
         self._actions.append(Say("warning", "recalled by a supervisor that was started again"))
         self._recalled_by = recall.boot
         self._entered = False
         self.deadline_ns = 0
-
-    @property
-    def first_tick(self) -> int:
-        """The tick of the frame that the run began with."""
-        return 0 if self.build is None or self.build.origin is None else self.build.origin.tick
-
-    @property
-    def first_chain(self) -> bytes:
-        """The chain over the frames up to that one."""
-        return first_chain(None if self.build is None else self.build.origin)
+        return True
 
     def refuse(self, payload: bytes) -> bool:
         """Take a refusal; False when it is meant for another boot."""

@@ -39,7 +39,7 @@ class Finding:
 def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found as they are asked for."""
     view = _View(data)
-    for check in (_names, _robots, _nodes, _players, _links, _rates, _clients, _deadlines, _lines, _shapes):
+    for check in (_names, _hosts, _robots, _nodes, _players, _links, _rates, _clients, _deadlines, _lines, _shapes):
         yield from check(view)
 
 
@@ -53,6 +53,7 @@ class _View:
     def __init__(self, data: object) -> None:
         self.data = data
         self.robots = self.mapping("robots")
+        self.hosts = self.mapping("hosts")
         self.nodes = self.mapping("nodes")
         self.players = self.mapping("players")
         self.clients = self.mapping("clients")
@@ -110,6 +111,23 @@ def _names(view: _View) -> Iterator[Finding]:
                 yield Finding((section, name), f"a name that is also one of {other}", name, at="key")
             for scope in scopes:
                 scope.setdefault(name, section)
+
+
+def _hosts(view: _View) -> Iterator[Finding]:
+    """Processes are placed on hosts that exist, by name or by label; a unit of systemd needs such a place."""
+    labels = {label for host in view.hosts for _, label in view.texts("hosts", host, "labels")}
+    places: list[Location] = [(section, name) for section in ("nodes", "players") for name in view.mapping(section)]
+    for place in (*places, ("vhub",)):
+        host, label = view.get(*place, "host"), view.get(*place, "label")
+        if isinstance(host, str) and host not in view.hosts:
+            yield Finding((*place, "host"), "unknown host", host, _quoted(nearest_name(host, view.hosts)))
+        if isinstance(label, str) and host is not None:
+            yield Finding((*place, "label"), "a label beside a host: one of them says where", label)
+        elif isinstance(label, str) and label not in labels:
+            nearest = _quoted(nearest_name(label, labels))
+            yield Finding((*place, "label"), "a label that no host has", label, nearest)
+        if host is None and label is None and view.get(*place, "launch") == "systemd":
+            yield Finding((*place, "launch"), "a unit of systemd needs a host or a label", "systemd")
 
 
 def _robots(view: _View) -> Iterator[Finding]:

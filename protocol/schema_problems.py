@@ -13,7 +13,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from foosim.protocol import names
+from foosim.protocol import hosts, names
 from foosim.protocol.deployment import deployment_schema
 from foosim.protocol.names import nearest_name
 from foosim.protocol.references import Finding, Location
@@ -24,6 +24,10 @@ _PATTERNS: Final = {
     names.ROBOT_NAME_PATTERN: f"not a robot's name (names joined by dots; {_NAME})",
     names.SELECTOR_PATTERN: "not a selector (a name, in which * and ? stand for anything)",
     names.CLASS_PATTERN: "not a class (module:Class)",
+    hosts.ADDRESS_PATTERN: "not the name or the IP address of a machine",
+    hosts.SSH_PATTERN: "not a destination for ssh (HOST, USER@HOST or ssh://USER@HOST:PORT)",
+    hosts.FOLDER_PATTERN: "not an absolute path",
+    hosts.OPTION_PATTERN: "not an argument for ssh",
 }
 _KINDS: Final = {
     "string_type": "not a text",

@@ -6,7 +6,7 @@ router's back. Threads that receive only fill inboxes; they never decide, never 
 
 Zenoh tells a sender nothing about loss and takes many settings silently. So what matters is set here on purpose, read
 back and compared, and every message is numbered by what it is about. Neighbours: `inbox` is where all that arrives
-goes, `channels` has the keys, `addresses` reads what a person writes.
+goes, `session_settings` what is set, `channels` has the keys, `addresses` reads what a person writes.
 """
 
 from __future__ import annotations
@@ -30,16 +30,13 @@ from foosim.protocol import limits
 from foosim.protocol.addresses import parse_address, reachable
 from foosim.protocol.errors import BadValue, Failed, show
 from foosim.protocol.inbox import Inbox, Item
+from foosim.protocol.session_settings import QUERY_S, Security, client_settings, holds, router_settings
+from foosim.protocol.tls_probe import probe
 
 KeyReader = Callable[[str], tuple[str, str] | None]
 """Gives the channel and the name that a key stands for, or None for a key that it does not know."""
 
-LEASE_MS: Final = 1000
-"""After how much silence a peer counts as gone."""
-BLOCK_US: Final = 500_000
-"""How long one stuck reader may hold a sender before its link is closed."""
 CLOSE_S: Final = 2.0
-QUERY_S: Final = 2.0
 ATTEMPT_S: Final = 0.5
 """Between two attempts to connect `give_up` is asked, and signals are heard."""
 ROUTER_THREADS: Final = 8
@@ -95,7 +92,7 @@ class Publisher:
         self._pid = os.getpid()
 
     def put(self, payload: bytes) -> None:
-        """Publish. A stuck reader holds a blocking publisher for at most `BLOCK_US`; nothing is told about loss."""
+        """Publish. A stuck reader holds a blocking publisher for at most half a second; nothing is told about loss."""
         assert os.getpid() == self._pid, "a session does not survive a fork: spawn processes"
         self._put(payload)
         self.sent += 1
@@ -121,20 +118,16 @@ class Session:
         _sessions.add(self)
 
     @classmethod
-    def router(cls, listen: str, message_bytes_max: int = limits.MESSAGE_BYTES_MAX) -> Session:
-        """Listen as the router of a plane; with port 0 the system chooses. Raises ListenError."""
-        address = parse_address(listen)
-        settings = _settings("router", message_bytes_max) | {
-            "listen/endpoints": [str(address)],
-            "listen/timeout_ms": 0,
-            "listen/exit_on_failure": True,
-            "connect/endpoints": [],
-            # What it says about itself tells which port was chosen. It can be read, never written.
-            "adminspace/enabled": True,
-            "adminspace/permissions": {"read": True, "write": False},
-        }
+    def router(
+        cls, listen: str, message_bytes_max: int = limits.MESSAGE_BYTES_MAX, security: Security | None = None
+    ) -> Session:
+        """Listen as the router of a plane; with port 0 the system chooses. Raises ListenError.
+
+        With `security` only who proves to be known is let in, and may do what is granted.
+        """
+        address = parse_address(listen, security is not None)
         try:
-            session = _open(settings)
+            session = _open(router_settings(address, message_bytes_max, security))
         except zenoh.ZError as error:
             raise ListenError(f"cannot listen on {address}: {_reason(error)}") from None
         locators = _locators(session)
@@ -150,28 +143,25 @@ class Session:
         timeout_s: float,
         message_bytes_max: int = limits.MESSAGE_BYTES_MAX,
         give_up: Callable[[], bool] = lambda: False,
+        security: Security | None = None,
     ) -> Session:
         """Connect to a router, which may start later. Raises ConnectError at the timeout, or when `give_up` says so.
 
-        A link that is lost later is made again as soon as the router is back.
+        Raises NotAuthorised as soon as the other side, or its certificate, says that we may not. A link that is lost
+        later is made again as soon as the router is back.
         """
-        address = parse_address(connect)
+        address = parse_address(connect, security is not None)
         if address.port == 0 or address.is_wildcard:
             raise BadValue("not an address to connect to (tcp/HOST:PORT)", connect)
-        deadline_ns = time.monotonic_ns() + int(timeout_s * 1e9)
+        begun_ns = time.monotonic_ns()
         while not give_up():
-            left_s = (deadline_ns - time.monotonic_ns()) / 1e9
-            settings = _settings("client", message_bytes_max) | {
-                "listen/endpoints": [],
-                "connect/endpoints": [str(address)],
-                "connect/timeout_ms": max(1, int(1000 * min(left_s, ATTEMPT_S))),
-                "connect/exit_on_failure": True,
-                "connect/retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 2.0},
-                "adminspace/enabled": False,
-            }
+            left_s = timeout_s - (time.monotonic_ns() - begun_ns) / 1e9
             try:
-                return cls(_open(settings), str(address))
+                return cls(
+                    _open(client_settings(address, message_bytes_max, min(left_s, ATTEMPT_S), security)), str(address)
+                )
             except zenoh.ZError:  # its text says no more than the address, whatever the cause
+                probe(address, None if security is None else security.credentials, left_s <= ATTEMPT_S)
                 if left_s <= ATTEMPT_S:
                     raise ConnectError(
                         f"no router answers at {address} within {timeout_s:g} s: "
@@ -419,40 +409,12 @@ def _name(key: str) -> str:
     return key.rpartition("/")[2]
 
 
-def _settings(mode: str, message_bytes_max: int) -> dict[str, Any]:
-    """Return what router and client have in common. Each line is here because its default was found wanting."""
-    return {
-        "mode": mode,
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "scouting/delay": 0,  # a router would wait half a second for those that it may not look for
-        "timestamping/enabled": {"router": False, "peer": False, "client": False},  # ticks are our time
-        "queries_default_timeout": int(QUERY_S * 1000),
-        "transport/shared_memory/enabled": False,  # loses queries when a reader stalls
-        "transport/unicast/lowlatency": False,  # lost messages above 64 kB between hosts
-        "transport/unicast/qos/enabled": True,
-        "transport/unicast/accept_timeout": 2000,  # half-open connections are dropped sooner
-        "transport/unicast/accept_pending": 200,
-        "transport/unicast/open_timeout": 5000,
-        "transport/unicast/max_sessions": limits.NODES_MAX + limits.CLIENTS_MAX,
-        "transport/unicast/max_links": 1,
-        "transport/link/protocols": ["tcp"],
-        "transport/link/tx/lease": LEASE_MS,
-        "transport/link/tx/keep_alive": 4,
-        "transport/link/tx/queue/batching/enabled": True,  # without, also bursts cost a packet for each message
-        "transport/link/tx/queue/congestion_control/block/wait_before_close": BLOCK_US,
-        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 1000,
-        "transport/link/rx/max_message_size": message_bytes_max,  # a gigabyte by default
-    }
-
-
 def _open(settings: dict[str, Any]) -> zenoh.Session:
     config = zenoh.Config()
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
     for key, value in settings.items():  # earlier versions took misspelt keys silently, and a later line could undo one
-        found = json.loads(config.get_json(key))
-        assert found == value, f"Zenoh has {key} = {found}, not {value}"
+        assert holds(json.loads(config.get_json(key)), value), f"Zenoh has not taken {key}"
     with _runtime_variable():
         return zenoh.open(config)
 

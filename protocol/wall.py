@@ -1,6 +1,7 @@
 """Wall time for people: the one place that reads it.
 
-It stands in logs, file names and run files; nothing is decided by it, since wall clocks jump. Deadlines and lags use
+It stands in logs, file names and run files; nothing of a run is decided by it, since wall clocks jump. Only the dates
+of certificates are compared with it. Deadlines and lags use
 the monotonic clock of a shell. Neighbours: `process` (logs), `supervisor.run_folder`, `vhub.main`.
 """
 
@@ -13,6 +14,11 @@ from datetime import UTC, datetime
 def now_text() -> str:
     """Return the time in UTC as `2026-03-01T12:00:00.123456Z`; such texts sort as the times do."""
     return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")  # noqa: TID251
+
+
+def now_utc() -> datetime:
+    """Return the time in UTC, for the dates of certificates."""
+    return datetime.now(UTC)  # noqa: TID251
 
 
 def now_stamp() -> str:

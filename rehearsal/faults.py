@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
-from foosim.rehearsal.hub_journal import Ending
+from foosim.rehearsal.hub_journal import ENDINGS
 from foosim.rehearsal.system import System
 
 TICKS: Final = 230
@@ -278,8 +278,7 @@ def _revive_supervisor(system: System, down_ms: int) -> None:
 
 
 def _hub(dice: Dice, names: Sequence[str]) -> Fault:
-    endings: tuple[Ending, ...] = ("now", "torn", "unsaid")
-    ending, back_ms = dice.one_of(endings), dice.one_of((1, 50, 300, 600))
+    ending, back_ms = dice.one_of(ENDINGS), dice.one_of((1, 40, 400, 2_000))
     what = f"the vHub ends, {ending}, for {back_ms} ms"
     return Fault(_tick(dice), "vhub", what, lambda system: system.kill_hub(ending, back_ms * MS))
 

@@ -5,7 +5,7 @@ Neighbours: `system` appends and restarts, `vhub.resume` reads.
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 from foosim.protocol.codec import decode_any
 from foosim.vhub.core import HubCore
@@ -14,6 +14,7 @@ from foosim.vhub.resume import Captured, Past, recall
 
 Ending = Literal["now", "torn", "unsaid"]
 """When a vHub dies: at once; while it writes its next record, which is torn then; behind that, with nothing said."""
+ENDINGS: Final[tuple[Ending, ...]] = get_args(Ending)
 HEADS_KEPT: Final = 5
 
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from foosim.protocol import limits
+from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
@@ -56,7 +57,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     settings = (*(sets or []), *([f"engine={engine}"] if engine is not None else []))
-    plan = make_plan(RunOptions(file, "fast", duration, seed, settings))
+    plan = make_plan(RunOptions(file, "fast", duration, seed, settings, LOOPBACK))
     free = sorted(name for name, player in plan.deployment.players.items() if not player.lockstep)
     if free:
         raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))

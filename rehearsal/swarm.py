@@ -61,7 +61,12 @@ SMALL: Final = (
 )
 """What is computed is the same, with fewer steps to it; the ball rolls from the start, and robots are asked for echoes.
 """
-PATIENT: Final = ("deadlines.tick_lost=5 s", "deadlines.lockstep_fast=24 h", "deadlines.lockstep_realtime=24 h")
+PATIENT: Final = (
+    "deadlines.tick_lost=5 s",
+    "deadlines.lockstep_fast=24 h",
+    "deadlines.lockstep_realtime=24 h",
+    "deadlines.client_back=24 h",
+)
 """A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
 RESTART_NS: Final = 500 * MS
 

@@ -311,7 +311,7 @@ class System:
             self._trace(now_ns, process, "journal", "", action.record)
             if process.core is self.hub:
                 self.hub_journal.append(action.record)
-            elif settings.keeps_journals:
+            if settings.keeps_journals and process.core is self.supervisor:
                 self._journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
@@ -370,10 +370,7 @@ class System:
         if name == channels.SUPERVISOR:
             return
         self.solvers.pop(name).close()
-        if channels.SUPERVISOR not in self.processes:
-            return
-        self.supervisor.process_gone(name, self._now_of(channels.SUPERVISOR))
-        self._turn(self.processes[channels.SUPERVISOR])
+        self._supervisor_sees_gone(name)
 
     def end_amid(self, name: str, actions: int) -> None:
         """End the supervisor amid its next turn, when it has performed so many of its actions."""
@@ -419,8 +416,11 @@ class System:
     def _end_hub(self) -> None:
         """What the vHub had not done yet is not done; the others see its connections close."""
         self._leave_hub()
+        self._supervisor_sees_gone(channels.VHUB)
+
+    def _supervisor_sees_gone(self, name: str) -> None:
         if channels.SUPERVISOR in self.processes:
-            self.supervisor.process_gone(channels.VHUB, self._now_of(channels.SUPERVISOR))
+            self.supervisor.process_gone(name, self._now_of(channels.SUPERVISOR))
             self._turn(self.processes[channels.SUPERVISOR])
 
     def _leave_hub(self) -> None:

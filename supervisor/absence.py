@@ -10,10 +10,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from foosim.protocol import channels
-from foosim.protocol.actions import Journal, Publish
-from foosim.protocol.codec import encode
+from foosim.protocol.actions import Publish
 from foosim.supervisor.account import Recovered
-from foosim.supervisor.records import RecoveredRecord
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -29,14 +27,12 @@ class Absence:
         self.is_away = False
         self._core = core
         self._since_ns = 0
+        self._reason = ""
         self._gap_ns = 0
         """The longest time between two commits since it is gone."""
         self._entry: Recovered | None = None
-
-    def go_on(self) -> None:
-        """The supervisor was started again while the vHub was away: it is here by the first commit."""
-        known = self._core.recovery.recovered
-        self._entry = next((entry for entry in known if entry.what == "vhub" and entry.outage_ns < 0), None)
+        self._tick = -1
+        """Where it stood when it was lost for not going on; -1 when it was lost for anything else."""
 
     def lose(self, reason: str, now_ns: int) -> None:
         """The vHub is gone."""
@@ -46,21 +42,22 @@ class Absence:
             core.roster.lose(process)
         if self.is_away:
             return
+        told = None if process is None else process.heartbeat
+        self._tick = told.tick if told is not None and "overdue" in reason else -1
         self.is_away, self._since_ns, self._gap_ns = True, now_ns, 0
         if not core.is_open:
             core.say("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
             return
-        if self._entry is None:  # else it went again before anything was committed
-            self._entry = Recovered("vhub", channels.VHUB, reason, core.frame.tick, core.epoch)
-            core.recovery.recovered.append(self._entry)
-            core.actions.append(Journal(encode(RecoveredRecord(self._entry))))
+        self._reason = reason
         core.say("warning", f"lost the vHub: {reason}; the run waits for it at tick {core.frame.tick}")
 
     def hear(self, now_ns: int) -> None:
-        """The vHub that is lost is heard of: it is back, unless that was said before it went."""
+        """The vHub that is lost is heard of: it is back, unless that was said before it went, or it still stands."""
         core = self._core
         process = core.roster.by_name[channels.VHUB]
-        if core.end is None and now_ns > max(self._since_ns, process.gone_ns) + SAID_NS:
+        told = process.heartbeat
+        goes_on = self._tick < 0 or (told is not None and told.tick > self._tick)
+        if core.end is None and goes_on and now_ns > max(self._since_ns, process.gone_ns) + SAID_NS:
             process.lost = False
             self.ready(now_ns)
 
@@ -71,17 +68,16 @@ class Absence:
         core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))
         if self.is_away:
             self.is_away = False
+            self._note()
             core.watch.begun(now_ns)
             core.say("info", f"the vHub is back after {(now_ns - self._since_ns) / 1e9:.2f} s")
 
     def committed(self, before_ns: int, now_ns: int) -> None:
         """A frame is committed, the one before it was at `before_ns`."""
-        entry = self._entry
-        if entry is not None:
+        if self.is_away:  # what was on its way when it went, or the first that it made possible
             self._gap_ns = max(self._gap_ns, now_ns - before_ns)
-            if not self.is_away:
-                entry.outage_ns, self._entry = self._gap_ns, None
-                self._core.actions.append(Journal(encode(RecoveredRecord(entry))))
+        elif self._entry is not None:
+            self._entry.outage_ns, self._entry = max(self._gap_ns, now_ns - before_ns), None
 
     def is_over(self, now_ns: int) -> bool:
         """Whether the vHub was away for longer than a run waits; then the run is over, which is said."""
@@ -89,6 +85,12 @@ class Absence:
         if not self.is_away or not core.is_open or now_ns < self._since_ns + core.deployment.deadlines.vhub_back_ns:
             return False
         wait_s = core.deployment.deadlines.vhub_back_ns / 1e9
-        reason = "" if self._entry is None else f"{self._entry.reason}; "
-        core.finish(f"lost vhub: {reason}it did not come back within {wait_s:g} s", failed=True)
+        self._note()
+        core.finish(f"lost vhub: {self._reason}; it did not come back within {wait_s:g} s", failed=True)
         return True
+
+    def _note(self) -> None:
+        """Put it into the account, when it is over: the world stood still until now."""
+        core = self._core
+        if core.is_open:
+            self._entry = core.recovery.note("vhub", channels.VHUB, self._reason, core.epoch)

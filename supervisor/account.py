@@ -42,13 +42,8 @@ class Recovered:
 
 
 def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int) -> None:
-    """A frame is committed at `now_ns`, the one before it was at `before_ns`: what was out goes on.
-
-    The vHub's absence is not over with a commit: some are still made without it.
-    """
+    """A frame is committed at `now_ns`, the one before it was at `before_ns`: what was out goes on."""
     for entry in reversed(recovered):
-        if entry.what == "vhub":
-            continue
         if entry.outage_ns >= 0:
             return
         entry.outage_ns = max(0, now_ns - before_ns)

@@ -11,17 +11,19 @@ from typing import Annotated
 
 import typer
 
-from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.codec import encode_json
-from foosim.protocol.command import DONE, FAILED, INTERRUPTED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
 from foosim.supervisor import control
 from foosim.supervisor.display import Display, render_text
+from foosim.supervisor.install import install, is_root_there, write_units
 from foosim.supervisor.main import serve
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.plan import RunOptions, check_certificates, make_plan
+from foosim.supervisor.remote import Remote, unit_name
 from foosim.supervisor.run_folder import create_run, open_run, run_exists
+from foosim.supervisor.units import units_of
 from foosim.supervisor.up import Killed, Up, check_capture, default_capture
 
 app = new_app()
@@ -37,7 +39,10 @@ Sets = Annotated[
     typer.Option("--set", help="Change the deployment, e.g. --set table.ball.mass='27 g'; may be repeated."),
 ]
 Engine = Annotated[str | None, typer.Option("--engine", help="bullet or pure; short for --set engine=NAME.")]
-Listen = Annotated[str, typer.Option("--listen", help="HOST[:PORT]; the radio plane listens at PORT + 1.")]
+Listen = Annotated[
+    str | None,
+    typer.Option("--listen", help="HOST[:PORT], by default as deployed; the radio plane listens at PORT + 1."),
+]
 Insecure = Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")]
 RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
 
@@ -46,7 +51,7 @@ RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; 
 def foosim_supervisor(version: VersionOption = False) -> None:
     """Run a distributed simulation, and control one that runs.
 
-    `up` starts everything that a deployment file declares on this machine and shows it. The other commands control a
+    `up` starts everything that a deployment file declares and shows it. The other commands control a
     run from another terminal; each names the tick at which it takes effect.
 
     Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 second Ctrl-C.
@@ -63,22 +68,27 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
     sets: Sets = None,
     engine: Engine = None,
-    listen: Listen = LOOPBACK,
+    listen: Listen = None,
     insecure: Insecure = False,
+    pki: PkiOption = None,
     run: RunName = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
 ) -> None:
-    """Run all that a deployment declares, on this machine, until Ctrl-C or --for.
+    """Run all that a deployment declares, here and on its hosts, until Ctrl-C or --for.
 
     Supervisor, vHub, nodes and players are processes of their own, each with a log; they end with this command. Ctrl-C
-    ends the run in order and leaves a finished capture; a second one kills everything. Nodes that the deployment
-    declares as `launch: manual` are waited for; their command line is printed.
+    ends the run in order and leaves a finished capture; a second one kills everything. What the deployment places on
+    another host is started there through ssh. Nodes that it declares as `launch: manual` are waited for; their command
+    line is printed.
     """
     if no_capture and capture is not None:
         raise BadValue("--capture and --no-capture exclude each other", str(capture))
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki))
+    warnings = check_certificates(plan)
     path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
     display = Display(sys.stderr if json else sys.stdout)
+    for warning in warnings:
+        display.say(warning)
     try:
         outcome = Up(plan, path, display, run).run()
     except Killed as killed:
@@ -99,8 +109,9 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     seed: Seed = None,
     sets: Sets = None,
     engine: Engine = None,
-    listen: Listen = LOOPBACK,
+    listen: Listen = None,
     insecure: Insecure = False,
+    pki: PkiOption = None,
     run: RunName = None,
 ) -> None:
     """Run a supervisor alone.
@@ -108,23 +119,24 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
     folder has the run file, logs and journals.
     """
-    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure))
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     raise typer.Exit(serve(plan, folder))
 
 
-def _options(
+def _options(  # noqa: PLR0913, PLR0917  # a command's options
     file: Path,
     pace: str | None,
     duration: str | None,
     seed: int | None,
     sets: list[str] | None,
     engine: str | None,
-    listen: str,
+    listen: str | None,
     insecure: bool,
+    pki: Path | None,
 ) -> RunOptions:
     settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]
-    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure)
+    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, pki)
 
 
 @app.command()
@@ -256,6 +268,41 @@ def validate(file: File, json: Json = False) -> None:
     }
     described = f"{len(deployment.robots)} robots on {len(deployment.nodes)} nodes, {len(deployment.players)} players"
     print(encode_json(content).decode() if json else f"{file}: valid, world {deployment.world}, {described}")
+
+
+@app.command("install")
+def install_units(  # a command's options
+    host: Annotated[str, typer.Argument(help="A host of the deployment.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")] = Path("deploy/cluster.yaml"),
+    listen: Annotated[str | None, typer.Option(help="HOST:PORT of the supervisor, by default as deployed.")] = None,
+    user: Annotated[bool, typer.Option("--user", help="Of a user's own systemd; with --print or --output.")] = False,
+    show: Annotated[bool, typer.Option("--print", help="Print the units and change nothing.")] = False,
+    output: Annotated[Path | None, typer.Option(help="Write them into this folder, not onto the host.")] = None,
+    sets: Sets = None,
+) -> None:
+    """Write a unit of systemd for each node of a host, onto the host.
+
+    A unit restarts a node that ends or hangs. `up` starts the units of nodes with `launch: systemd`. As root on the
+    host they are units of the system; any other user gets units of its own systemd, which run without a login after
+    `loginctl enable-linger`.
+    """
+    plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=True))
+    deployment = plan.deployment
+    units = units_of(deployment, host, plan.address, user)
+    if show:
+        print("\n".join(f"# {name}\n{text}" for name, text in units.items()).rstrip())
+    elif output is not None:
+        print(*write_units(output, units), sep="\n")
+    elif user:
+        raise BadValue("--user goes with --print or --output; onto a host, whoever ssh logs in as decides", host)
+    else:
+        remote = Remote(host, deployment.hosts[host])
+        is_users = not is_root_there(remote)
+        print(*install(remote, units_of(deployment, host, plan.address, is_users), is_users), sep="\n")
+    for name, node in deployment.nodes.items():
+        if unit_name(name) in units and node.launch != "systemd":
+            hint = "with `launch: systemd` `up` starts its unit"
+            print(f"node {name} has `launch: {node.launch}`; {hint}", file=sys.stderr)
 
 
 def main() -> None:

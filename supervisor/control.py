@@ -11,19 +11,23 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
 from foosim.protocol import channels
+from foosim.protocol.certificates import Credentials, operator_credentials
 from foosim.protocol.channels import Plane
 from foosim.protocol.codec import decode, decode_json, encode, encode_json
+from foosim.protocol.command import PKI_VARIABLE
 from foosim.protocol.errors import BadValue, Failed, Malformed, Refused
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Wire
 from foosim.protocol.messages import Answer, Request, Vector
 from foosim.protocol.session import Session
+from foosim.protocol.session_settings import Security
 from foosim.protocol.units import parse_pace
-from foosim.supervisor.run_folder import find_run
+from foosim.supervisor.run_folder import RunInfo, find_run
 
 ANSWER_S: Final = 30.0
 """How long an answer is waited for: adding waits until every node has built an engine."""
@@ -43,11 +47,18 @@ class NoAnswer(Failed):
 class Control:
     """A connection to one running supervisor. Use it in `with`."""
 
-    def __init__(self, address: str) -> None:
-        """Connect to the simulation plane's address; raises ConnectError when nobody is there."""
-        self._name = f"operator-{os.getpid()}-{os.urandom(4).hex()}"
+    def __init__(self, address: str, credentials: Credentials | None = None) -> None:
+        """Connect to the simulation plane's address; raises ConnectError when nobody is there.
+
+        `credentials` are an operator's, where the run has certificates.
+        """
+        # Under its certificate an operator may speak by any name that begins with his own and a dot.
+        stem = f"operator-{os.getpid()}-" if credentials is None else f"{credentials.name}."
+        self._name = f"{stem}{os.urandom(4).hex()[:7]}"
+        self._credentials = credentials
         self._inbox = Inbox(WAITING_MAX)
-        self._session = Session.client(address, CONNECT_S)
+        security = None if credentials is None else Security(credentials)
+        self._session = Session.client(address, CONNECT_S, security=security)
         self._wire = Wire(self._session, Plane.SIMULATION, self._inbox, self._name)
         self._wire.read(channels.OPERATOR_READS)
         self._requests = 0
@@ -69,7 +80,7 @@ class Control:
         A supervisor that is started again meanwhile gets the same request, and gives the same answer.
         """
         self._requests += 1
-        identity = f"{self._name[9:]}-{self._requests}"
+        identity = f"{self._name[-7:]}-{self._requests}"
         payload = encode(Request(self._name, identity, verb, encode_json(arguments)))
         deadline_s = time.monotonic() + timeout_s
         while (left_s := deadline_s - time.monotonic()) > 0 and not give_up():
@@ -80,7 +91,8 @@ class Control:
             if not answer.accepted:
                 raise RequestRefused(answer.text)
             return answer
-        raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s")
+        who = "" if self._credentials is None else f"; is {self._credentials.identity} an operator of this run?"
+        raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s{who}")
 
     def status(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
         """Return the state of the run. Raises NoAnswer."""
@@ -103,11 +115,20 @@ class Control:
 
 
 def connect(run: str | None = None) -> Control:
-    """Connect to the newest live run, or to the one named. Raises NoRun."""
+    """Connect to the newest live run, or to the one named. Raises NoRun, and what `Control` and
+    `operator_credentials` raise.
+    """
     folder = find_run(run)
     info = folder.info()
     assert info is not None, "a run that was found has a run file"
-    return Control(info.simulation)
+    return Control(info.simulation, operator_credentials(_pki_of(info)))
+
+
+def _pki_of(info: RunInfo) -> Path | None:
+    """Return the folder with certificates for a run: the one in the environment, else the run's own."""
+    if not info.pki:
+        return None
+    return Path(os.environ.get(PKI_VARIABLE) or info.pki)
 
 
 def _ask(run: str | None, verb: str, **arguments: Any) -> Answer:

@@ -45,6 +45,7 @@ from foosim.protocol.start import first_chain, first_frame
 from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account
 from foosim.supervisor.arrivals import Arrivals
+from foosim.supervisor.balance import Balancer
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
@@ -87,8 +88,8 @@ class SupervisorCore:
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.requests = Requests(self)
-        self.recovery = Recovery(self)
-        self.absence = Absence(self)
+        self.recovery, self.absence = Recovery(self), Absence(self)
+        self.balancer = Balancer(self.deployment.owners()) if settings.balance else None
         self.handshake = Handshake(self)
         self.frame: Frame = first_frame(self.deployment, settings.start)
         self.chain = first_chain(settings.origin)
@@ -129,7 +130,7 @@ class SupervisorCore:
             Farewell: self.handshake.farewell,
         }
         text = settings.deployment_name, settings.deployment_text
-        self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.last_tick, clock, settings.start)
+        self.run_record = RunRecord(settings.run, *text, str(settings.pace), settings.ticks, clock, settings.start)
         self.take_over = TakeOver(self, history, now_ns) if history is not None and history.epoch is not None else None
         self.actions.append(Journal(encode(self.run_record) if history is None else self.head()))
 
@@ -168,6 +169,8 @@ class SupervisorCore:
                 self._lose(lost, now_ns)
             if self.take_over is not None:
                 self.take_over.wake(now_ns)
+            if self.balancer is not None:
+                self.balancer.wake(self, now_ns)
             if self._lacks and self._patience.is_over(now_ns):
                 self._ask_again(now_ns)
             if now_ns >= self._prepare_ns:
@@ -213,16 +216,14 @@ class SupervisorCore:
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
         """Go on without the nodes among those who are lost, wait for the vHub; without any other the run ends."""
-        if channels.VHUB in lost:
-            self.absence.lose(lost[channels.VHUB], now_ns)
-            lost = {name: why for name, why in lost.items() if name != channels.VHUB}
         others = {name: why for name, why in lost.items() if name not in self.deployment.nodes}
+        if channels.VHUB in others:
+            self.absence.lose(others.pop(channels.VHUB), now_ns)
         if others:
             self.finish(_losses(others), failed=True)
-            return
-        for name, why in lost.items():
+        for name in sorted(lost.keys() & self.deployment.nodes.keys()):
             if self.end is None:
-                self.recovery.lose(name, why, now_ns)
+                self.recovery.lose(name, lost[name], now_ns)
 
     def hold(self) -> None:
         """No node is left: nothing is computed until one joins."""

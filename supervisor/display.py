@@ -116,17 +116,20 @@ def _head(status: dict[str, Any]) -> Text:
 
 
 def _processes(status: dict[str, Any]) -> Table:
-    """Nodes with what they own, solve and how busy they are; then the other processes."""
+    """Nodes with their hosts, where there are any, what they own, solve and how busy they are; then the others."""
     table = Table(title="processes", title_justify="left", box=None, pad_edge=False)
-    for column, justify in (("name", "left"), ("owns", "left"), ("solved ticks", "right"), ("load", "right")):
-        table.add_column(column, justify=justify)  # type: ignore[arg-type]
-    table.add_column("waits for", no_wrap=True)
     processes = status["processes"]
     nodes = status["nodes"]
+    hosts = any(process["host"] for process in processes.values())
+    columns = [("name", "left"), *([("host", "left")] if hosts else []), ("owns", "left")]
+    for column, justify in (*columns, ("solved ticks", "right"), ("load", "right")):
+        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+    table.add_column("waits for", no_wrap=True)
     for name in [*nodes, *(other for other in processes if other not in nodes)]:
         node, process = nodes.get(name), processes.get(name)
         table.add_row(
             name,
+            *([process["host"] if process else ""] if hosts else []),
             "" if node is None else _listed(node["owned"]),
             "" if node is None else str(node["solved_ticks"]),
             "-" if process is None else f"{process['busy']:.0%}",

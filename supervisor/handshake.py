@@ -89,9 +89,7 @@ class Handshake:
             core.count_repeat()
             return
         process.heard_ns = now_ns
-        if process.lost and process.name == channels.VHUB:
-            core.absence.hear(now_ns)
-        elif process.lost:
+        if process.lost and process.name != channels.VHUB:
             core.recovery.hear(process, now_ns)
         if not heartbeat.report:
             core.watch.told(heartbeat)
@@ -99,6 +97,8 @@ class Handshake:
         process.heartbeat = heartbeat
         report = decode_json(heartbeat.report)
         process.report = report if isinstance(report, dict) else {}
+        if process.lost and process.name == channels.VHUB:
+            core.absence.hear(now_ns)
         if core.end is not None:
             core.actions.append(Publish(channels.END, channels.SUPERVISOR, encode(core.end)))
         elif core.is_open and heartbeat.epoch < core.epoch:

@@ -67,7 +67,6 @@ def stand_on(core: SupervisorCore, history: History) -> None:
     core.roster.stopped = set(control.stopped)
     core.recovery.recovered, core.recovery.returns = history.recovered, dict(control.returns)
     core.requests.resume(history.edits, history.answers)
-    core.absence.go_on()
 
 
 def stand_at(core: SupervisorCore, frame: Frame, chain: bytes, commit: bytes) -> None:

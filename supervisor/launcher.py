@@ -1,29 +1,31 @@
-"""Starts the processes of a run on this machine, and ends them.
+"""Starts the processes of a run, on this machine and through ssh on others, and ends them.
 
 Each child stands in a process group of its own, so that a Ctrl-C in the terminal reaches the launcher alone, has a log
 file, and dies with the launcher (`protocol.process` is the child's side of that). Children are started from the main
-thread: the kernel's signal at the parent's end is tied to the thread that forked. Neighbours: `up`.
+thread: the kernel's signal at the parent's end is tied to the thread that forked. Of a process on another machine the
+child here is ssh, and its log is what that brings home: it ends with its standard input, which only the launcher holds.
+Neighbours: `up`, `remote` (the command lines of ssh), `guard` (the other end).
 """
 
 from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import signal
 import subprocess
-import sysconfig
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from foosim.protocol.process import PARENT_VARIABLE
+from foosim.protocol.errors import Failed
+from foosim.supervisor.children import GRACE_S, child_environment, script
+from foosim.supervisor.remote import Remote
 
-GRACE_S: Final = 5.0
-"""How long a child has after SIGTERM before it is killed."""
 POLL_S: Final = 0.02
+LINES: Final = 30
+"""How much of a log's end tells why ssh ended."""
 
 
 @dataclass(slots=True)
@@ -34,6 +36,10 @@ class Child:
     command: tuple[str, ...]
     log: Path
     process: subprocess.Popen[bytes] = field(repr=False)
+    remote: Remote | None = None
+    """The machine that it runs on when that is another one: `process` is the ssh that holds it."""
+    begin: int = 0
+    """Where its log begins, behind what those before it said."""
 
     @property
     def exit_code(self) -> int | None:
@@ -46,55 +52,84 @@ class Child:
         code = self.exit_code
         if code is None:
             return "is alive"
+        if self.remote is not None and code > 0:
+            return f"ended: {self.remote.why(code, self._tail(LINES))}"
         return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+
+    @property
+    def is_away(self) -> bool:
+        """Whether it ended because its machine could not be reached any more."""
+        return self.remote is not None and self.remote.is_away(self.exit_code or 0, self._tail(LINES))
 
     def last_lines(self, count: int = 3) -> list[str]:
         """Return the end of its log, when it ended by itself: it may say why there."""
-        if (self.exit_code or 0) <= 0:
-            return []
+        return self._tail(count) if (self.exit_code or 0) > 0 else []
+
+    def let_go(self) -> None:
+        """End the standard input of one on another machine: whatever still lives there ends by that."""
+        if self.process.stdin is not None:
+            self.process.stdin.close()
+
+    def _tail(self, count: int) -> list[str]:
         try:
             with self.log.open("rb") as file:
-                file.seek(max(0, self.log.stat().st_size - 8192))
+                file.seek(max(self.begin, self.log.stat().st_size - 8192))
                 lines = file.read().decode("utf-8", "replace").splitlines()
         except OSError:
             return []
         return [line for line in lines if line.strip()][-count:]
 
 
-def script(name: str) -> str:
-    """Return the path of one of foosim's commands: beside this Python, else on PATH."""
-    beside = Path(sysconfig.get_path("scripts")) / name
-    return str(beside) if beside.is_file() else shutil.which(name) or name
-
-
 class Launcher:
     """All children of this process, in the order in which they were started."""
 
-    def __init__(self) -> None:
+    def __init__(self, run: str = "", remotes: Mapping[str, Remote] | None = None, units: Sequence[str] = ()) -> None:
+        """`remotes` are the machines of the processes of this run that are not to run on this one, by name.
+
+        `units` are those among them that systemd runs there.
+        """
+        self.run = run
+        self.remotes: Mapping[str, Remote] = remotes or {}
+        self.units = frozenset(units)
         self.children: dict[str, Child] = {}
         self._end, self._hold = os.pipe()
         """The pipe's two ends: children read the first; only this process has the second, and never writes."""
 
     def start(self, name: str, command: Sequence[str], log: Path) -> Child:
-        """Start `command`, whose first word is one of foosim's commands."""
-        arguments = (script(command[0]), *command[1:])
-        environment = {
-            **os.environ,
-            PARENT_VARIABLE: f"{os.getpid()}:{self._end}",
-            "OPENBLAS_NUM_THREADS": "1",  # nothing here uses BLAS; its threads only take memory
-            "PYTHONUNBUFFERED": "1",
-        }
+        """Start `command`, whose first word is one of foosim's commands, where this process belongs.
+
+        Of a unit of systemd the child here only tells systemd there to start it, and ends when that has been said.
+        """
+        remote = self.remotes.get(name)
+        if remote is not None:
+            return self._start_there(name, command, log, remote)
         with log.open("ab") as file:
             process = subprocess.Popen(
-                arguments,
+                (script(command[0]), *command[1:]),
                 stdin=subprocess.DEVNULL,
                 stdout=file,
                 stderr=subprocess.STDOUT,
-                env=environment,
+                env=child_environment(self._end),
                 pass_fds=(self._end,),
                 process_group=0,
             )
         child = self.children[name] = Child(name, tuple(command), log, process)
+        return child
+
+    def _start_there(self, name: str, command: Sequence[str], log: Path, remote: Remote) -> Child:
+        line = remote.unit_started(name) if name in self.units else remote.guarded(self.run, name, command)
+        earlier = self.children.get(name)
+        if earlier is not None:
+            earlier.let_go()
+        try:
+            with log.open("ab") as file:
+                process = subprocess.Popen(
+                    line, stdin=subprocess.PIPE, stdout=file, stderr=subprocess.STDOUT, process_group=0
+                )
+                begin = file.tell()
+        except FileNotFoundError:
+            raise Failed(f"there is no ssh here, which {name} is to be started with on host {remote.name}") from None
+        child = self.children[name] = Child(name, tuple(command), log, process, remote, begin)
         return child
 
     def ended(self) -> list[Child]:
@@ -129,6 +164,8 @@ class Launcher:
         """Give the pipe back; whoever should still live ends by it."""
         os.close(self._hold)
         os.close(self._end)
+        for child in self.children.values():
+            child.let_go()
 
     def _signal(self, number: signal.Signals) -> None:
         for child in reversed(self.alive()):

@@ -13,16 +13,22 @@ import time
 import msgspec
 
 from foosim.protocol import channels, limits, wall
+from foosim.protocol.access import access_to
 from foosim.protocol.actions import Say
+from foosim.protocol.addresses import parse_address
+from foosim.protocol.certificates import check_host, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.errors import Refused
+from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, journal_files, read_newest, remove_journal
 from foosim.protocol.loop import Loop, Wire
+from foosim.protocol.notify import Notify
 from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
+from foosim.protocol.session_settings import Security
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.records import History, fold
@@ -49,15 +55,19 @@ class SupervisorProcess:
             os.getpid(),
             wall.now_text(),
             session.locator,
+            pki="" if plan.options.pki is None else str(plan.options.pki.absolute()),
         )
+        self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         known = folder.info()
         if history is not None and known is not None:
             self._info = msgspec.structs.replace(self._info, started=known.started, radio=known.radio)
         wire = Wire(session, Plane.SIMULATION, inbox, SUPERVISOR)
-        self._loop = Loop(self.core, inbox, start_log(SUPERVISOR), self.core.deadline_ns)
+        self.log = start_log(SUPERVISOR)
+        self._loop = Loop(self.core, inbox, self.log, self.core.deadline_ns)
         self._loop.connect(wire)
         self._journal = self._loop.journal = journal
         self._turned_tick = 0
+        self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.took = self.core.watch.took
         self._loop.lacking = lambda: self.core.lacking
@@ -84,6 +94,9 @@ class SupervisorProcess:
 
     def _turn(self, now_ns: int) -> None:
         self.core.busy = self._loop.busy
+        reminder = self._exposure.due(now_ns)
+        if reminder:
+            self.core.say("warning", reminder)
         if self._is_told_to_end:
             self._is_told_to_end = False
             self.core.stop()
@@ -122,8 +135,13 @@ def serve(plan: Plan, folder: RunFolder) -> int:
     history = _history(plan, folder)
     known = folder.info()
     address = str(plan.address) if history is None or known is None else known.simulation
-    with Journal(folder.journals, SUPERVISOR) as journal, Session.router(address) as session:
+    credentials = load_credentials(plan.options.pki, SUPERVISOR)
+    access = access_to(Plane.SIMULATION, plan.deployment)
+    security = None if credentials is None else Security(credentials, access)
+    with Journal(folder.journals, SUPERVISOR) as journal, Session.router(address, security=security) as session:
+        check_host(credentials, session.locator)
         supervisor = SupervisorProcess(plan, folder, session, inbox, journal, history)
+        warn_of_end(credentials, supervisor.log)
         stop.then(supervisor.stop)
         code = supervisor.run()
     if code == DONE:

@@ -8,7 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from foosim.protocol.addresses import LOOPBACK, Address, check_listen
+from foosim.protocol import identity, wall
+from foosim.protocol.addresses import Address, check_listen
+from foosim.protocol.certificates import load_credentials, operator_credentials
+from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
@@ -26,8 +29,10 @@ class RunOptions:
     duration: str | None = None
     seed: int | None = None
     sets: tuple[str, ...] = ()
-    listen: str = LOOPBACK
+    listen: str | None = None
+    """Where to listen; None is where the deployment says."""
     insecure: bool = False
+    pki: Path | None = None
 
     @property
     def all_sets(self) -> tuple[str, ...]:
@@ -35,14 +40,20 @@ class RunOptions:
 
     def arguments(self) -> list[str]:
         """Return the options as arguments of `foosim-supervisor run`."""
-        given = [str(self.file), "--listen", self.listen]
+        given = [str(self.file)]
+        given += ["--listen", self.listen] if self.listen is not None else []
         given += ["--insecure"] if self.insecure else []
+        given += self.pki_arguments()
         given += ["--pace", self.pace] if self.pace is not None else []
         given += ["--for", self.duration] if self.duration is not None else []
         given += ["--seed", str(self.seed)] if self.seed is not None else []
         for setting in self.sets:
             given += ["--set", setting]
         return given
+
+    def pki_arguments(self) -> list[str]:
+        """Return where the certificates are, as each process of the run is told it."""
+        return [] if self.pki is None else ["--pki", str(self.pki)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +69,8 @@ class RunSettings:
     pace: Pace
     ticks: int = 0
     start: Start | None = None
+    balance: bool = False
+    """Whether robots move by the nodes' measured load."""
 
     @property
     def origin(self) -> Origin | None:
@@ -81,12 +94,26 @@ class Plan:
     address: Address
 
 
+def check_certificates(plan: Plan) -> list[str]:
+    """Return which certificates end soon, of everybody whom `up` starts and of the operator that it is itself.
+
+    Raises CertificateError when somebody would not be let in.
+    """
+    pki, deployment = plan.options.pki, plan.deployment
+    nodes = [identity.node(name) for name, node in deployment.nodes.items() if node.launch == "local"]
+    everybody = (SUPERVISOR, VHUB, *nodes, *map(identity.client, deployment.players))
+    found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]
+    warnings = [credentials.ends_soon(wall.now_utc()) for credentials in found if credentials is not None]
+    return [warning for warning in warnings if warning]
+
+
 def make_plan(options: RunOptions) -> Plan:
     """Check everything that was asked for before anything is started; raises Refused."""
     name = str(options.file)
     text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
     deployment = load_deployment(text, name)
-    address = check_listen(options.listen, options.insecure, ports=2)
+    listen = deployment.listen if options.listen is None else options.listen
+    address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
     pace = deployment.pace if options.pace is None else parse_pace(options.pace)
     ticks = 0
     if options.duration is not None:

@@ -27,7 +27,7 @@ from foosim.supervisor.pacing import Lags
 
 
 class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_unknown_fields=True):
-    """The first record of a journal: the run, its deployment, pace, last tick (0: none), and what it begins with.
+    """The first record of a journal: the run, its deployment, pace and end (0: none).
 
     `clock` names the monotonic clock whose times the records have: a machine's, since it was started.
     """
@@ -36,7 +36,7 @@ class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_
     deployment_name: str
     deployment: str
     pace: str
-    last_tick: int
+    ticks: int
     clock: str
     start: Start | None = None
 
@@ -178,7 +178,8 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
 def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
     """Return the history that a file's first record stands for."""
     if isinstance(first, RunRecord):
-        control = Control(first.pace, False, 0, first.last_tick, [], {})
+        begun = 0 if first.start is None else first.start.origin.tick
+        control = Control(first.pace, False, 0, first.ticks and begun + first.ticks, [], {})
         account = Account(dict.fromkeys(sorted(deployment.nodes), 0))
         frame = first_frame(deployment, first.start)
         chain = first_chain(None if first.start is None else first.start.origin)
@@ -220,12 +221,7 @@ def _apply(history: History, record: Change) -> None:
     elif isinstance(record, OrderedRecord):
         history.edits.setdefault(record.tick, []).extend(record.edits)
     elif isinstance(record, RecoveredRecord):
-        known = [(entry.what, entry.name, entry.epoch) for entry in history.recovered]
-        entry = record.entry
-        if known and known[-1] == (entry.what, entry.name, entry.epoch):
-            history.recovered[-1] = entry
-        else:
-            history.recovered.append(entry)
+        history.recovered.append(record.entry)
     elif isinstance(record, Control):
         history.control = record
     else:
@@ -238,7 +234,8 @@ def _commit(history: History, record: CommitRecord) -> None:
     history.commits[commit.tick] = record.commit
     history.commits.pop(commit.tick - limits.KEPT_TICKS, None)
     history.edits.pop(commit.tick - 1, None)
-    if commit.tick == history.frame.tick:  # the one that the run begins with
+    start = history.run.start
+    if commit.tick == (0 if start is None else start.origin.tick):
         history.started_ns = history.committed_ns = record.now_ns
         return
     history.chain = chain_next(history.chain, commit.digest)

@@ -141,11 +141,13 @@ class Recovery:
         deployment = self._core.deployment
         return deployment.nodes[name].required or deployment.on_node_loss == "stop"
 
-    def note(self, what: str, name: str, reason: str) -> None:
+    def note(self, what: str, name: str, reason: str, epoch: int | None = None) -> Recovered:
+        """Note a loss or a return, from the next epoch on unless another one is named."""
         core = self._core
-        entry = Recovered(what, name, reason, core.frame.tick, core.epoch + 1)
+        entry = Recovered(what, name, reason, core.frame.tick, core.epoch + 1 if epoch is None else epoch)
         self.recovered.append(entry)
         core.actions.append(Journal(encode(RecoveredRecord(entry))))
+        return entry
 
     def _was_lost(self, name: str) -> bool:
         return any(entry.what == "node" and entry.name == name for entry in self.recovered)

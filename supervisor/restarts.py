@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 WAITS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)
+AWAY_S: Final = 4.0
+"""How long after one whose machine could not be reached; such ones are never given up."""
 WINDOW_S: Final = 60.0
 """A process that ended this often within this time is given up."""
 
@@ -27,12 +29,16 @@ class Restarts:
     def __init__(self) -> None:
         self._by_name: dict[str, _Restarts] = {}
 
-    def ended(self, name: str, now_s: float, at_once: bool = False) -> float | None:
+    def ended(self, name: str, now_s: float, at_once: bool = False, is_away: bool = False) -> float | None:
         """A process has ended: return after how many seconds it is started again, None when it is given up.
 
         `at_once`: the run stands still without it, so the first two times it is not waited at all.
+        `is_away`: because its machine could not be reached, which says nothing against the process.
         """
         known = self._by_name.setdefault(name, _Restarts())
+        if is_away:
+            known.due_s = now_s + AWAY_S
+            return AWAY_S
         while known.ended_s and known.ended_s[0] <= now_s - WINDOW_S:
             known.ended_s.popleft()
         if len(known.ended_s) >= len(WAITS_S):

@@ -34,7 +34,7 @@ class NoRun(Failed):
 
 
 class RunInfo(msgspec.Struct, frozen=True):
-    """What a run file says. `radio` is empty until the vHub has told where it listens."""
+    """What a run file says. `radio` is empty until the vHub has told where it listens, `pki` without certificates."""
 
     run: str
     world: str
@@ -43,6 +43,7 @@ class RunInfo(msgspec.Struct, frozen=True):
     started: str
     simulation: str
     radio: str = ""
+    pki: str = ""
 
 
 class RunFolder:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.hosts import places
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -97,9 +98,11 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
 
 def _processes(core: SupervisorCore, waiting_for: str) -> dict[str, Any]:
     """Return all processes as they last told, in name order, and the supervisor itself behind them."""
+    hosts = places(core.deployment)
     processes = {
         name: {
             "role": process.role,
+            "host": hosts.get(name, ""),
             "lost": process.lost and name not in core.roster.stopped,
             "stopped": name in core.roster.stopped,
             "busy": 0.0 if process.heartbeat is None else round(process.heartbeat.busy, 3),
@@ -108,7 +111,7 @@ def _processes(core: SupervisorCore, waiting_for: str) -> dict[str, Any]:
         }
         for name, process in sorted(core.roster.by_name.items())
     }
-    own = {"role": SUPERVISOR, "lost": False, "stopped": False, "busy": round(core.busy, 3)}
+    own = {"role": SUPERVISOR, "host": "", "lost": False, "stopped": False, "busy": round(core.busy, 3)}
     return {**processes, SUPERVISOR: {**own, "tick": core.frame.tick, "waiting_for": waiting_for}}
 
 

@@ -1,4 +1,4 @@
-"""`up`: starts all processes of a run on this machine, shows the run, and ends it in order.
+"""`up`: starts all processes of a run, here and on other machines, shows the run, and ends it in order.
 
 It decides nothing of the run: supervisor, vHub, nodes and players are its children and do the work; it starts them,
 looks at them, asks the supervisor for the status that it shows, and hands on a Ctrl-C. Neighbours: `launcher`,
@@ -12,19 +12,24 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from foosim.protocol import wall
-from foosim.protocol.addresses import Address, parse_address
+from foosim.protocol.addresses import parse_address
+from foosim.protocol.certificates import operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.command import DONE, FAILED, REFUSED
-from foosim.protocol.errors import Refused
+from foosim.protocol.errors import Failed, Refused
+from foosim.protocol.exposure import Exposure
 from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.display import Display, recovery_text
+from foosim.supervisor.hosts import check_hosts, fetch_capture
 from foosim.supervisor.launcher import Child, Launcher, command_line
 from foosim.supervisor.plan import Plan
+from foosim.supervisor.remote import CAPTURE
+from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
 
@@ -36,8 +41,12 @@ END_S: Final = 20.0
 """How long a run that is ending may take before its processes are stopped: the vHub has a capture to close."""
 LEAVE_S: Final = 1.0
 """How long the others may take to end when the supervisor has: it waited for the vHub's capture."""
+AWAY_S: Final = 10.0
+"""The same for those on other machines, where an end takes a moment to be known."""
 STALLED_S: Final = 1.0
 """How long a node that is lost may take to come back by itself before its process is killed."""
+CUT_OFF_S: Final = 10.0
+"""The same for a node on another machine: it may only be cut off, and holds on until it is not."""
 STALLED_TRIES: Final = 5
 """How many questions a supervisor may leave unanswered for a second each before its process is killed."""
 LOST_S: Final = 3.0
@@ -93,8 +102,13 @@ class Up:
         self.plan = plan
         self.capture = capture
         self.display = display
+        remotes = remotes_of(plan.deployment)
+        check_hosts(plan.deployment, plan.address, remotes)
         self.folder: RunFolder = create_run(plan.deployment.world, run)
-        self._launcher = Launcher()
+        units = [name for name, node in plan.deployment.nodes.items() if node.launch == "systemd"]
+        self._launcher = Launcher(self.folder.name, remotes, units)
+        self._not_home = ""
+        """Why the capture was not brought home from the machine on which it was written."""
         self._interrupts = 0
         self._ending_s = 0.0
         self._is_told = False
@@ -118,10 +132,12 @@ class Up:
             try:
                 if self._start():
                     self._watch()
-                self._launcher.wait(LEAVE_S if self.folder.result() is not None else END_S)
+                leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
+                self._launcher.wait(leave_s if self.folder.result() is not None else END_S)
             finally:
                 self._launcher.stop()
                 self._launcher.close()
+            self._bring_home()
         return self._outcome()
 
     # --- starting ----------------------------------------------------------------------------------------------------
@@ -137,8 +153,8 @@ class Up:
             return False
         self._launch(VHUB, self._vhub_command(info))
         for name, node in sorted(self.plan.deployment.nodes.items()):
-            command = ["foosim-node", "--name", name, "--connect", info.simulation]
-            if node.launch == "local":
+            command = ["foosim-node", "--name", name, "--connect", info.simulation, *options.pki_arguments()]
+            if node.launch != "manual":
                 self._launch(name, command)
             else:
                 display.say(f"waiting for node {name}; start it on its machine: {command_line(command)}")
@@ -146,17 +162,32 @@ class Up:
         if info is None:
             return False
         for name in sorted(self.plan.deployment.players):
-            self._launch(name, ["foosim-player", "--name", name, "--connect", info.radio])
+            command = ["foosim-player", "--name", name, "--connect", info.radio, *options.pki_arguments()]
+            self._launch(name, command)
         return True
 
     def _vhub_command(self, info: RunInfo) -> list[str]:
-        options = self.plan.options
-        address = self.plan.address
-        listen = Address(address.host, parse_address(info.radio).port) if info.radio else address.next_port()
+        address, folder, capture, options = self.plan.address, self.folder.path, self.capture, self.plan.options
+        listen = replace(address, port=parse_address(info.radio).port) if info.radio else address.next_port()
+        remote = self._launcher.remotes.get(VHUB)
+        if remote is not None:  # where the guard has a folder for the run
+            listen = replace(listen, host=remote.host.address)
+            folder, capture = Path(), None if capture is None else Path(CAPTURE)
         command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(listen)]
         command += ["--insecure"] if options.insecure else []
-        command += ["--run-folder", str(self.folder.path)]
-        return [*command, "--no-capture"] if self.capture is None else [*command, "--capture", str(self.capture)]
+        command += options.pki_arguments()
+        command += ["--run-folder", str(folder)]
+        return [*command, "--no-capture"] if capture is None else [*command, "--capture", str(capture)]
+
+    def _bring_home(self) -> None:
+        """Fetch the capture from the machine on which the vHub wrote it."""
+        remote = self._launcher.remotes.get(VHUB)
+        if remote is None or self.capture is None or VHUB not in self._launcher.children:
+            return
+        try:
+            fetch_capture(remote, self.folder.name, self.capture)
+        except Failed as failed:
+            self._not_home = str(failed)
 
     def _launch(self, name: str, command: list[str]) -> None:
         self._launcher.start(name, command, self.folder.log(name))
@@ -181,8 +212,12 @@ class Up:
         info = self.folder.info()
         assert info is not None
         next_s = time.monotonic()
-        with Control(info.simulation) as control:
+        exposure = Exposure(self.plan.address, time.monotonic_ns())
+        with Control(info.simulation, operator_credentials(self.plan.options.pki)) as control:
             while self._goes_on():
+                reminder = exposure.due(time.monotonic_ns())
+                if reminder:
+                    self.display.say(reminder)
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self.display.every_s
                     self._show(control)
@@ -228,7 +263,8 @@ class Up:
         for child in lost:
             pid, since_s = self._stalled[child.name]
             same = pid == child.process.pid  # and not one that was started since, and has not said hello yet
-            if same and child.exit_code is None and now_s >= since_s + STALLED_S:
+            patience_s = STALLED_S if child.remote is None else CUT_OFF_S
+            if same and child.exit_code is None and now_s >= since_s + patience_s:
                 self.display.say(f"{child.name} does not answer any more: it is killed")
                 child.process.kill()
 
@@ -269,7 +305,8 @@ class Up:
         self._start_due(now_s)
 
     def _restart_later(self, child: Child, now_s: float) -> None:
-        wait_s = self._restarts.ended(child.name, now_s, at_once=child.name in (SUPERVISOR, VHUB))
+        at_once = child.name in (SUPERVISOR, VHUB)
+        wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
         after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s" if wait_s else "starts again"
         self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
 
@@ -341,6 +378,8 @@ class Up:
         if result is not None and self._lost is not None and not result["failed"]:
             reason = f"lost {self._lost.name}: it {self._lost.ending}"  # the supervisor never knew it
             result = {**result, "reason": reason, "failed": True}
+        if result is not None and VHUB in self._launcher.remotes and self.capture is not None:
+            result = {**result, "capture": str(self.capture) if self.capture.exists() else None}
         reason = "the run did not end in order" if result is None else f"the run has ended: {result['reason']}"
         recoveries = [] if result is None else result["recoveries"][self._told :]
         lines = [*map(recovery_text, recoveries), reason, *self._lost_lines(), *self._capture_lines()]
@@ -356,7 +395,7 @@ class Up:
     def _capture_lines(self) -> list[str]:
         """Say where the capture is; who was killed did not finish it."""
         if self.capture is None or not self.capture.exists():
-            return []
+            return [self._not_home] if self._not_home else []
         hub = self._launcher.children.get(VHUB)
         finished = hub is not None and hub.exit_code in (DONE, FAILED)
         return [f"capture {self.capture}" if finished else f"capture {self.capture} (unfinished)"]

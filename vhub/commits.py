@@ -8,12 +8,10 @@ frames.
 from __future__ import annotations
 
 from foosim.protocol import limits
-from foosim.protocol.actions import Publish
-from foosim.protocol.channels import STANDING, VHUB
-from foosim.protocol.codec import encode
+from foosim.protocol.channels import VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
+from foosim.protocol.frame import Frame, chain_next, frame_from_bytes, layout_after
 from foosim.protocol.layout import Layout, added_entities
 from foosim.protocol.messages import Commit, Standing
 
@@ -27,22 +25,20 @@ class Commits:
     def __init__(self) -> None:
         self.layout: Layout | None = None
         self.next_tick = 0
-        self._chains = {-1: CHAIN_START}
-        """Over the digests of the frames behind the first, by tick."""
-        self._is_first = True
+        self._chains: dict[int, bytes] = {}
         self._frames: dict[int, Committed] = {}
         self._early: dict[int, tuple[bytes, Commit]] = {}
 
     def start(self, layout: Layout | None, tick: int, chain: bytes, last: Committed | None = None) -> None:
-        """Begin with the frame of a tick and layout and chain before it.
-
-        `last` is the frame before; None when the run begins with that tick, whose digest is in the chain already.
-        """
+        """Begin with the frame of a tick, and what was before: the layout, the chain, and the last frame if any."""
         self.layout, self.next_tick = layout, tick
-        self._chains = {tick - 1: chain}
-        self._is_first = last is None
+        self._chains[tick - 1] = chain
         if last is not None:
             self._frames[tick - 1] = last
+
+    def chain_at(self, tick: int) -> bytes:
+        """Return the chain over the digests of the frames up to a tick's, without the one that a run begins with."""
+        return self._chains[tick]
 
     def take(self, commit: Commit, payload: bytes) -> list[int]:
         """Take a commit; return the ticks whose frames are there by it, none for a repeat or one that came early.
@@ -68,18 +64,12 @@ class Commits:
     def __contains__(self, tick: int) -> bool:
         return tick in self._frames
 
-    def standing(self, deployment: Deployment, epoch: int) -> Publish:
-        """Say how far the world has come here: a supervisor that was started again may have lost more."""
+    def standing(self, deployment: Deployment, epoch: int) -> Standing:
+        """Return how far the world has come here."""
         assert self.layout is not None
         last = self._frames.get(self.next_tick - 1)
         added = added_entities(deployment, self.layout)
-        chain = self.chain_at(self.next_tick - 1)
-        standing = Standing(VHUB, epoch, b"" if last is None else last[0], chain, added)
-        return Publish(STANDING, VHUB, encode(standing))
-
-    def chain_at(self, tick: int) -> bytes:
-        """Return the chain over the frames up to one that is kept."""
-        return self._chains[tick]
+        return Standing(VHUB, epoch, b"" if last is None else last[0], self._chains[self.next_tick - 1], added)
 
     def forget(self, tick: int) -> None:
         """Nobody asks for this tick any more."""
@@ -92,10 +82,9 @@ class Commits:
         frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
         if frame.digest != commit.digest:
             raise Malformed(f"commit {commit.tick} whose frame has another digest")
+        chain, begins = self._chains[commit.tick - 1], commit.tick - 1 not in self._frames
+        self._chains[commit.tick] = chain if begins else chain_next(chain, commit.digest)
         self.layout = layout
         self.next_tick += 1
-        before = self._chains[commit.tick - 1]
-        self._chains[commit.tick] = before if self._is_first else chain_next(before, commit.digest)
-        self._is_first = False
         self._frames[commit.tick] = payload, commit, frame
         return commit.tick

@@ -10,6 +10,7 @@ that is started again goes on from), `protocol.member` (handshake).
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from foosim.protocol import channels, limits
@@ -18,6 +19,7 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.frame import Frame
 from foosim.protocol.layout import added_entities
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
@@ -42,12 +44,13 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.patience import Patience
+from foosim.protocol.start import first_chain
 from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
-from foosim.vhub.keeping import Keep, KeepEpoch, Keeping
-from foosim.vhub.packet import IN_FLIGHT, Flight
-from foosim.vhub.records import Closing, HeadRecord, World, missing_robots, tick_record, world_packets
+from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closing
+from foosim.vhub.packet import Flight
+from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
 from foosim.vhub.report import HubStatistics, report, statistics
 from foosim.vhub.resume import Past
@@ -56,6 +59,17 @@ from foosim.vhub.state import HubState, received
 from foosim.vhub.waits import Waits
 
 HubAction = Action | Keep | KeepEpoch
+
+
+@dataclass(slots=True)
+class _World:
+    """The tick that is being closed, after its world phase."""
+
+    frame: Frame
+    closing: Closing
+    commit: bytes
+    waited: list[str]
+    free: dict[str, list[Flight]]
 
 
 class HubCore:
@@ -81,7 +95,7 @@ class HubCore:
         self._commits = Commits()
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
-        self._world: World | None = None
+        self._world: _World | None = None
         self._patience = Patience(now_ns)
         self._end_ns = 0
         self._malformed = self.repeated = 0
@@ -90,7 +104,7 @@ class HubCore:
             Samples: self._on_samples,
             Epoch: self._on_epoch,
             Want: self._on_want,
-            Recall: self.member.recall,
+            Recall: self._on_recall,
             Build: self._on_build,
             Tempo: self._on_tempo,
             End: self._on_end,
@@ -231,23 +245,9 @@ class HubCore:
         released = state.close_world(frame, packets, closing.fates)
         due = state.due_members(tick)
         for name in due:
-            self._go(name, tick, released.pop(name, []), now_ns)
-        self._world = World(frame, closing, raw, [name for name in due if name in self.sessions.by_name], released)
+            self.door.go(name, tick, released.pop(name, []), now_ns)
+        self._world = _World(frame, closing, raw, [name for name in due if name in self.sessions.by_name], released)
         return True
-
-    def _go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
-        assert self.state is not None and self.deployment is not None and self.releases is not None
-        member = self.state.members[name]
-        member.downlink += 1
-        session = self.sessions.by_name.get(name)
-        if session is None:
-            return
-        for flight in flights:
-            flight.released_wall_ns = now_ns
-        self.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
-        deadlines = self.deployment.deadlines
-        allowed_ns = deadlines.lockstep_realtime_ns if self.releases.factor else deadlines.lockstep_fast_ns
-        session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * self.deployment.tick_ns))
 
     def _close_clients(self, now_ns: int) -> bool:
         """Phase two, when all Dones are there: judge what clients sent, write, speak."""
@@ -302,9 +302,8 @@ class HubCore:
         layout = self._commits.layout if frame is None else frame.layout
         assert layout is not None
         added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
-        run, chain = self.member.build.run, self._commits.chain_at(self.state.closed)
-        last = commit, self._epoch_payload, chain, self.capture
-        return encode(HeadRecord(run, self.state.snapshot(), added, *last))
+        where = commit, self._epoch_payload, self.capture, self._commits.chain_at(self.state.closed)
+        return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added, *where))
 
     def _release(self, now_ns: int) -> None:
         """Say what is released to free-running clients by now; closings of which nothing waits go to the capture."""
@@ -325,7 +324,7 @@ class HubCore:
             self.repeated += 1
             return
         self.deployment = self.member.deployment
-        if self.state is not None:
+        if self.state is not None:  # of a supervisor that has recalled us
             self.member.is_ready = False
             self.ready_if_complete()
 
@@ -334,14 +333,14 @@ class HubCore:
 
         The shell calls it, since only the shell can read the journal.
         """
-        deployment = self.deployment
-        assert deployment is not None and self.state is None, "begin once, after the build"
+        deployment, build = self.deployment, self.member.build
+        assert deployment is not None and build is not None and self.state is None, "begin once, after the build"
         self.releases = Releases(deployment.tick_ns)
         self.sessions.downlinks.kept_ns = deployment.deadlines.client_back_ns
-        self.member.standing = lambda: self._commits.standing(deployment, self._epoch)
+        self.member.standing = self._standing
         if past is None:
             self.state = HubState(deployment, self.member.first_tick)
-            self._commits.start(self.member.layout, self.member.first_tick, self.member.first_chain)
+            self._commits.start(self.member.layout, self.member.first_tick, first_chain(build.origin))
         else:
             self._go_on(past, now_ns)
         self.actions.append(Journal(self.head()))
@@ -359,6 +358,14 @@ class HubCore:
         if past.epoch is not None:
             self._take_epoch(past.epoch)
         self._patience.progress(self.deployment.tick_ns, now_ns)
+
+    def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
+        self.repeated += not self.member.recall(recall)
+
+    def _standing(self) -> Publish:
+        """Say how far the world has come here: a supervisor that was started again may have lost more."""
+        assert self.deployment is not None
+        return Publish(channels.STANDING, channels.VHUB, encode(self._commits.standing(self.deployment, self._epoch)))
 
     def ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined, or had joined the one before it."""
@@ -470,15 +477,8 @@ class HubCore:
         self._release(now_ns)
         committed = last or self._commits.get(self.state.closed + 1) or self._commits.get(self.state.closed)
         if committed is not None:
-            _, commit, frame = committed
-            flights = self.state.in_flight()
-            for flight in flights:
-                flight.cause = IN_FLIGHT
-            delivered = self.state.deliveries.get(frame.tick - 1, [])
-            final = Closing(frame, commit.digest, commit.edits, delivered, wall_ns=now_ns)
-            final = final if self._world is None else self._world.closing  # a tick that is half closed has fates
-            final.fates += flights
-            self.actions.append(Keep(final))
+            half = None if self._world is None else self._world.closing  # a tick that is half closed has fates
+            self.actions.append(Keep(last_closing(self.state, committed, half, now_ns)))
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1

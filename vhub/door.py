@@ -14,9 +14,10 @@ from foosim.protocol.actions import Journal
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import ClientHello, Done, Join, Up
+from foosim.vhub.packet import Flight
 from foosim.vhub.records import InputsRecord
 from foosim.vhub.sessions import Session, may_lockstep
-from foosim.vhub.state import Joining, Member
+from foosim.vhub.state import Joining, Member, received
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore
@@ -64,6 +65,22 @@ class Door:
         if joins or leaves:
             core.actions.append(Journal(encode(InputsRecord(tick, joins, leaves))))
         return joins, leaves
+
+    def go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
+        """Give a lockstep client its tick, and begin to wait for its Done."""
+        core = self._core
+        assert core.state is not None and core.deployment is not None and core.releases is not None
+        member = core.state.members[name]
+        member.downlink += 1
+        session = core.sessions.by_name.get(name)
+        if session is None:
+            return
+        for flight in flights:
+            flight.released_wall_ns = now_ns
+        core.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
+        deadlines = core.deployment.deadlines
+        allowed_ns = deadlines.lockstep_realtime_ns if core.releases.factor else deadlines.lockstep_fast_ns
+        session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * core.deployment.tick_ns))
 
     # --- messages ----------------------------------------------------------------------------------------------------
 

@@ -10,7 +10,10 @@ from collections import deque
 from dataclasses import dataclass
 
 from foosim.protocol.messages import Epoch
+from foosim.vhub.commits import Committed
+from foosim.vhub.packet import IN_FLIGHT
 from foosim.vhub.records import Closing
+from foosim.vhub.state import HubState
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,3 +46,15 @@ class Keeping:
         while self._closings and (waiting_tick is None or self._closings[0].frame.tick < waiting_tick):
             taken.append(Keep(self._closings.popleft()))
         return taken
+
+
+def last_closing(state: HubState, committed: Committed, half_closed: Closing | None, now_ns: int) -> Closing:
+    """Return what a run ends with: its last frame, the fates of a tick that is half closed, and what is in flight."""
+    _, commit, frame = committed
+    flights = state.in_flight()
+    for flight in flights:
+        flight.cause = IN_FLIGHT
+    delivered = state.deliveries.get(frame.tick - 1, [])
+    closing = half_closed or Closing(frame, commit.digest, commit.edits, delivered, wall_ns=now_ns)
+    closing.fates += flights
+    return closing

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -16,21 +18,27 @@ from typing import Annotated
 import typer
 
 from foosim.protocol import channels, limits, wall
+from foosim.protocol.access import access_to
 from foosim.protocol.actions import Say
-from foosim.protocol.addresses import LOOPBACK, check_listen
+from foosim.protocol.addresses import LOOPBACK, Address, check_listen, parse_address
+from foosim.protocol.admission import Admission
+from foosim.protocol.certificates import Credentials, check_host, load_credentials, passwords_file, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
-from foosim.protocol.command import DONE, FAILED, REFUSED, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue
+from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, read_journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
+from foosim.protocol.notify import Notify
 from foosim.protocol.orphan import Orphan
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
+from foosim.protocol.session_settings import Security
 from foosim.vhub.capture_file import origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
@@ -54,10 +62,20 @@ class HubOptions:
 class HubProcess:
     """The vHub on its two sessions, until the run ends, the supervisor is gone for too long, or `stop`."""
 
-    def __init__(self, simulation: Session, radio: Session, inbox: Inbox, options: HubOptions) -> None:
+    def __init__(
+        self,
+        simulation: Session,
+        open_radio: Callable[[Deployment], Session],
+        inbox: Inbox,
+        options: HubOptions,
+        credentials: Credentials | None = None,
+    ) -> None:
+        """`open_radio` listens for the clients of a deployment, which comes with the handshake."""
         self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns())
-        self.core.radio_address = radio.locator
         self._options = options
+        self._open_radio = open_radio
+        self._admission = Admission(credentials, SUPERVISOR, simulation.locator, time.monotonic_ns())
+        self._exposure: Exposure | None = None
         self._inbox = inbox
         self._journal: Journal | None = None
         self._capture: CaptureWriter | None = None
@@ -66,11 +84,11 @@ class HubProcess:
         self._orphan = Orphan()
         self._why_abandoned = "the vHub was told to end"
         self._log: logging.Logger = start_log(VHUB)
+        warn_of_end(credentials, self._log)
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
-        self._radio = Wire(radio, Plane.RADIO, inbox, VHUB)
         self._loop = Loop(self.core, inbox, self._log, lambda now_ns: self.core.deadline_ns())
         self._loop.connect(self._wire)
-        self._loop.connect(self._radio)
+        self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.took = self.core.waits.took
         self._loop.lacking = lambda: self.core.lacking
@@ -78,10 +96,7 @@ class HubProcess:
         self._loop.on_alive = self._on_alive
         self._loop.on_say = self._on_say
         self._wire.read(channels.VHUB_READS, channels.VHUB_WAITS)
-        self._radio.read(channels.VHUB_READS)
         self._wire.watch_alive(SUPERVISOR)
-        self._radio.watch_alive()
-        self._radio.declare_alive()
 
     def run(self) -> int:
         """Take part until the end, close the capture, say farewell; return the exit code."""
@@ -115,6 +130,7 @@ class HubProcess:
     def _turn(self, now_ns: int) -> None:
         core = self.core
         core.busy = self._loop.busy
+        self._admission.check(now_ns)
         if core.member.build is not None and self._journal is None:
             self._begin(core.member.build, now_ns)
         if self._orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._is_abandoned:
@@ -125,12 +141,15 @@ class HubProcess:
             end = End(core.state.closed + 1, self._why_abandoned, True)
             core.receive(channels.END, SUPERVISOR, encode(end), now_ns)
         core.advance(now_ns)
+        reminder = "" if self._exposure is None else self._exposure.due(now_ns)
+        if reminder:
+            core.actions.append(Say("warning", reminder))
         if now_ns >= self._forget_ns and self._journal is not None and core.state is not None:
             self._forget_ns = now_ns + FORGET_EVERY_NS
             self._turn_journal(self._journal, core.state.closed)
 
     def _begin(self, build: Build, now_ns: int) -> None:
-        """Be present, since the supervisor has let us in, open the journal and the capture, and go on from them.
+        """Be present, since the supervisor has let us in; open journal and capture, go on from them, and listen.
 
         Present first: whoever cannot open them ends, and the supervisor knows by the presence that it did.
         """
@@ -145,6 +164,7 @@ class HubProcess:
         if self._capture is not None and past is not None and past.known is not None:
             self._capture.keep(Closing(past.known, past.known.digest, [], []))  # which it has: it goes on from there
         core.begin(past, now_ns)
+        self._listen(deployment)
 
     def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:
         """Begin the capture, or go on with the one that the vHub before has begun; return how far it is."""
@@ -164,6 +184,17 @@ class HubProcess:
         self._capture = CaptureWriter(path, deployment, *described)
         self.core.capture = str(path)
         return self._capture.begun_with
+
+    def _listen(self, deployment: Deployment) -> None:
+        """Open the radio plane to the clients that the deployment declares."""
+        session = self._open_radio(deployment)
+        self.core.radio_address = session.locator
+        self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
+        radio = Wire(session, Plane.RADIO, self._inbox, VHUB)
+        self._loop.connect(radio)
+        radio.read(channels.VHUB_READS)
+        radio.watch_alive()
+        radio.declare_alive()
 
     def _turn_journal(self, journal: Journal, closed: int) -> None:
         """Between ticks, begin a new file when one is full; what the capture has on the disk may go."""
@@ -185,6 +216,8 @@ class HubProcess:
         self._log.log(logging.getLevelNamesMapping()[level.upper()], text)
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
+        if plane is Plane.SIMULATION:
+            self._admission.heard(name, is_alive)
         if is_alive:
             if name == SUPERVISOR:
                 self._orphan.hear(True, time.monotonic_ns())
@@ -207,18 +240,43 @@ class HubProcess:
                 remove_journal(self._journal.folder, VHUB)
 
 
-def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions) -> int:
-    """Run the vHub until its run ends; return the exit code. Raises Refused when there is nobody to connect to."""
-    address = check_listen(listen, insecure)
+def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions, pki: Path | None = None) -> int:
+    """Run the vHub until its run ends; return the exit code. Raises Refused when there is nobody to connect to.
+
+    `pki` is the folder with its certificate and, where clients have passwords, with these.
+    """
+    address = check_listen(listen, insecure, secured=pki is not None)
+    credentials = load_credentials(pki, VHUB)
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
     with (
-        Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX) as radio,
-        Session.client(connect, CONNECT_S, give_up=stop.is_set) as simulation,
+        ExitStack() as opened,
+        Session.client(
+            connect, CONNECT_S, give_up=stop.is_set, security=None if credentials is None else Security(credentials)
+        ) as simulation,
     ):
-        hub = HubProcess(simulation, radio, inbox, options)
+
+        def open_radio(deployment: Deployment) -> Session:
+            session = opened.enter_context(_radio_session(address, credentials, deployment, pki))
+            check_host(credentials, session.locator)
+            return session
+
+        hub = HubProcess(simulation, open_radio, inbox, options, credentials)
         stop.then(hub.stop)
         return hub.run()
+
+
+def _radio_session(
+    address: Address, credentials: Credentials | None, deployment: Deployment, pki: Path | None
+) -> Session:
+    """Listen as the router of the radio plane, which lets in the clients of a deployment."""
+    if credentials is None or pki is None:
+        return Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX)
+    access = access_to(Plane.RADIO, deployment)
+    if not access.uses_passwords:
+        return Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX, Security(credentials, access))
+    with passwords_file(pki, [grant.name for grant in access.grants]) as path:
+        return Session.router(str(address), limits.RADIO_MESSAGE_BYTES_MAX, Security(credentials, access, str(path)))
 
 
 app = new_app()
@@ -232,9 +290,13 @@ def vhub(
     capture: Annotated[Path | None, typer.Option(help="What to write; by default captures/WORLD-TIME.mcap.")] = None,
     no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
     run_folder: Annotated[Path | None, typer.Option(help="Where its journal goes; by default RUN.vhub.")] = None,
+    pki: PkiOption = None,
     version: VersionOption = False,
 ) -> None:
     """Take part in a run as its virtual hub.
+
+    Started again with the same run folder, and listening where clients know it, it goes on from its journal and its
+    capture.
 
     It exits with 0 when the run ended and the capture is finished, with 1 when the supervisor was lost for longer than
     the deployment's `deadlines.orphan`, and with 3 when the supervisor would not have it.
@@ -242,7 +304,7 @@ def vhub(
     die_with_parent()
     if no_capture and capture is not None:
         raise BadValue("--no-capture and --capture exclude each other", str(capture))
-    raise typer.Exit(run_vhub(connect, listen, insecure, HubOptions(capture, not no_capture, run_folder)))
+    raise typer.Exit(run_vhub(connect, listen, insecure, HubOptions(capture, not no_capture, run_folder), pki))
 
 
 def main() -> None:

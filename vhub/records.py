@@ -35,10 +35,10 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     added: list[tuple[str, str]]
     commit: bytes = b""
     epoch: bytes = b""
-    chain: bytes = CHAIN_START
-    """Over the frames up to that commit."""
     capture: str = ""
     """Where the capture is; empty when there is none."""
+    chain: bytes = CHAIN_START
+    """Over the frames up to that of the last closed tick."""
 
 
 class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", forbid_unknown_fields=True):
@@ -81,17 +81,6 @@ class Closing:
     leaves: list[str] = field(default_factory=list)
     fates: list[Flight] = field(default_factory=list)
     wall_ns: int = 0
-
-
-@dataclass(slots=True)
-class World:
-    """The tick that is being closed, after its world phase."""
-
-    frame: Frame
-    closing: Closing
-    commit: bytes
-    waited: list[str]
-    free: dict[str, list[Flight]]
 
 
 def tick_record(
@@ -148,8 +137,8 @@ class Folded:
 class Fold:
     """Computes again what the records of a journal, the first of which is a head, are about.
 
-    Iterating gives each closing; `state`, `layout`, `commit`, `chain`, `epoch` and `inputs` are then those behind it.
-    Raises Malformed when the records are not those of one run of this version.
+    Iterating gives each closing; `state`, `layout`, `commit`, `epoch` and `inputs` are then those behind it. Raises
+    Malformed when the records are not those of one run of this version.
     """
 
     def __init__(self, deployment: Deployment, records: Iterable[bytes]) -> None:
@@ -198,7 +187,7 @@ class Fold:
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
-        if self.commit:  # else it is the frame that the run begins with
+        if self.commit:  # the frame that a run begins with is not in its chain, or is already
             self.chain = chain_next(self.chain, commit.digest)
         self.commit, self.inputs = record.commit, None
         return Folded(state, closing, record, released)

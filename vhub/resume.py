@@ -15,7 +15,7 @@ from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, frame_from_bytes
+from foosim.protocol.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.protocol.layout import Layout
 from foosim.protocol.messages import Commit, Deliveries, Down, Epoch, Want
 from foosim.vhub.commits import Committed
@@ -38,10 +38,9 @@ class Past:
 
     state: HubState
     layout: Layout
-    chain: bytes = b""
-    """Over the frames up to the last closed tick."""
     committed: Committed | None = None
     """The commit of the last closed tick; None before the first."""
+    chain: bytes = CHAIN_START
     epoch: Epoch | None = None
     inputs: InputsRecord | None = None
     sent: dict[int, bytes] = field(default_factory=dict)
@@ -104,7 +103,7 @@ def recall(
             raise Malformed(f"the capture has tick {captured.tick}, its journal ends at {fold.state.closed}")
         untold = [record for record in found if isinstance(record, Epoch) and record.epoch > captured.epoch]
         past.kept[:0] = [KeepEpoch(epoch) for epoch in untold]
-    past.layout, past.chain, past.inputs = fold.layout, fold.chain, fold.inputs
+    past.layout, past.inputs, past.chain = fold.layout, fold.inputs, fold.chain
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
     frame = _frame(fold)
     if frame is not None:

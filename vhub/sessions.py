@@ -78,7 +78,7 @@ class Session:
     def take(self, packets: Sequence[Sent]) -> int:
         """Take what the client sends, each number once and in order; return how many were taken before."""
         repeated = 0
-        for packet in packets:
+        for packet in sorted(packets, key=lambda sent: sent.sequence):
             if packet.sequence == self.next_sequence:
                 self.next_sequence += 1
                 self.inbox.append(packet)

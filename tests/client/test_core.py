@@ -62,7 +62,8 @@ class Air:
         self.hub = HubCore("boot", bytes(32), 0)
         self.deliveries: list[Deliveries] = []
         self._said: list[Publish] = []
-        self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot", "first", "run-1", NAME, TEXT, "fast", [])))
+        build = Build("vhub", "boot", "first", "run-1", NAME, TEXT, "fast", [])
+        self.tell(channels.BUILD, "vhub", encode(build))
         self.hub.begin(None, 0)
 
     def tell(self, channel: channels.Channel, name: str, payload: bytes) -> None:
@@ -160,8 +161,8 @@ def test_hello_is_said_until_it_is_answered_and_join_until_the_first_downlink() 
         assert hello.channel is channels.CLIENT_HELLO
     air.tell(hello.channel, "ear", hello.payload)
     (welcome,) = air.said()
-    core.receive(welcome.channel, welcome.name, welcome.payload, core.deadline_ns())
-    core.receive(welcome.channel, welcome.name, welcome.payload, core.deadline_ns())
+    core.receive(welcome.channel, welcome.name, welcome.payload, now_ns)
+    core.receive(welcome.channel, welcome.name, welcome.payload, now_ns)
     assert (core.deployment, core.statistics().repeated) == (DEPLOYMENT, 1)
     core.join(0, HEARD)
     joins = published(core)

@@ -18,7 +18,7 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.messages import Deliveries, Epoch, Go
 from foosim.rehearsal import hub_journal
 from foosim.rehearsal.bus import Traced, Weather
-from foosim.rehearsal.hub_journal import Ending
+from foosim.rehearsal.hub_journal import ENDINGS, Ending
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.core import HubCore
@@ -30,7 +30,6 @@ TICKS: Final = 240
 MS: Final = 1_000_000
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms")
-ENDINGS: Final[tuple[Ending, ...]] = ("now", "torn", "unsaid")
 Fault = tuple[int, Callable[[System], object]]
 
 
@@ -134,14 +133,14 @@ def test_a_vhub_that_does_not_come_back_ends_the_run_in_order() -> None:
 def test_a_node_is_lost_while_the_vhub_is_away() -> None:
     faults: list[Fault] = [
         (60, kill_hub("unsaid")),
-        (60, lambda system: system.after(100 * MS, partial(system.kill, "n2"))),
+        (60, lambda system: system.later(100 * MS, partial(system.kill, "n2"))),
         (120, lambda system: system.start("n2")),
         (150, lambda system: system.kill("n1")),
         (150, kill_hub("torn")),
     ]
     seen = fly(faults)
     assert seen.run.digests == undisturbed().run.digests and seen.rows() == undisturbed().rows()
-    assert [entry["what"] for entry in seen.run.json["recoveries"]] == ["vhub", "node", "join", "node", "vhub"]
+    assert [entry["what"] for entry in seen.run.json["recoveries"]] == ["node", "vhub", "join", "node", "vhub"]
 
 
 def test_a_ball_is_added_while_the_vhub_is_away() -> None:

@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 import pytest
 
-from foosim.supervisor import cli
+from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.protocol.identity import identities_of
+from foosim.supervisor import cli, pki
 from foosim.supervisor.run_folder import runs_folder
 from foosim.supervisor.up import check_capture
 
@@ -102,7 +104,7 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--for", "20"), 2, "not a time"),
         (("--for", "0 s"), 2, "a run has at least one tick"),
         (("--seed", "-1"), 2, "seed: "),
-        (("--listen", "nowhere:x"), 2, "not an address (HOST, HOST:PORT or tcp/HOST:PORT), 'nowhere:x'"),
+        (("--listen", "nowhere:x"), 2, "not an address (HOST, HOST:PORT, tcp/HOST:PORT or tls/HOST:PORT), 'nowhere:x'"),
         (("--listen", "127.0.0.1:65535"), 2, "no room for 2 ports"),
         (("--listen", "0.0.0.0"), 3, "say --insecure to mean it"),
         (("--run", "Über"), 2, "--run: a name is a lower case letter, then"),
@@ -168,3 +170,24 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
 )
 def test_a_value_that_no_run_could_take_is_bad_input(command: Command, arguments: tuple[str, ...], text: str) -> None:
     assert command(*arguments) == (2, "", f"{text}\n")
+
+
+def test_who_lacks_a_certificate_is_named_before_anything_starts(command: Command, tmp_path: Path) -> None:
+    folder = tmp_path / "certs"
+    pki.init(folder)
+    pki.issue(folder, identities_of(load_deployment(read_deployment_text(TABLE), "table.yaml")))
+    (folder / "node.blue.key").unlink()
+    (folder / "client.player-red.pem").unlink()
+    done = command("up", TABLE, "--pki", folder)
+    assert done.code == 3 and "node.blue.key: cannot be read, No such file" in done.err
+    (folder / "node.blue.pem").unlink()
+    pki.issue(folder, ["node.blue"])
+    done = command("up", TABLE, "--pki", folder)
+    assert done.code == 3 and f"{folder} has no certificate of client.player-red; it has: " in done.err
+    done = command("up", TABLE, "--pki", folder, "--insecure")
+    assert done.code == 2 and "--insecure and --pki exclude each other" in done.err
+    done = command("up", TABLE, "--listen", "tls/127.0.0.1")
+    assert done.code == 2 and "needs certificates: say where they are by --pki DIR" in done.err
+    done = command("up", TABLE, "--listen", "tcp/127.0.0.1:7400", "--pki", folder)
+    assert done.code == 2 and "nearest is tls/127.0.0.1:7400" in done.err
+    assert not runs_folder().exists(), "nothing was started"

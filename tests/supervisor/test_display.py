@@ -15,7 +15,7 @@ from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import status
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
-HERE = {"lost": False, "stopped": False}
+HERE = {"host": "", "lost": False, "stopped": False}
 
 
 @pytest.fixture
@@ -64,6 +64,12 @@ def test_the_table_has_time_pace_lag_score_and_ball(running: dict[str, Any]) -> 
     assert "12.34 s · tick 6170 · realtime 1.00x" in text
     assert "red 2 : 1 blue · ball at +0.123 -0.045 +0.018 m, solved by red · 41 hand-overs, 2 moves" in text
     assert "lag 0.7 ms (p50 0.3, p99 1.6, max 7.4), waited for player-blue" in text
+
+
+def test_hosts_have_a_column_where_there_are_any(running: dict[str, Any]) -> None:
+    assert "host" not in render_text(running)
+    running["processes"]["blue"]["host"] = "left"
+    assert "left" in row_of(render_text(running), "blue.attack") and "host" in row_of(render_text(running), "owns")
 
 
 def test_when_the_last_tick_was_in_time_the_last_late_one_is_named_by_its_number(running: dict[str, Any]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from foosim.supervisor.restarts import WAITS_S, WINDOW_S, Restarts
+from foosim.supervisor.restarts import AWAY_S, WAITS_S, WINDOW_S, Restarts
 
 
 def test_the_waits_double_and_then_it_is_given_up() -> None:
@@ -32,3 +32,11 @@ def test_each_is_counted_for_itself() -> None:
     assert restarts.ended("red", 0.0) == WAITS_S[0]
     assert restarts.due(10.0) == ["blue", "red"]
     assert not restarts.is_known("green")
+
+
+def test_one_whose_machine_is_away_is_never_given_up() -> None:
+    restarts = Restarts()
+    for count in range(50):
+        assert restarts.ended("blue", count * AWAY_S, is_away=True) == AWAY_S
+        assert restarts.due((count + 1) * AWAY_S) == ["blue"]
+    assert restarts.failed == [] and restarts.ended("blue", 50 * AWAY_S) == WAITS_S[0]

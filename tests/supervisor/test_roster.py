@@ -190,6 +190,7 @@ def test_who_is_let_in_gets_all_it_needs_and_the_run_starts_when_all_are_ready()
         build = decode(Build, said.payload)
         assert (said.channel, said.name, build.name, build.deployment) == (channels.BUILD, name, name, TEXT)
         give(process, [said], name)
+    hub.begin(None, 0)
     assert table.core.watch.waiting_for(table.core) == ["blue", "red", "vhub"]
     assert hub.member.is_ready, "without lockstep clients there is nobody to wait for"
     assert not [action for action in table.hear(hub) if action.channel is channels.EPOCH]

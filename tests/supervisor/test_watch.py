@@ -210,9 +210,10 @@ class _StuckHub(HubCore):
 
 
 def test_a_vhub_that_stops_closing_is_named_and_lost() -> None:
-    seen = Seen(sets=DEADLINES, ticks=300)
+    """It says that it lives all the time: that does not bring it back."""
+    seen = Seen(sets=(*DEADLINES, "deadlines.vhub_back=5 s"), ticks=300)
     seen.settings.hub = _StuckHub
-    assert ended(seen.go()) == ("lost vhub: tick 61 is overdue by 1.0 s", 61)
+    assert ended(seen.go()) == ("lost vhub: tick 61 is overdue by 1.0 s; it did not come back within 5 s", 61)
 
 
 def stopped(process: str, **changes: Any) -> Seen:
@@ -237,9 +238,11 @@ def test_a_silent_node_is_lost(process: str) -> None:
 
 
 def test_a_silent_vhub_is_lost_and_the_run_ends_without_its_farewell() -> None:
-    seen = stopped(VHUB, sets=("deadlines.heartbeat=1 s", "deadlines.tick_lost=1 h", "deadlines.tick_named=1 h"))
+    sets = ("deadlines.heartbeat=1 s", "deadlines.tick_lost=1 h", "deadlines.tick_named=1 h", "deadlines.vhub_back=2 s")
+    seen = stopped(VHUB, sets=sets)
     core = seen.system.supervisor
-    assert core.end is not None and core.end.reason == "lost vhub: no heartbeat for 1 s"
+    assert core.end is not None
+    assert core.end.reason == "lost vhub: no heartbeat for 1 s; it did not come back within 2 s"
     assert core.finished and not seen.system.hub.finished and seen.result["capture"] is None
 
 
@@ -272,19 +275,32 @@ def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
 
 
 def test_a_lockstep_client_whose_connection_closes_is_lost() -> None:
-    seen = Seen(ticks=400)
+    seen = Seen(ticks=400, sets=(*LONG, "deadlines.client_back=300 ms"))
     seen.prepare = lambda system: system.at_tick(60, lambda: system.hub.client_gone("player-blue", system.bus.now_ns))
     reason, _ = ended(seen.go())
     assert reason == "lost player-blue: its connection closed"
 
 
-@pytest.mark.parametrize("process", ["n1", VHUB])
-def test_a_process_whose_presence_ends_is_lost(process: str) -> None:
-    seen = Seen(ticks=400)
+def presence_ends(process: str) -> Seen:
+    seen = Seen(ticks=600)
     seen.prepare = lambda system: system.at_tick(60, lambda: system.supervisor.process_gone(process, system.bus.now_ns))
-    seen.go()
-    assert seen.system.supervisor.end is not None
-    assert seen.system.supervisor.end.reason == f"lost {process}: its connection closed"
+    return seen.go()
+
+
+def test_a_node_whose_presence_ends_is_lost() -> None:
+    reason, _ = ended(presence_ends("n1"))
+    assert reason == "lost n1: its connection closed"
+
+
+def test_a_vhub_whose_presence_ends_and_that_is_heard_later_is_back() -> None:
+    """Only its connection was cut: it goes on with all that it has."""
+    seen = presence_ends(VHUB)
+    assert seen.result["reason"] == "done" and seen.result["ticks"] == 600
+    (entry,) = seen.result["recoveries"]
+    assert (entry["what"], entry["name"], entry["reason"]) == ("vhub", "vhub", "its connection closed")
+    assert entry["tick"] == 60 and entry["epoch"] == 1 and entry["outage_ms"] is not None
+    assert any(line.startswith("lost the vHub: its connection closed; the run waits for it") for line in seen.lines)
+    assert any(line.startswith("the vHub is back after 0.") for line in seen.lines)
 
 
 def never_there(absent: str, sets: Sequence[str] = ()) -> Seen:

@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING
 import msgspec
 import pytest
 
+from foosim.protocol import limits
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.journal import Journal, journal_files, read_journal, read_records
-from foosim.protocol.messages import Deliveries
-from foosim.vhub.records import HeadRecord, HubRecord, TickRecord, fold
+from foosim.protocol.messages import Deliveries, Down
+from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.records import HeadRecord, HubRecord, InputsRecord, TickRecord, fold
+from foosim.vhub.resume import Captured, recall
 from foosim.vhub.rows import plan_of, rows_of
 from foosim.vhub.state import HubState
 
@@ -26,7 +29,10 @@ def head_of(run: HubRun, tick: int) -> bytes:
     """The head that a journal file would start with behind the record of `tick`."""
     names = [entity.name for entity in run.closings[tick].frame.layout.entities]
     added = [("ball2", "ball")] if "ball2" in names else []
-    return encode(HeadRecord("run-1", run.snapshots[tick], added))
+    record = decode_any(HubRecord, run.records[tick + 1])
+    assert isinstance(record, TickRecord)
+    epoch = encode([epoch for epoch in run.epochs if epoch.tick <= tick][-1])
+    return encode(HeadRecord("run-1", run.snapshots[tick], added, record.commit, epoch))
 
 
 def without_wall(row: msgspec.Struct) -> dict[str, object]:
@@ -138,3 +144,39 @@ def test_records_that_are_no_run_are_refused(hub_run: HubRun) -> None:
     changed = msgspec.structs.replace(record, admitted=record.admitted[:1])
     with pytest.raises(Malformed, match="its inputs give other deliveries"):
         folded([*hub_run.records[:6], encode(changed), *hub_run.records[7:10]])
+
+
+@pytest.mark.parametrize("captured", [None, -1, 3, 28, 40, 63])
+def test_a_vhub_that_is_started_again_knows_what_the_one_before_knew(hub_run: HubRun, captured: int | None) -> None:
+    told = None if captured is None else Captured(captured, 1 if captured >= 0 else 0)
+    past = recall(hub_run.deployment, "run-1", hub_run.journal, told, limits.DOWNLINK_KEPT_NS)
+    assert past is not None and past.state.snapshot() == hub_run.snapshots[-1]
+    assert past.epoch == hub_run.epochs[-1] and past.committed is not None and past.committed[1].tick == 63
+    for tick, payload in past.sent.items():
+        assert hub_run.deliveries.get(tick, [payload]) == [payload], "byte for byte"
+    assert past.published == [payloads for _, payloads in sorted(hub_run.deliveries.items())][-1][-1]
+    live = {(name, down.number, encode(down)) for name, down in hub_run.downs if isinstance(down, Down)}
+    again = {(name, number, payload) for name, downs in past.downlinks.items() for number, payload in downs}
+    assert again and again <= live | {item for item in again if item[0] != "watcher"}
+    kept = [item.closing.frame.tick for item in past.kept if isinstance(item, Keep)]
+    assert kept == ([] if captured is None else list(range(captured + 1, 64)))
+    epochs = [item.epoch.epoch for item in past.kept if isinstance(item, KeepEpoch)]
+    assert epochs == ([] if captured is None else [2] if captured >= 0 else [1, 2])
+    assert (past.known is not None and past.known.tick == captured) if captured is not None and captured >= 0 else True
+
+
+def test_what_joins_and_leaves_is_written_before_its_go_is_said(hub_run: HubRun) -> None:
+    cut = max(i for i, raw in enumerate(hub_run.journal) if isinstance(decode_any(HubRecord, raw), InputsRecord))
+    past = recall(hub_run.deployment, "run-1", hub_run.journal[: cut + 1], None, 0)
+    assert past is not None and past.inputs is not None and past.inputs.tick == past.state.closed + 1
+    assert [joining.name for joining in past.inputs.joins] == ["watcher"]
+
+
+def test_the_journal_of_another_run_or_one_behind_its_capture_is_refused(hub_run: HubRun) -> None:
+    assert recall(hub_run.deployment, "run-1", [], None, 0) is None
+    with pytest.raises(Malformed, match="the journal of the vHub is of run run-1, this is run run-2"):
+        recall(hub_run.deployment, "run-2", hub_run.journal, None, 0)
+    with pytest.raises(Malformed, match="one that does not start with its head, this is run run-1"):
+        recall(hub_run.deployment, "run-1", hub_run.journal[1:], None, 0)
+    with pytest.raises(Malformed, match="the capture has tick 64, its journal ends at 63"):
+        recall(hub_run.deployment, "run-1", hub_run.journal, Captured(64, 2), 0)

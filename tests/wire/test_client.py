@@ -130,11 +130,12 @@ def test_who_is_refused_is_told_why(house: House) -> None:
 
 
 def test_a_client_says_that_the_vhub_is_lost(house: House) -> None:
-    house.up("--set", CLIENTS)
+    """The launcher is killed, and all with it: nobody starts it again."""
+    up = house.up("--set", CLIENTS, "--set", "deadlines.vhub_back=1 s")
     with connect(house.info().radio, "hand") as client:
         ticks = client.lockstep(100)
         assert next(ticks) == 0
-        house.kill("vhub")
+        up.kill()
         with pytest.raises(ConnectionFailed, match="lost the vHub at tcp/"):
             list(ticks)
 

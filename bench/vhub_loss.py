@@ -1,0 +1,72 @@
+"""How long a run stands still when its vHub is killed: from kill -9 until the next commit, all that comes between.
+
+A run in real time with both players and a capture; its vHub is killed twice (the launcher starts it again at once as
+often), each time when the run has gone on for a while. Neighbours: `runs`.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from dataclasses import dataclass
+from statistics import median
+from typing import Final
+
+from bench.machine import children
+from bench.runs import BenchError, name_of, watch
+
+KILLS: Final = 2
+CALM_S: Final = 3.0
+"""How long the run goes on between two kills, and before the first."""
+LIMIT_MS: Final = 1000.0
+VHUB: Final = "vhub"
+
+
+@dataclass(frozen=True, slots=True)
+class VhubLoss:
+    """The outages in ms of the wall, in order."""
+
+    outages_ms: list[float]
+    median_ms: float
+    max_ms: float
+
+
+def vhub_loss(seconds: float = 30.0) -> VhubLoss:
+    """Kill it twice in each run of ten seconds, in as many runs as fit into the time."""
+    outages: list[float] = []
+    for _ in range(max(1, round(seconds / 10.0))):
+        over = threading.Event()
+        killer = threading.Thread(target=_kill, args=(over,), name="killer")
+        killer.start()
+        try:
+            run = watch("realtime", 10.0)
+        finally:
+            over.set()
+            killer.join()
+        told = [entry for entry in run.result["recoveries"] if entry["what"] == VHUB]
+        if len(told) != KILLS:
+            raise BenchError(f"the vHub was killed {KILLS} times, and the run tells of {len(told)}")
+        outages += [entry["outage_ms"] for entry in told]
+    return VhubLoss(outages, round(median(outages), 1), max(outages))
+
+
+def _kill(over: threading.Event) -> None:
+    """Kill the vHub whenever it has lived for a while beside players."""
+    left, known = KILLS, 0
+    while left and not over.wait(0.1):
+        pids = {name_of(command): pid for pid, command in children().items()}
+        if VHUB not in pids or "player-red" not in pids or pids[VHUB] == known:
+            continue
+        known = pids[VHUB]
+        if not over.wait(CALM_S):
+            os.kill(known, signal.SIGKILL)
+            left -= 1
+
+
+def lines(found: VhubLoss) -> list[str]:
+    """Return the figures for people."""
+    each = " ".join(f"{outage:.0f}" for outage in found.outages_ms)
+    return [
+        f"outage: median {found.median_ms:.0f} ms, longest {found.max_ms:.0f} ms ({each}; to stay below {LIMIT_MS:.0f})"
+    ]

@@ -1,0 +1,55 @@
+"""Identities: what a certificate says that its holder is. `supervisor`, `vhub`, `node.NAME`, `client.NAME` (players
+too), `operator.NAME` (a person or a script that controls the run).
+
+An identity is the common name of a certificate and the stem of its files. Neighbours: `certificates` checks whether
+somebody is who he says, `access` what each may do.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import BadValue
+from foosim.protocol.names import is_name
+
+ROLES: Final = ("node", "client", "operator")
+"""Roles of which there are several, told apart by name."""
+FORMS: Final = "supervisor, vhub, node.NAME, client.NAME or operator.NAME"
+
+
+def node(name: str) -> str:
+    """Return the identity of a node."""
+    return f"node.{name}"
+
+
+def client(name: str) -> str:
+    """Return the identity of a client, or of a player."""
+    return f"client.{name}"
+
+
+def operator(name: str) -> str:
+    """Return the identity of an operator."""
+    return f"operator.{name}"
+
+
+def parse_identity(text: str) -> tuple[str, str]:
+    """Return role and name, the name of supervisor and vHub being their role; raises BadValue."""
+    if text in (SUPERVISOR, VHUB):
+        return text, text
+    role, _, name = text.partition(".")
+    if role not in ROLES or not is_name(name) or name in (SUPERVISOR, VHUB):
+        raise BadValue(f"not an identity ({FORMS})", text)
+    return role, name
+
+
+def identities_of(deployment: Deployment) -> list[str]:
+    """Return everybody who takes part in a run, or controls it: the servers first, the others by role and name."""
+    return [
+        SUPERVISOR,
+        VHUB,
+        *map(node, sorted(deployment.nodes)),
+        *map(client, sorted([*deployment.players, *deployment.clients])),
+        *map(operator, sorted(deployment.access.operators)),
+    ]

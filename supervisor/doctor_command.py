@@ -1,0 +1,63 @@
+"""The command `foosim-doctor`: whether a deployment could run here, and what to do where it could not.
+
+Neighbours: `doctor` has the checks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foosim.protocol.addresses import LOOPBACK, check_listen
+from foosim.protocol.codec import encode_json
+from foosim.protocol.command import DONE, FAILED, PkiOption, VersionOption, new_app, run_app
+from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.supervisor.doctor import Case, Finding, examine, is_well
+
+app = new_app()
+
+MARKS = {"fine": "ok", "warning": "!", "problem": "NO"}
+
+
+@app.command()
+def doctor(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)],
+    listen: Annotated[str, typer.Option(help="Where it would listen: HOST[:PORT], as for `up`.")] = LOOPBACK,
+    insecure: Annotated[bool, typer.Option("--insecure", help="As for `up`.")] = False,
+    pki: PkiOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")] = False,
+    version: VersionOption = False,
+) -> None:
+    """Look whether a deployment could run on this machine, before it does.
+
+    Checks versions, certificates (names, dates, keys, hosts), ports, the clock and disks. Each line says what is fine,
+    what is not, and what to do. Exit codes: 0 nothing stands in the way, 1 something does, 2 bad input.
+    """
+    deployment = load_deployment(read_deployment_text(file), str(file))
+    check_listen(listen, insecure, 2, pki is not None)
+    findings = examine(Case(deployment, listen, insecure, pki))
+    if json:
+        content = {"well": is_well(findings), "findings": [asdict(finding) for finding in findings]}
+        print(encode_json(content).decode())
+    else:
+        for finding in findings:
+            print(_line(finding))
+    raise typer.Exit(DONE if is_well(findings) else FAILED)
+
+
+def _line(finding: Finding) -> str:
+    remedy = f"\n{'':18}-> {finding.remedy}" if finding.remedy else ""
+    text = f": {finding.text}" if finding.text else ""
+    return f"{MARKS[finding.state]:3} {finding.check:13} {finding.subject}{text}{remedy}"
+
+
+def main() -> None:
+    """Entry of `foosim-doctor`."""
+    run_app(app, "foosim-doctor")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,85 @@
+"""What `up` does with the machines of a run, beside starting processes on them: checks, and what is brought home.
+
+A vHub on another machine writes the capture there; when it has ended the file is sent through ssh, compared with its
+digest, and then removed there. Neighbours: `remote` (command lines), `guard` (what sends), `up`.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Mapping
+from hashlib import blake2b
+from pathlib import Path
+from typing import IO, Final
+
+from foosim.protocol.addresses import Address, parse_address
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Failed, Refused
+from foosim.supervisor.children import GUARD
+from foosim.supervisor.remote import CAPTURE, Remote
+
+BLOCK_BYTES: Final = 1 << 20
+SIZE_LINE_MAX: Final = 32
+FORGET_S: Final = 15.0
+
+
+class OutOfReach(Refused):
+    """Processes are to run on other machines, and the supervisor does not listen where those reach it."""
+
+
+def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, Remote]) -> None:
+    """Raise OutOfReach when a process on another machine could not connect to where the supervisor listens."""
+    for name, remote in remotes.items():
+        there = f"{name} on host {remote.name} ({remote.host.address})"
+        if address.is_loopback and not parse_address(remote.host.address).is_loopback:
+            raise OutOfReach(
+                f"{there} cannot connect to {address}; say --listen HOST[:PORT], or `listen:` in the deployment, "
+                "with an address of this machine that it reaches"
+            )
+        node = deployment.nodes.get(name)
+        if node is not None and node.launch == "systemd" and address.port == 0:
+            raise OutOfReach(f"{there} is a unit of systemd and needs a port that stays; say --listen HOST:PORT")
+
+
+def fetch_capture(remote: Remote, run: str, path: Path) -> None:
+    """Bring the capture of a run home to `path`, and remove the run's folder there. Raises Failed; it stays there."""
+    command = remote.ssh([remote.path(GUARD), "send", run, CAPTURE])
+    part = path.with_name(path.name + ".part")
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
+    ) as process:
+        assert process.stdout is not None and process.stderr is not None
+        try:
+            problem = _receive(process.stdout, part)
+        except OSError as error:
+            problem = f"{part}: {error.strerror}"
+        process.stdout.close()
+        lines = process.stderr.read().decode("utf-8", "replace").splitlines()
+    if process.returncode or problem:
+        part.unlink(missing_ok=True)
+        code = process.returncode
+        why = "; ".join(lines[-1:]) if code == 1 else remote.why(code, lines) if code else problem
+        where = f"host {remote.name}, in foosim's state folder as hosts/{run}/{CAPTURE}"
+        raise Failed(f"the capture stays on {where}: {why or problem}")
+    part.replace(path)
+    forget = remote.ssh([remote.path(GUARD), "forget", run])
+    try:
+        subprocess.run(forget, stdin=subprocess.DEVNULL, capture_output=True, timeout=FORGET_S, check=False)
+    except subprocess.TimeoutExpired:
+        return  # it is home; what is left there is only in the way
+
+
+def _receive(stream: IO[bytes], part: Path) -> str:
+    """Write what a guard sends to `part`; return what is wrong with it, or an empty text."""
+    size = stream.readline(SIZE_LINE_MAX).strip()
+    if not size.isdigit():
+        return "nothing was sent"
+    left, digest = int(size), blake2b(digest_size=32)
+    with part.open("wb") as file:
+        while left > 0 and (block := stream.read(min(left, BLOCK_BYTES))):
+            left -= len(block)
+            digest.update(block)
+            file.write(block)
+    if left or stream.readline().strip() != digest.hexdigest().encode():
+        return "it came damaged"
+    return ""

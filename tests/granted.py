@@ -1,0 +1,57 @@
+"""A second opinion on who may do what on the keys of a plane, written down by hand: no table of channels, no rules.
+
+`protocol/access.py` generates what Zenoh enforces; tests of the generator and of real sessions compare it with this.
+A new channel gets its place here by somebody who thinks about it.
+"""
+
+from typing import Final
+
+S: Final = "foosim/simulation"
+R: Final = "foosim/radio"
+
+
+def may_put(identity: str, key: str) -> bool:
+    """Whether what this identity puts on a key is let in."""
+    role, _, name = identity.partition(".")
+    match role:
+        case "node":
+            of_node = ("hello", "ready", "part", "samples", "want", "heartbeat", "farewell")
+            return key in {f"{S}/{what}/{name}" for what in of_node}
+        case "vhub":
+            of_vhub = ("hello", "ready", "standing", "want", "heartbeat", "farewell")
+            return key in {f"{S}/deliveries", *(f"{S}/{what}/vhub" for what in of_vhub)}
+        case "operator":
+            return key.startswith(f"{S}/request/{name}.") and "/" not in key[len(f"{S}/request/") :]
+        case "client":
+            return key in {f"{R}/hello/{name}", f"{R}/up/{name}"}
+    return False
+
+
+def may_hear(identity: str, key: str) -> bool:
+    """Whether this identity hears what is put on a key."""
+    role, _, name = identity.partition(".")
+    match role:
+        case "node":
+            to_all = {f"{S}/{what}" for what in ("recall", "prepare", "epoch", "order", "deliveries", "end")}
+            to_it = {f"{S}/{what}/{name}" for what in ("build", "refusal", "commit")}
+            return key in to_all | to_it or key.startswith((f"{S}/part/", f"{S}/want/"))
+        case "vhub":
+            to_all = {f"{S}/{what}" for what in ("recall", "epoch", "tempo", "end")}
+            to_it = {f"{S}/{what}/vhub" for what in ("build", "refusal", "commit")}
+            return key in to_all | to_it or key.startswith((f"{S}/samples/", f"{S}/want/"))
+        case "operator":
+            return key.startswith(f"{S}/answer/{name}.")
+        case "client":
+            return key in {f"{R}/{what}/{name}" for what in ("welcome", "refusal", "down")}
+    return False
+
+
+def may_be_present(identity: str, key: str) -> bool:
+    """Whether a token of this identity is let in under a key."""
+    role, _, name = identity.partition(".")
+    return key == {"node": f"{S}/alive/{name}", "vhub": f"{S}/alive/vhub", "client": f"{R}/alive/{name}"}.get(role)
+
+
+def may_watch(identity: str, key: str) -> bool:
+    """Whether this identity hears of a presence under a key: of its router's."""
+    return key == (f"{R}/alive/vhub" if identity.startswith("client.") else f"{S}/alive/supervisor")

@@ -1,0 +1,77 @@
+"""Balancing: what moves where, and when nothing does; a run that is balanced is the same world."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foosim.protocol.units import Pace
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.balance import EVERY_NS, SETTLE_NS, STAY_NS, Balancer, Shift
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+OWNERS = {"a": "n1", "b": "n1", "c": "n1", "d": "n2"}
+"""Robots of two nodes."""
+
+
+def test_a_robot_moves_from_the_busiest_node_to_the_idlest() -> None:
+    balancer = Balancer(OWNERS)
+    assert balancer.look({"n1": 0.9, "n2": 0.2, "n3": 0.3}, OWNERS, 0) == Shift("a", "n1", "n2", 0.9, 0.2)
+
+
+def test_it_moves_home_rather_than_another_one() -> None:
+    balancer = Balancer({**OWNERS, "c": "n2"})
+    shift = balancer.look({"n1": 0.9, "n2": 0.2}, OWNERS, 0)
+    assert shift is not None and shift.robot == "c"
+
+
+@pytest.mark.parametrize(
+    ("loads", "owners"),
+    [
+        ({"n1": 0.30, "n2": 0.20}, OWNERS),  # a small difference
+        ({"n1": 0.90, "n2": 0.65}, OWNERS),  # a robot's share is more than the difference
+        ({"n1": 0.90, "n2": 0.10}, {"a": "n1", "d": "n2"}),  # the only robot: the other node would have it all
+        ({"n1": 0.90}, OWNERS),
+    ],
+)
+def test_nothing_moves_when_nothing_is_won(loads: dict[str, float], owners: dict[str, str]) -> None:
+    assert Balancer(OWNERS).look(loads, owners, 0) is None
+
+
+def test_loads_settle_before_the_next_move_and_a_robot_stays_where_it_came() -> None:
+    balancer = Balancer({})
+    loads = {"n1": 0.9, "n2": 0.1}
+    shift = balancer.look(loads, OWNERS, 0)
+    assert shift is not None and shift.robot == "a"
+    owners = {**OWNERS, "a": "n2"}
+    assert balancer.look(loads, owners, SETTLE_NS - 1) is None
+    back = {"n1": 0.1, "n2": 0.9}
+    second = balancer.look(back, owners, SETTLE_NS)
+    assert second is not None and second.robot == "d", "not the one that has just come"
+    last = balancer.look(back, {**owners, "d": "n1", "e": "n2"}, STAY_NS)
+    assert last is not None and last.robot == "a"
+
+
+def test_one_busy_second_moves_nothing() -> None:
+    balancer = Balancer({})
+    assert balancer.look({"n1": 0.3, "n2": 0.3}, OWNERS, 0) is None
+    assert balancer.look({"n1": 0.6, "n2": 0.3}, OWNERS, EVERY_NS) is None, "the mean is 0.45"
+    assert balancer.look({"n1": 0.9, "n2": 0.3}, OWNERS, 2 * EVERY_NS) is not None
+
+
+def test_a_run_that_is_balanced_is_the_same_world() -> None:
+    def busy(system: System) -> None:
+        for name, load in (("n1", 0.9), ("n2", 0.1), ("n3", 0.2)):
+            system.processes[name].core.busy = load
+
+    def prepare(system: System) -> None:
+        system.supervisor.balancer = Balancer(system.supervisor.deployment.owners())
+        system.at_tick(5, lambda: busy(system))
+
+    text, sets, pace = TABLE.read_text(), ["engine=pure"], Pace("realtime")
+    ticks = 700
+    usual = rehearse(text, TABLE.name, ticks, 1, sets)
+    balanced = rehearse(text, TABLE.name, ticks, 3, sets, Settings(), pace=pace, prepare=prepare)
+    assert balanced.json["moves"] == 1 and balanced.digests == usual.digests

@@ -1,0 +1,180 @@
+"""The doctor: what it finds wrong, what it says to do, and that doing it helps."""
+
+import importlib.metadata
+import json
+import shutil
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import pytest
+from typer.testing import CliRunner
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.protocol.identity import identities_of
+from foosim.supervisor import doctor, pki
+from foosim.supervisor.doctor import CHECKS, Case, Finding, examine, is_well
+from foosim.supervisor.doctor_command import app
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+
+
+@pytest.fixture
+def deployment() -> Deployment:
+    return load_deployment(read_deployment_text(TABLE), "table.yaml")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, deployment: Deployment) -> Path:
+    path = tmp_path / "pki"
+    pki.init(path)
+    pki.issue(path, identities_of(deployment))
+    return path
+
+
+@pytest.fixture(autouse=True)
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+
+
+def found(case: Case, subject: str) -> Finding:
+    (finding,) = [finding for finding in examine(case) if finding.subject == subject]
+    return finding
+
+
+def test_where_all_is_well_every_check_says_so(deployment: Deployment, folder: Path) -> None:
+    (folder / "ca.key").unlink()
+    findings = examine(Case(deployment, "127.0.0.1", pki=folder))
+    assert {finding.check for finding in findings} == CHECKS.keys()
+    assert [finding for finding in findings if finding.state == "problem"] == [] and is_well(findings)
+    for finding in findings:
+        assert (finding.state == "fine") == (finding.remedy == ""), finding
+
+
+def _no_certificate(folder: Path) -> None:
+    (folder / "node.red.pem").unlink()
+
+
+def _short(folder: Path) -> None:
+    for suffix in (".pem", ".key"):
+        (folder / f"node.red{suffix}").unlink()
+    pki.issue(folder, ["node.red"], days=3)
+
+
+def _swapped(folder: Path) -> None:
+    (folder / "node.red.key").write_bytes((folder / "node.blue.key").read_bytes())
+
+
+def _readable(folder: Path) -> None:
+    (folder / "node.red.key").chmod(0o644)
+
+
+def _no_root(folder: Path) -> None:
+    (folder / "ca.pem").unlink()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "subject", "state", "said", "remedy"),
+    [
+        (_no_certificate, "node.red", "problem", "no certificate", "foosim-pki issue"),
+        (_short, "node.red", "warning", "renew it", "foosim-pki renew"),
+        (_swapped, "node.red", "problem", "does not belong to", "issue anew"),
+        (_readable, "node.red.key", "problem", "can be read by others", "chmod 600"),
+        (_no_root, "ca.pem", "problem", "has no ca.pem", "foosim-pki init"),
+    ],
+)
+def test_what_is_wrong_with_certificates_is_found(
+    deployment: Deployment,
+    folder: Path,
+    spoil: Callable[[Path], None],
+    subject: str,
+    state: str,
+    said: str,
+    remedy: str,
+) -> None:
+    spoil(folder)
+    finding = found(Case(deployment, "127.0.0.1", pki=folder), subject)
+    assert finding.state == state and said in finding.text and remedy in finding.remedy
+
+
+def test_the_servers_need_the_host_where_they_listen(deployment: Deployment, folder: Path) -> None:
+    case = Case(deployment, "127.0.0.9:7400", pki=folder)
+    finding = found(case, "vhub")
+    assert finding.state == "problem" and finding.remedy.endswith("vhub --host 127.0.0.9")
+    assert found(case, "node.red").state == "fine", "who only connects listens nowhere"
+    pki.renew(folder, ["supervisor", "vhub"], hosts=["127.0.0.9"])
+    assert found(case, "vhub").state == "fine"
+
+
+def test_clients_with_passwords_need_one(folder: Path) -> None:
+    text = read_deployment_text(TABLE) + "\naccess: {radio: password}\n"
+    case = Case(load_deployment(text, "table.yaml"), "127.0.0.1", pki=folder)
+    finding = found(case, "client.player-red")
+    assert finding.state == "problem" and finding.remedy.endswith("client.player-red --password")
+    pki.issue_password(folder, "client.player-red")
+    assert "a password and a certificate" in found(case, "client.player-red").text
+    (folder / "client.player-red.pem").unlink()
+    assert found(case, "client.player-red").state == "fine"
+
+
+def test_ports_that_are_taken_or_elsewhere_are_found(deployment: Deployment) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        finding = found(Case(deployment, f"127.0.0.1:{port}"), "simulation plane")
+        assert finding.state == "problem" and "end what listens there" in finding.remedy
+    finding = found(Case(deployment, "192.0.2.1:7400", insecure=True), "radio plane")
+    assert finding.state == "problem" and "192.0.2.1:7401" in finding.text
+
+
+class Usage(NamedTuple):
+    total: int
+    used: int
+    free: int
+
+
+@pytest.mark.parametrize(("free", "state"), [(1 << 20, "problem"), (1 << 30, "warning"), (1 << 40, "fine")])
+def test_a_disk_without_room_is_found(
+    deployment: Deployment, monkeypatch: pytest.MonkeyPatch, free: int, state: str
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: Usage(1 << 41, 0, free))
+    assert found(Case(deployment, "127.0.0.1"), "captures").state == state
+
+
+@pytest.mark.parametrize(("kept", "state"), [(0, "fine"), (5, "warning")])
+def test_a_clock_that_nobody_keeps_is_found(
+    deployment: Deployment, monkeypatch: pytest.MonkeyPatch, kept: int, state: str
+) -> None:
+    monkeypatch.setattr(doctor, "_clock_state", lambda: kept)
+    assert found(Case(deployment, "127.0.0.1"), "clock").state == state
+
+
+def test_a_library_that_is_too_old_or_missing_is_found(deployment: Deployment, monkeypatch: pytest.MonkeyPatch) -> None:
+    wanted = ["numpy>=99", "nothing-is-called-so>=1", "pytest>=9999; extra == 'dev'"]
+    monkeypatch.setattr(importlib.metadata, "requires", lambda name: wanted)
+    case = Case(deployment, "127.0.0.1")
+    assert "is not >=99" in found(case, "numpy").text
+    assert found(case, "nothing-is-called-so").remedy == "pip install 'nothing-is-called-so>=1'"
+    assert "pytest" not in {finding.subject for finding in examine(case)}, "developers' tools are not needed to run"
+
+
+def test_the_command_tells_it_as_text_and_as_json(folder: Path) -> None:
+    (folder / "vhub.key").unlink()
+    shown = CliRunner().invoke(app, [str(TABLE), "--pki", str(folder)])
+    assert shown.exit_code == 1
+    assert any(line.startswith("NO  certificates  vhub: ") for line in shown.output.splitlines())
+    told = CliRunner().invoke(app, [str(TABLE), "--json"])
+    content = json.loads(told.output)
+    assert told.exit_code == 0 and content["well"] is True
+    assert content["findings"][0] == {
+        "check": "versions",
+        "subject": "foosim",
+        "state": "fine",
+        "remedy": "",
+        "host": "here",
+        "text": content["findings"][0]["text"],
+    }

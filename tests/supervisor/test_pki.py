@@ -1,0 +1,289 @@
+"""Certificates: what is issued, that it is accepted, what is refused, and how that is said."""
+
+import json
+import os
+import stat
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+from typing import Final
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID
+from typer.testing import CliRunner
+
+from foosim.protocol import certificates, wall
+from foosim.protocol.certificates import (
+    CertificateError,
+    check_host,
+    hosts_of,
+    load_credentials,
+    operator_credentials,
+    passwords_file,
+    read_certificate,
+)
+from foosim.protocol.errors import Refused
+from foosim.supervisor import pki
+from foosim.supervisor.pki import FileExists
+from foosim.supervisor.pki_command import app
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    path = tmp_path / "pki"
+    pki.init(path)
+    return path
+
+
+def run(*arguments: str | Path, given: str | None = None) -> tuple[int, str]:
+    """Exit code and output of the command; a refusal is its text."""
+    result = CliRunner().invoke(app, list(map(str, arguments)), input=given)
+    if isinstance(result.exception, Refused):
+        return result.exception.exit_code, str(result.exception)
+    return result.exit_code, result.output
+
+
+def test_a_certificate_is_what_the_docs_say(folder: Path) -> None:
+    pki.issue(folder, ["supervisor"], ["10.0.0.1", "sim1.lan"])
+    ca, leaf = read_certificate(folder / "ca.pem"), read_certificate(folder / "supervisor.pem")
+    constraints = ca.extensions.get_extension_for_class(x509.BasicConstraints)
+    assert constraints.critical and constraints.value == x509.BasicConstraints(ca=True, path_length=0)
+    assert (ca.not_valid_after_utc - ca.not_valid_before_utc).days == 3650
+    assert (leaf.not_valid_after_utc - leaf.not_valid_before_utc).days == 90
+    public = leaf.public_key()
+    assert isinstance(public, ec.EllipticCurvePublicKey) and isinstance(public.curve, ec.SECP256R1)
+    assert set(hosts_of(leaf)) >= {"supervisor", "localhost", "127.0.0.1", "::1", "10.0.0.1", "sim1.lan"}
+    usage = leaf.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value
+    assert set(usage) == {ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH}
+    assert not leaf.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
+    for path in folder.iterdir():
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600, path
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+
+
+def test_what_is_issued_is_accepted_and_nothing_is_overwritten(folder: Path) -> None:
+    pki.issue(folder, ["node.red", "client.a_b"])
+    credentials = load_credentials(folder, "node.red")
+    assert credentials is not None and credentials.name == "red" and credentials.ends_soon(wall.now_utc()) == ""
+    assert load_credentials(None, "node.red") is None, "no folder, no certificates"
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(FileExists, match=r"not overwritten: .*node\.red\.pem, .*node\.red\.key"):
+        pki.issue(folder, ["node.blue", "node.red"])
+    with pytest.raises(FileExists, match=r"ca\.pem"):
+        pki.init(folder)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before, "nothing was made"
+
+
+def test_renewed_is_the_same_but_for_the_dates(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pki.issue(folder, ["node.red"], ["10.0.0.7"], days=10)
+    old, key = read_certificate(folder / "node.red.pem"), (folder / "node.red.key").read_bytes()
+    now = wall.now_utc()
+    monkeypatch.setattr(wall, "now_utc", lambda: now + timedelta(days=4))
+    assert pki.renew(folder, within_days=3) == []
+    assert pki.renew(folder, within_days=7) == [folder / "node.red.pem"]
+    new = read_certificate(folder / "node.red.pem")
+    assert new.not_valid_after_utc - old.not_valid_after_utc > timedelta(days=3)
+    assert (new.not_valid_after_utc - new.not_valid_before_utc).days == 10
+    assert hosts_of(new) == hosts_of(old) and new.serial_number != old.serial_number
+    assert (folder / "node.red.key").read_bytes() == key
+    assert load_credentials(folder, "node.red") is not None
+    with pytest.raises(CertificateError, match=r"no certificate of node\.blue; it has: node\.red"):
+        pki.renew(folder, ["node.blue"])
+
+
+def _expired(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = wall.now_utc()
+    monkeypatch.setattr(wall, "now_utc", lambda: now + timedelta(days=91))
+
+
+def _early(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = wall.now_utc()
+    monkeypatch.setattr(wall, "now_utc", lambda: now - timedelta(hours=2))
+
+
+def _root_expired(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = wall.now_utc()
+    monkeypatch.setattr(wall, "now_utc", lambda: now + timedelta(days=3700))
+
+
+def _others_key(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "node.red.key").write_bytes((folder / "node.blue.key").read_bytes())
+
+
+def _others_certificate(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for suffix in (".pem", ".key"):
+        (folder / f"node.red{suffix}").write_bytes((folder / f"node.blue{suffix}").read_bytes())
+
+
+def _others_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = folder.parent / "other"
+    (other / pki.init(other).name).replace(folder / "ca.pem")
+
+
+def _leaf_for_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "ca.pem").write_bytes((folder / "node.blue.pem").read_bytes())
+
+
+def _garbage(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "node.red.pem").write_bytes(b"-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n")
+
+
+def _garbage_key(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "node.red.key").write_bytes(b"\0\1\2")
+
+
+def _no_key(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "node.red.key").unlink()
+
+
+def _nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "node.red.pem").unlink()
+
+
+def _no_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "ca.pem").unlink()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (_expired, r"node\.red\.pem: expired on .* UTC; foosim-pki renew .* node\.red"),
+        (_early, r"ca\.pem: valid from .* mind the clock"),
+        (_root_expired, r"ca\.pem: expired on"),
+        (_others_key, r"node\.red\.key: the key does not belong to the certificate node\.red\.pem"),
+        (_others_certificate, r"node\.red\.pem: a certificate of 'node\.blue', not of node\.red"),
+        (_others_root, r"node\.red\.pem: not issued by the root in ca\.pem beside it"),
+        (_leaf_for_root, r"ca\.pem: not the certificate of an authority"),
+        (_garbage, r"node\.red\.pem: not a certificate in PEM"),
+        (_garbage_key, r"node\.red\.key: not a private key in PEM"),
+        (_no_key, r"node\.red\.key: cannot be read, No such file"),
+        (_nothing, r"has no certificate of node\.red; it has: node\.blue"),
+        (_no_root, r"has no ca\.pem; foosim-pki init"),
+    ],
+)
+def test_what_would_be_refused_is_refused_before_anything_is_opened(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, spoil: Callable[[Path, pytest.MonkeyPatch], None], said: str
+) -> None:
+    pki.issue(folder, ["node.red", "node.blue"])
+    spoil(folder, monkeypatch)
+    with pytest.raises(CertificateError, match=said) as refused:
+        load_credentials(folder, "node.red")
+    assert refused.value.exit_code == 3
+    if (folder / "ca.pem").exists() and (folder / "node.red.pem").exists():
+        code, output = run("show", folder)
+        assert code == 1 and any(
+            line.startswith(("node.red ", "foosim ", "node.blue ")) for line in output.splitlines()
+        )
+
+
+def test_a_certificate_that_ends_soon_is_told(folder: Path) -> None:
+    pki.issue(folder, ["node.red"], days=5)
+    credentials = load_credentials(folder, "node.red")
+    assert credentials is not None and "renew it" in credentials.ends_soon(wall.now_utc())
+
+
+def test_who_listens_has_a_certificate_for_that_host(folder: Path) -> None:
+    pki.issue(folder, ["supervisor"], ["10.0.0.1"])
+    credentials = load_credentials(folder, "supervisor")
+    check_host(credentials, "tls/10.0.0.1:7400")
+    check_host(credentials, "tls/[::1]:7400")
+    check_host(None, "tcp/10.9.9.9:7400")
+    with pytest.raises(CertificateError, match=r"not for 10\.0\.0\.2, where supervisor listens: .* --host 10\.0\.0\.2"):
+        check_host(credentials, "tls/10.0.0.2:7400")
+    assert run("renew", folder, "supervisor", "--host", "10.0.0.2", "--host", "10.0.0.1")[0] == 0
+    check_host(load_credentials(folder, "supervisor"), "tls/10.0.0.2:7400")
+
+
+def test_an_operator_is_the_only_one_or_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("FOOSIM_OPERATOR", raising=False)
+    assert operator_credentials(None) is None
+    with pytest.raises(CertificateError, match="no operator's certificate"):
+        operator_credentials(folder)
+    pki.issue(folder, ["operator.ann", "operator.bob"])
+    with pytest.raises(CertificateError, match=r"several operators \(operator\.ann, operator\.bob\)"):
+        operator_credentials(folder)
+    monkeypatch.setenv("FOOSIM_OPERATOR", "bob")
+    found = operator_credentials(folder)
+    assert found is not None and found.identity == "operator.bob"
+
+
+def test_passwords_are_kept_beside_certificates(folder: Path) -> None:
+    code, output = run("issue", folder, "client.hand", "--password", given="\n")
+    made = output.strip()
+    assert code == 0 and len(made) >= 24
+    found = load_credentials(folder, "client.hand")
+    assert found is not None and (found.user, found.password) == ("hand", made) and made not in repr(found)
+    assert run("issue", folder, "client.other", "--password", given="s3cret\n") == (0, "")
+    with passwords_file(folder, ["hand", "other", "third"]) as path:
+        assert path.read_text() == f"hand:{made}\nother:s3cret\n"
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert not path.exists()
+    pki.issue(folder, ["client.hand"])
+    with pytest.raises(
+        CertificateError, match=r"a certificate and a password of client\.hand: remove"
+    ):
+        load_credentials(folder, "client.hand")
+    with pytest.raises(CertificateError, match="needs the root certificate"):
+        load_credentials(None, "client.hand", "s3cret")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["issue", "FOLDER"], 2, "nobody to issue to"),
+        (["issue", "FOLDER", "robot.red"], 2, "not an identity (supervisor, vhub, node.NAME,"),
+        (["issue", "FOLDER", "node.Red"], 2, "not an identity"),
+        (["issue", "FOLDER", "node.red", "--host", "a b"], 2, "not a host name or an IP address, 'a b'"),
+        (["issue", "FOLDER", "node.red", "--days", "9999"], 2, "days of a certificate are from 1 to 825"),
+        (["issue", "FOLDER", "node.red", "--password"], 2, "only clients have passwords"),
+        (["issue", "FOLDER", "--password"], 2, "--password is for one client"),
+        (["issue", "NOWHERE", "node.red"], 3, "has no ca.pem; foosim-pki init"),
+        (["show", "NOWHERE"], 3, "cannot be read, No such file"),
+        (["renew", "FOLDER", "node.red"], 3, "has no certificate of node.red"),
+        (["init", "FOLDER"], 3, "exists already, and is not overwritten"),
+    ],
+)
+def test_what_cannot_be_done_is_said(folder: Path, arguments: list[str], code: int, said: str) -> None:
+    places = {"FOLDER": str(folder), "NOWHERE": str(folder.parent / "nowhere")}
+    found, output = run(*(places.get(argument, argument) for argument in arguments), given="a b\n")
+    assert found == code and said in output, output
+
+
+def test_where_clients_have_passwords_a_deployment_gets_these(folder: Path, tmp_path: Path) -> None:
+    file = tmp_path / "passwords.yaml"
+    file.write_text(f"{TABLE.read_text()}\naccess: {{radio: password, operators: [ann]}}\n")
+    assert run("issue", folder, "--deployment", file)[0] == 0
+    assert certificates.identities_in(folder) == ["node.blue", "node.red", "operator.ann", "supervisor", "vhub"]
+    before = (folder / "client.player-red.password").read_text()
+    assert run("issue", folder, "--deployment", file) == (0, ""), "everybody has something"
+    assert (folder / "client.player-red.password").read_text() == before != ""
+
+
+def test_without_the_roots_key_nothing_is_issued(folder: Path) -> None:
+    os.remove(folder / "ca.key")
+    code, output = run("issue", folder, "node.red")
+    assert code == 3 and "issue and renew where the root's key is kept" in output
+
+
+def test_a_whole_deployment_is_issued_in_one_command(folder: Path) -> None:
+    assert run("issue", folder, "node.red")[0] == 0
+    code, output = run("issue", folder, "--deployment", TABLE, "--host", "10.0.0.1")
+    assert code == 0 and "node.red.pem" not in output
+    everybody = {
+        "supervisor",
+        "vhub",
+        "node.red",
+        "node.blue",
+        "client.player-red",
+        "client.player-blue",
+        "operator.admin",
+    }
+    assert set(certificates.identities_in(folder)) == everybody
+    code, output = run("show", folder, "--json")
+    shown = {its["identity"]: its for its in json.loads(output)}
+    assert code == 0 and shown.keys() == everybody | {"foosim"}
+    assert "10.0.0.1" in shown["vhub"]["hosts"] and not any(its["problem"] for its in shown.values())
