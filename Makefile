@@ -11,7 +11,7 @@ SEED ?= 17
 # One worker per core. The shell's PYTHONPATH (ROS sets one) would load other people's pytest plugins.
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses auto --maxprocesses 8
 
-.PHONY: help up test play swarm faults fuzz machines lint bench clean environment
+.PHONY: help up test play swarm swarm-gate faults fuzz machines lint bench clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
@@ -20,6 +20,7 @@ help:
 	@echo 'make swarm   runs under random faults, by seed (SEEDS=100; ARGS: --seed N, --json)'
 	@echo 'make faults  faults on real processes at random times, with their figures (N=20; ARGS: --seed S, --only KIND)'
 	@echo 'make fuzz    hostile bytes on every channel and in every file (N=200000 each; SEED=17; ARGS: -k NAME)'
+	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
 	@echo 'make machines  further cuts between machines: needs root, see docs/testing.md'
 	@echo 'make lint    ruff and mypy alone'
 	@echo 'make bench   measure speed, latency and throughput (ARGS: options of the bench)'
@@ -43,6 +44,9 @@ faults: environment
 # Tests that take an hour are no longer hung than those that take a second.
 fuzz: environment
 	@$(PYTEST) -o timeout=0 tests/laws/test_fuzz.py tests/laws/test_fuzz_files.py --fuzz-payloads $(or $(N),200000) --fuzz-seed $(SEED) $(ARGS)
+
+swarm-gate: environment
+	@$(PYTHON) -m bench.gate $(ARGS)
 
 # Last in it is pytest, so that its summary ends the output.
 test: lint

@@ -12,7 +12,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any, Final
 
-from bench import barrier, certificates, distributed, echo, hub, machine, realtime, table_one_process, vhub_loss
+from bench import (
+    barrier,
+    certificates,
+    distributed,
+    echo,
+    hub,
+    machine,
+    realtime,
+    swarm,
+    table_one_process,
+    vhub_loss,
+)
 from bench.runs import BenchError
 
 
@@ -65,6 +76,7 @@ BENCHES: Final = (
     Bench("realtime", "the same in real time", with_default(realtime.realtime), realtime.lines),
     Bench("hub", "packets through the vHub's core", with_default(hub.hub), hub.lines),
     Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
+    Bench("swarm", "rehearsals under random faults, by seed", swarm.swarm, swarm.lines),
     Bench("vhub-loss", "the vHub is killed and comes back", with_default(vhub_loss.vhub_loss), vhub_loss.lines),
     Bench("barrier", "the messages of a tick alone", run_barrier, barrier_lines),
 )

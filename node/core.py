@@ -410,7 +410,7 @@ class NodeCore:
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self.epoch or self.deployment is None:
             self._repeated += 1
-            self.member.repeated(epoch.epoch == self.epoch)
+            self.member.repeated(epoch.epoch == self.epoch and self.name in epoch.roster)
             return
         self.member.check_epoch(epoch)
         if self.name not in epoch.roster:

@@ -40,6 +40,8 @@ from foosim.protocol.yaml_tree import (
     write_yaml,
 )
 
+DEPLOYMENTS_KEPT: Final = 16
+"""How many of the last texts need not be read again."""
 PROBLEMS_MAX: Final = 100
 """How many problems are looked for and shown: a hostile file may hold many thousands, each with names to compare."""
 
@@ -51,7 +53,10 @@ _PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
 
 @lru_cache(maxsize=DEPLOYMENTS_KEPT)
 def load_deployment(text: str, name: str) -> Deployment:
-    """The deployment in `text`; `name` is the file's in messages. Raises DeploymentError with all problems."""
+    """The deployment in `text`; `name` is the file's in messages. Raises DeploymentError with all problems.
+
+    Equal texts give one value, which nobody changes: all processes of a rehearsal load the same.
+    """
     tree, problems = read_tree(text, locate_in(name))
     return _check(tree, problems)
 

@@ -11,13 +11,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from foosim.protocol import limits
 from foosim.protocol.channels import Channel
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`."""
+    """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`.
+
+    With `repeat` it comes twice.
+    """
 
     seed: int = 0
     delay_ns: int = 0
@@ -27,6 +31,7 @@ class Weather:
 
 
 CALM: Final = Weather()
+LATE_NS: Final = 2_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +43,8 @@ class Traced:
     what: str
     channel: str
     payload: bytes
+    name: str = ""
+    """Whom the channel's key names."""
 
 
 Message = tuple[int, int, str, Channel, str, bytes]
@@ -53,7 +60,11 @@ class Bus:
         self._key = draw_key(weather.seed, "bus")
         self._heap: list[Message] = []
         self._readers: dict[tuple[str, str], list[str]] = {}
-        self._cut: dict[str, int] = {}
+        self._mute: dict[str, int] = {}
+        self._deaf: dict[str, int] = {}
+        self._repeat_until_ns = 0
+        self._clogged: dict[str, int] = {}
+        """Until when nobody hears a process, it hears nobody, and what goes either way waits."""
 
     def subscribe(self, process: str, reads: Iterable[tuple[Channel, bool]]) -> None:
         """Let a process read channels: all that comes on them, or only what is addressed to it."""
@@ -62,23 +73,47 @@ class Bus:
             if process not in readers:
                 readers.append(process)
 
-    def cut_off(self, process: str, until_ns: int) -> None:
-        """Lose all that a process says and is told until a virtual time."""
-        self._cut[process] = max(until_ns, self._cut.get(process, 0))
+    def cut_off(self, process: str, until_ns: int, *, says: bool = True, hears: bool = True) -> None:
+        """Lose all that a process says, all that it is told, or both, until a virtual time."""
+        for ways, cut in ((self._mute, says), (self._deaf, hears)):
+            if cut:
+                ways[process] = max(until_ns, ways.get(process, 0))
 
-    def _is_cut(self, process: str, at_ns: int) -> bool:
-        return bool(self._cut) and at_ns < self._cut.get(process, 0)
+    def clog(self, process: str, until_ns: int) -> None:
+        """Keep all that a process says and is told until a virtual time; nothing is lost."""
+        self._clogged[process] = max(until_ns, self._clogged.get(process, 0))
+
+    def repeat_until(self, until_ns: int) -> None:
+        """Bring all that is said until a virtual time once more, after up to `LATE_NS`."""
+        self._repeat_until_ns = until_ns
+
+    def heal(self) -> None:
+        """From now on nothing is lost, late, cut or clogged."""
+        self.weather = CALM
+        self._repeat_until_ns = 0
+        for ways in (self._mute, self._deaf, self._clogged):
+            ways.clear()
 
     def put(self, sender: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
         """Send a message at `at_ns`; every reader but the sender gets it."""
+        if self._mute and at_ns < self._mute.get(sender, 0):
+            return
+        if self._clogged:
+            at_ns = max(at_ns, self._clogged.get(sender, 0))
         plane = channel.plane.name
         for key in ((channel.name, plane), (channel.name, plane + name)):
             for reader in self._readers.get(key, ()):
-                if reader != sender and not self._is_cut(sender, at_ns) and not self._is_cut(reader, at_ns):
-                    self._push(reader, channel, name, payload, at_ns)
+                if reader == sender or (self._deaf and at_ns < self._deaf.get(reader, 0)):
+                    continue
+                arrives_ns = max(at_ns, self._clogged.get(reader, 0)) if self._clogged else at_ns
+                self._push(reader, channel, name, payload, arrives_ns)
 
     def _push(self, reader: str, channel: Channel, name: str, payload: bytes, at_ns: int) -> None:
         self.sent += 1
+        if at_ns < self._repeat_until_ns:
+            late_ns = at_ns + int(unit_interval(draw_words(self._key, self.sent)[4]) * LATE_NS)
+            heapq.heappush(self._heap, (late_ns, self.sent, reader, channel, name, payload))
+            self.sent += 1
         weather = self.weather
         if weather is not CALM:
             words = draw_words(self._key, self.sent)
@@ -91,13 +126,13 @@ class Bus:
             at_ns += weather.delay_ns + int(unit_interval(words[1]) * weather.spread_ns)
         heapq.heappush(self._heap, (at_ns, self.sent, reader, channel, name, payload))
 
-    def hold(self, message: Message, until_ns: int) -> None:
-        """Put a message back for a receiver that is busy; it keeps its place among what waits."""
-        heapq.heappush(self._heap, (until_ns, message[1], *message[2:]))
+    def next_ns(self) -> int:
+        """Return when the next message arrives; far beyond any run when none is on its way."""
+        return self._heap[0][0] if self._heap else limits.COUNTER_MAX
 
-    def next_ns(self) -> int | None:
-        """Return when the next message arrives, or None."""
-        return self._heap[0][0] if self._heap else None
+    @property
+    def is_empty(self) -> bool:
+        return not self._heap
 
     def pop(self) -> Message:
         return heapq.heappop(self._heap)

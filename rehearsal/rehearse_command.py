@@ -14,6 +14,7 @@ from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
+from foosim.rehearsal.faults import TICKS
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.swarm import fly
 from foosim.rehearsal.system import Settings
@@ -45,14 +46,16 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     The same cores, messages and bytes as in the processes of `foosim-supervisor up`: with lockstep players the digests
     are those of `up`, whatever the number of nodes.
 
-    With --swarm a seed decides the number of nodes (3 to 6), the weather on the bus (delay, loss, repeats) and 8 to 20
-    faults of at least three kinds in 320 ticks on the pure engine: nodes killed, paused, cut off, slow, stopped; robots
-    moved, balls added, removed and pushed. Everything that is said and closed is checked against the laws.
+    With --swarm a seed decides the number of nodes (3 to 5), their clocks, the weather on the bus (delay, loss,
+    repeats) and 8 to 20 faults of at least three kinds in 230 ticks on the pure engine (--for: more of both): processes
+    killed, ended amid a turn, paused, slow, stopped, cut off one way or both, clogged; memory and clocks that jump; old
+    messages once more; robots moved, balls added, removed and pushed, the run paused. Everything that is written, said
+    and closed is checked against the laws; then all heals, and everybody has to be back.
 
     Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created.
     """
     if swarm:
-        raise typer.Exit(_swarm(file, 1 if seed is None else seed, seeds, json))
+        raise typer.Exit(_swarm(file, duration, 1 if seed is None else seed, seeds, json))
     if duration is None:
         raise BadValue("--for: how long is needed, e.g. 20s", None)
     if not 1 <= nodes <= limits.NODES_MAX:
@@ -84,16 +87,21 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     raise typer.Exit(FAILED if result["failed"] else DONE)
 
 
-def _swarm(file: Path, first: int, count: int, json: bool) -> int:
+def _swarm(file: Path, duration: str | None, first: int, count: int, json: bool) -> int:
     """Rehearse under the faults of some seeds; return the exit code."""
     text = read_deployment_text(file)
     load_deployment(text, str(file))
+    ticks = TICKS if duration is None else make_plan(RunOptions(file, "fast", duration, None, ())).ticks
+    if ticks < TICKS:
+        raise BadValue(f"--for: with --swarm at least {TICKS} ticks are needed, for faults and healing", duration)
+    longer = "" if duration is None else f" --for {duration}"
     flown = []
     for seed in range(first, first + count):
-        flight = fly(text, str(file), seed)
+        flight = fly(text, str(file), seed, ticks=ticks)
         flown.append(flight)
         if flight.broken:
-            typer.echo(f"seed {seed}: {flight.broken}\n  foosim-rehearse {file} --swarm --seed {seed}", err=True)
+            typer.echo(f"seed {seed}: {flight.broken}", err=True)
+            typer.echo(f"  foosim-rehearse {file} --swarm{longer} --seed {seed}", err=True)
             for fault in flight.faults:
                 typer.echo(f"  {fault}", err=True)
     broken = [flight.seed for flight in flown if flight.broken]
@@ -101,9 +109,10 @@ def _swarm(file: Path, first: int, count: int, json: bool) -> int:
         typer.echo(encode_json({"seeds": [asdict(flight) for flight in flown], "broken": broken}).decode())
     else:
         faults, losses = sum(len(flight.faults) for flight in flown), sum(flight.losses for flight in flown)
-        ticks = sum(flight.ticks for flight in flown)
+        done, seen = sum(flight.ticks for flight in flown), sum(flight.seen for flight in flown)
         typer.echo(
-            f"{count} seeds: {ticks} ticks, {faults} faults, {losses} nodes lost, {len(broken)} seeds broke a law"
+            f"{count} seeds: {done} ticks, {faults} faults, {losses} nodes lost, {seen} things written and said, "
+            f"{len(broken)} seeds broke a law"
         )
     return FAILED if broken else DONE
 

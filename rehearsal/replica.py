@@ -19,7 +19,18 @@ from foosim.protocol.fetching import piece_of
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame, layout_after
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import AddedEntity, Build, Commit, Delivered, Deliveries, Edit, Epoch, Order, Prepare
+from foosim.protocol.messages import (
+    AddedEntity,
+    Build,
+    Commit,
+    Delivered,
+    Deliveries,
+    Edit,
+    Epoch,
+    Order,
+    Prepare,
+    RobotPacket,
+)
 from foosim.protocol.start import Start, first_frame
 from foosim.rehearsal.bus import Bus
 
@@ -84,6 +95,12 @@ class Replica:
         self.frame = core.frame
         return self.frame
 
+    def sense(self) -> list[RobotPacket]:
+        """Return what all robots send at the frame, in (robot, index) order."""
+        core, _ = next(iter(self._nodes.values()))
+        packets, _ = core.stepper(self.frame.layout).sense(self.frame, self.frame.layout.robots)
+        return packets
+
     def rebuild_engines(self) -> None:
         """Replace all engines by new ones."""
         for _, solver in self._nodes.values():
@@ -101,7 +118,7 @@ class Replica:
 
     def _settle(self) -> None:
         """Let the nodes take turns until nobody has anything to say."""
-        while self._bus.next_ns() is not None:
+        while not self._bus.is_empty:
             _, _, receiver, channel, name, payload = self._bus.pop()
             if receiver == SOURCE:
                 piece = piece_of(self._deployment, channels.read(channel, name, payload))

@@ -1,79 +1,74 @@
 """Rehearsals under random faults, by seed: the real cores of all processes, on virtual time, in bad weather.
 
-A seed decides the number of nodes, the weather on the bus and when which fault happens. The laws are checked at
-whatever is said and closed; then everything heals, and the run must be finished. A failing seed is one command.
-Neighbours: `system` (what is disturbed), `replica` (the world computed again, which must be the same).
+A seed decides the number of nodes, their clocks, the weather on the bus and when which fault happens. The laws are
+checked at whatever is written, said and closed; then everything heals, and the run must go on and be finished with
+everybody back. A failing seed is one command. Neighbours: `faults` (the kinds), `laws`, `system` (what is disturbed).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Final, TypeVar
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from typing import Final
 
+from foosim.client.core import ClientCore, Outgoing
+from foosim.node.core import NodeCore
 from foosim.protocol import channels
-from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.draws import draw_key, draw_words, unit_interval
-from foosim.protocol.messages import Commit, Deliveries, Epoch, Part
+from foosim.protocol.errors import Refused
+from foosim.protocol.frame import Frame
+from foosim.protocol.names import CHANNEL_ECHO
 from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import CALM, Traced, Weather
-from foosim.rehearsal.hub_journal import ENDINGS
+from foosim.rehearsal.clock import Clock
+from foosim.rehearsal.faults import (
+    CHANGES_THE_WORLD,
+    FAULT_OF,
+    HEALED_TICK,
+    HOUR_NS,
+    KINDS,
+    MS,
+    ONCE,
+    TICKS,
+    Dice,
+    Fault,
+    ask,
+    revive,
+)
+from foosim.rehearsal.laws import Laws
+from foosim.rehearsal.packet_laws import Broken, hold
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
-from foosim.supervisor.records import CommitRecord
-from foosim.supervisor.records import Record as SupervisorRecord
-from foosim.vhub.records import Closing, HubRecord, TickRecord
 
-TICKS: Final = 320
-HEALED_TICK: Final = 240
-"""From here on nothing new happens, and what is down comes up."""
 FAULTS: Final = (8, 20)
-NODES: Final = (3, 6)
-PATIENT: Final = ("deadlines.tick_lost=5 s", "deadlines.lockstep_fast=1 h", "deadlines.client_back=1 h")
+NODES: Final = (3, 3, 3, 4, 4, 5)
+HEALED_PACE: Final = "0.02x"
+"""100 ms a tick: slow enough that all are back before the end."""
+PROGRESS_NS: Final = 10_000_000_000
+"""When all is healed the next tick is committed within this virtual time."""
+IDLE_NS: Final = 60_000_000_000
+"""Before, with all that goes on, within this."""
+WORLDS: Final = 4
+"""How many worlds there are: seeds differ in what happens to the processes, and take the next of these in turn."""
+PROBER: Final = "prober"
+SMALL: Final = (
+    "engine=pure",
+    "substeps=1",
+    "table.rules.kickoff_delay=20 ms",
+    f"clients={{{PROBER}: {{lockstep: true, rate: 50 Hz}}}}",
+)
+"""What is computed is the same, with fewer steps to it; the ball rolls from the start, and robots are asked for echoes.
+"""
+PATIENT: Final = (
+    "deadlines.tick_lost=5 s",
+    "deadlines.lockstep_fast=24 h",
+    "deadlines.lockstep_realtime=24 h",
+    "deadlines.client_back=24 h",
+)
 """A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
-MS: Final = 1_000_000
 RESTART_NS: Final = 500 * MS
-
-T = TypeVar("T")
-
-
-class Broken(AssertionError):
-    """A law does not hold."""
-
-
-class Dice:
-    """Numbers of one seed, in order: a function of seed and count alone."""
-
-    def __init__(self, seed: int) -> None:
-        self._key = draw_key(seed, "swarm")
-        self._count = 0
-
-    def unit(self) -> float:
-        """Return a number in [0, 1)."""
-        self._count += 1
-        return unit_interval(draw_words(self._key, self._count)[0])
-
-    def between(self, low: int, high: int) -> int:
-        """Return a whole number from `low` to `high`."""
-        return low + int(self.unit() * (high - low + 1))
-
-    def one_of(self, choices: Sequence[T]) -> T:
-        """Return one of them."""
-        return choices[self.between(0, len(choices) - 1)]
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """Something that happens when frame `tick` is committed."""
-
-    tick: int
-    kind: str
-    what: str
-    do: Callable[[System], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,238 +79,96 @@ class Plan:
     nodes: int
     weather: Weather
     faults: tuple[Fault, ...]
+    clocks: tuple[tuple[str, Clock], ...]
+    ticks: int = TICKS
+
+    @property
+    def healed_tick(self) -> int:
+        return self.ticks - TICKS + HEALED_TICK
+
+    @property
+    def kinds(self) -> list[str]:
+        return sorted({fault.kind for fault in self.faults})
 
 
-def plan_of(seed: int) -> Plan:
-    """Return the plan of a seed: nodes, weather, and from 8 to 20 faults, of three kinds at least."""
+def plan_of(seed: int, ticks: int = TICKS) -> Plan:
+    """Return the plan of a seed: nodes, clocks, weather, and from 8 to 20 faults, of three kinds at least.
+
+    A longer run has as many more of them.
+    """
     dice = Dice(seed)
-    nodes = dice.between(*NODES)
+    nodes = dice.one_of(NODES)
     names = [f"n{number}" for number in range(1, nodes + 1)]
     bad = dice.unit() < 0.7
     weather = Weather(
         seed,
-        delay_ns=dice.between(0, 2 * MS) if bad else 0,
-        spread_ns=dice.between(0, 5 * MS) if bad else 0,
+        delay_ns=dice.between(0, MS) if bad else 0,
+        spread_ns=dice.between(0, 3 * MS) if bad else 0,
         loss=dice.one_of((0.0, 0.02, 0.1)) if bad else 0.0,
         repeat=dice.one_of((0.0, 0.05, 0.3)) if bad else 0.0,
     )
-    count = dice.between(*FAULTS)
-    chosen = [dice.one_of(KINDS) for _ in range(count)]
-    chosen[:3] = KINDS[seed % len(KINDS) :][:3] if seed % len(KINDS) <= len(KINDS) - 3 else KINDS[:3]
-    faults = [FAULT_OF[kind](dice, names) for kind in chosen]
-    return Plan(seed, nodes, weather, tuple(sorted(faults, key=lambda fault: fault.tick)))
+    chosen = [KINDS[(seed + place) % len(KINDS)] for place in range(3)]
+    times = max(1, ticks // TICKS)
+    chosen += [dice.one_of(KINDS) for _ in range(dice.between(*FAULTS) * times - len(chosen))]
+    once = [kind for place, kind in enumerate(chosen) if kind not in ONCE or kind not in chosen[:place]]
+    late = max(0, ticks - TICKS)
+    faults = [_later(FAULT_OF[kind](dice, names), dice.between(0, late) if late else 0) for kind in once]
+    faults.sort(key=lambda fault: fault.tick)
+    here = (*names, channels.SUPERVISOR, channels.VHUB, PROBER)
+    clocks = tuple((name, Clock(dice.between(0, 2 * HOUR_NS), dice.between(-1000, 1000))) for name in here)
+    return Plan(seed, nodes, weather, tuple(faults), clocks, ticks)
 
 
-# --- the faults ------------------------------------------------------------------------------------------------------
+def _later(fault: Fault, ticks: int) -> Fault:
+    return replace(fault, tick=fault.tick + ticks)
 
 
-def _tick(dice: Dice) -> int:
-    return dice.between(5, HEALED_TICK - 10)
+class Prober:
+    """A lockstep client that asks robots for echoes, each with a number of its own, and counts what comes back."""
 
+    ROBOTS: Final = ("blue.goal", "camera", "red.midfield")
 
-def _here(name: str, do: Callable[[System], object]) -> Callable[[System], object]:
-    """Return what is done to a process only while it is there."""
-    return lambda system: do(system) if name in system.processes else None
+    def __init__(self, core: ClientCore) -> None:
+        self._core = core
+        self._joined = False
+        self._sent = 0
+        self._back: set[bytes] = set()
 
-
-def _kill(dice: Dice, names: Sequence[str]) -> Fault:
-    name, back = dice.one_of(names), dice.between(1, 40)
-
-    def do(system: System) -> None:
-        system.kill(name)
-        system.at_tick(system.supervisor.frame.tick + back, partial(_revive, system, name))
-        if not any(other in system.processes for other in names):
-            system.start(name)  # no further tick would be committed
-
-    return Fault(_tick(dice), "kill", f"kill {name}", _here(name, do))
-
-
-def _revive(system: System, name: str) -> None:
-    if name not in system.processes:
-        system.start(name)
-
-
-def _pause(dice: Dice, names: Sequence[str]) -> Fault:
-    name, for_ms = dice.one_of(names), dice.one_of((30, 300, 1_500, 3_000))
-    return Fault(
-        _tick(dice),
-        "pause",
-        f"pause {name} for {for_ms} ms",
-        _here(name, lambda system: system.pause(name, for_ms * MS)),
-    )
-
-
-def _cut(dice: Dice, names: Sequence[str]) -> Fault:
-    name, for_ms = dice.one_of(names), dice.one_of((30, 300, 1_500, 3_000))
-    return Fault(
-        _tick(dice),
-        "cut",
-        f"cut {name} off for {for_ms} ms",
-        lambda system: system.bus.cut_off(name, system.bus.now_ns + for_ms * MS),
-    )
-
-
-def _slow(dice: Dice, names: Sequence[str]) -> Fault:
-    name, slow_ns = dice.one_of([*names, channels.VHUB]), dice.between(0, 20 * MS)
-
-    def do(system: System) -> None:
-        system.processes[name].slow_ns = slow_ns
-
-    return Fault(_tick(dice), "slow", f"{name} takes {slow_ns / MS:.1f} ms a turn", _here(name, do))
-
-
-def _move(dice: Dice, names: Sequence[str]) -> Fault:
-    robot, node = dice.one_of(("red.goal", "red.attack", "blue.defence", "camera")), dice.one_of(names)
-    request = partial(System.request, verb="move", robot=robot, node=node)
-    return Fault(_tick(dice), "move", f"move {robot} to {node}", request)
-
-
-def _stop(dice: Dice, names: Sequence[str]) -> Fault:
-    node = dice.one_of(names)
-
-    def do(system: System) -> None:
-        system.request("stop", node=node)
-        tick = system.supervisor.frame.tick
-        system.at_tick(tick + 10, partial(_here(node, lambda found: found.kill(node)), system))
-        system.at_tick(tick + 15, partial(system.request, "start", node=node))
-        system.at_tick(tick + 20, partial(_revive, system, node))
-
-    return Fault(_tick(dice), "stop", f"stop {node}", do)
-
-
-def _add(dice: Dice, names: Sequence[str]) -> Fault:
-    x, y, name = dice.unit() - 0.5, 0.5 * (dice.unit() - 0.5), f"b{dice.between(2, 4)}"
-    verb = dice.one_of(("add", "add", "remove"))
-    arguments = {"name": name, "position": [x, y, 0.05]} if verb == "add" else {"name": name}
-    return Fault(_tick(dice), "add", f"{verb} {name}", partial(System.request, verb=verb, **arguments))
-
-
-def _vhub(dice: Dice, names: Sequence[str]) -> Fault:
-    ending, back_ms = dice.one_of(ENDINGS), dice.one_of((1, 40, 400, 2_000))
-    kill = partial(System.kill_hub, ending=ending, back_ns=back_ms * MS)
-    return Fault(_tick(dice), "vhub", f"kill the vHub ({ending}), back after {back_ms} ms", kill)
-
-
-def _push(dice: Dice, names: Sequence[str]) -> Fault:
-    impulse = [0.04 * (dice.unit() - 0.5) for _ in range(3)]
-    return Fault(_tick(dice), "push", "push the ball", partial(System.request, verb="push", impulse=impulse))
-
-
-def _supervisor(dice: Dice, names: Sequence[str]) -> Fault:
-    amid, down_ms = dice.between(0, 3), dice.one_of((0, 1, 30, 600))
-
-    def do(system: System) -> None:
-        if channels.SUPERVISOR not in system.processes or system.is_dying(channels.SUPERVISOR):
+    def step(self, now_ns: int) -> None:
+        """Join, and answer each Go with a question."""
+        core = self._core
+        if core.deployment is None or core.ended:
             return
-        system.end_amid(channels.SUPERVISOR, amid)
-        system.later(down_ms * MS, partial(_revive_supervisor, system, down_ms))
-
-    return Fault(_tick(dice), "supervisor", f"end the supervisor, {amid} actions into a turn, for {down_ms} ms", do)
-
-
-def _revive_supervisor(system: System, down_ms: int) -> None:
-    """Start the supervisor when it has ended; it has not while it had nothing to do since."""
-    if channels.SUPERVISOR in system.processes:
-        system.later((down_ms + 1) * MS, partial(_revive_supervisor, system, down_ms))
-    else:
-        system.start(channels.SUPERVISOR)
-
-
-FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
-    "kill": _kill,
-    "pause": _pause,
-    "move": _move,
-    "cut": _cut,
-    "add": _add,
-    "stop": _stop,
-    "slow": _slow,
-    "push": _push,
-    "supervisor": _supervisor,
-    "vhub": _vhub,
-}
-KINDS: Final = list(FAULT_OF)
+        if not self._joined:
+            self._joined = True
+            rate_hz = core.deployment.clients[PROBER].rate_hz
+            assert rate_hz is not None
+            core.join(core.deployment.ticks(rate_hz), [(robot, CHANNEL_ECHO) for robot in self.ROBOTS])
+        if core.go is not None:
+            for packet in core.go.packets:
+                if packet.payload in self._back:
+                    raise Broken(f"echo {packet.payload.decode()} comes back twice")
+                self._back.add(packet.payload)
+            robot = self.ROBOTS[self._sent % len(self.ROBOTS)]
+            self._sent += 1
+            core.done([Outgoing(robot, CHANNEL_ECHO, f"{robot} {self._sent}".encode())])
 
 
-# --- the laws --------------------------------------------------------------------------------------------------------
+class WatchedNode(NodeCore):
+    """A node that lets the laws see from what it makes its frames."""
 
+    def _enter(self, frame: Frame, now_ns: int) -> None:
+        if self._barrier is not None:
+            old = [part.node for part in self._barrier.parts.values() if part.epoch != self.epoch]
+            hold(not old, f"{self.name} takes parts of {old} from another epoch than {self.epoch}")
+        super()._enter(frame, now_ns)
 
-class Laws:
-    """Watches a run; raises Broken at the first thing that must not be."""
-
-    def __init__(self, replica: Replica) -> None:
-        self.ticks = 0
-        self._replica = replica
-        self._epoch = self._committed = 0
-        self._solved: dict[tuple[int, int], dict[str, list[int]]] = {}
-        self._written: dict[str, set[bytes]] = {channels.SUPERVISOR: set(), channels.VHUB: set()}
-        self._closed = -1
-        self._delivered: dict[int, bytes] = {}
-        self._final = 0
-        """The last tick whose deliveries were said, also together with earlier ones."""
-
-    def see(self, traced: Traced) -> None:
-        """Look at one thing that a process did."""
-        if traced.what == "journal":
-            self._journalled(traced)
-        elif traced.what == "publish":
-            self._said(traced)
-
-    def _journalled(self, traced: Traced) -> None:
-        if traced.process == channels.VHUB:
-            record = decode_any(HubRecord, traced.payload)
-            if isinstance(record, TickRecord):
-                _hold(record.tick == self._closed + 1, f"the vHub closes tick {record.tick} after {self._closed}")
-                self._closed = record.tick
-            return
-        record = decode_any(SupervisorRecord, traced.payload)
-        if isinstance(record, CommitRecord):
-            self._committed_one(decode(Commit, record.commit))
-            self._written[channels.SUPERVISOR].add(record.commit)
-        elif isinstance(record, Epoch):
-            _hold(record.epoch == self._epoch + 1, f"epoch {record.epoch} after {self._epoch}")
-            _hold(record.tick == self._committed, f"epoch {record.epoch} does not start at the last commit")
-            self._epoch = record.epoch
-        self._written[channels.SUPERVISOR].add(traced.payload)
-
-    def _committed_one(self, commit: Commit) -> None:
-        if commit.tick > 0:
-            _hold(commit.tick == self._committed + 1, f"commit {commit.tick} after {self._committed}")
-            self._committed = commit.tick
-            solved = sorted(index for each in self._solved.pop((commit.epoch, commit.tick)).values() for index in each)
-            _hold(solved == list(range(len(solved))), f"tick {commit.tick}: entities {solved} are solved")
-
-    def _said(self, traced: Traced) -> None:
-        if traced.channel == channels.PART.name:
-            part = decode(Part, traced.payload)
-            self._solved.setdefault((part.epoch, part.tick), {}).setdefault(part.node, part.solved)
-        elif traced.channel in (channels.COMMIT.name, channels.EPOCH.name):
-            written = traced.payload in self._written[channels.SUPERVISOR]
-            _hold(written, f"{traced.channel} is said before it is written")
-        elif traced.channel == channels.DELIVERIES.name:
-            deliveries = decode(Deliveries, traced.payload)
-            tick = deliveries.tick
-            known = tick - 1 <= self._closed or tick <= self._final
-            _hold(known, f"deliveries {tick} are said before tick {tick - 1} is written")
-            self._final = max(self._final, deliveries.last)
-            said = self._delivered.setdefault(tick, traced.payload)
-            _hold(said == traced.payload, f"deliveries {tick} are said again, and are others")
-
-    def close(self, closing: Closing) -> None:
-        """Compute the tick again from what led to it: the frame must be the same to the last bit."""
-        frame = closing.frame
-        if frame.tick != self._replica.frame.tick + 1:
-            return  # frame 0, or the last one of a run that ended before all was closed
-        again = self._replica.step(closing.edits, closing.delivered)
-        _hold(again.digest == closing.digest, f"frame {frame.tick} is another one than its orders and deliveries give")
-        self.ticks = frame.tick
-
-
-def _hold(law: bool, what: str) -> None:
-    if not law:
-        raise Broken(what)
-
-
-# --- one seed --------------------------------------------------------------------------------------------------------
+    def _resume(self, frame: Frame, now_ns: int) -> None:
+        epoch = self._awaited_epoch
+        if epoch is not None:
+            fits = frame.tick == epoch.tick and frame.digest == epoch.digest
+            hold(fits, f"{self.name} begins epoch {epoch.epoch} from another frame than its own")
+        super()._resume(frame, now_ns)
 
 
 @dataclass(slots=True)
@@ -327,56 +180,124 @@ class Flown:
     kinds: list[str]
     faults: list[str]
     ticks: int = 0
+    epochs: int = 0
     losses: int = 0
     joins: int = 0
+    restarts: int = 0
+    seen: int = 0
+    """Things that were written or said, each of them checked."""
+    virtual_s: float = 0.0
     broken: str = ""
     chain: str = ""
+    packets: dict[str, int] = field(default_factory=dict)
 
 
-def fly(text: str, name: str, seed: int, settings: Settings | None = None) -> Flown:
-    """Rehearse a deployment under the faults of a seed, on the pure engine. `settings` may plant faulty cores."""
-    plan = plan_of(seed)
-    text = with_nodes(text, name, plan.nodes, [f"seed={seed}", "engine=pure", *PATIENT])
-    alone = with_nodes(text, name, 1, ["players={}"])
-    replica = Replica(alone, name, load_deployment(alone, name))
-    laws = Laws(replica)
-    chosen = replace(
-        settings or Settings(),
-        weather=plan.weather,
-        restart_ns=RESTART_NS,
-        keeps_journals=True,
-        observer=laws.see,
-        on_closing=laws.close,
-    )
-    system = System(RunSettings(f"swarm-{seed}", name, text, Pace("fast"), TICKS), chosen)
-    for fault in plan.faults:
-        system.at_tick(fault.tick, partial(fault.do, system))
-    system.at_tick(HEALED_TICK, partial(_heal, system, plan.nodes))
-    flown = Flown(
-        seed, plan.nodes, sorted({f.kind for f in plan.faults}), [f"tick {f.tick}: {f.what}" for f in plan.faults]
-    )
+@lru_cache(maxsize=4 * WORLDS)
+def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
+    """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
+    text = with_nodes(text, name, nodes, [f"seed={seed}", *SMALL, *PATIENT])
+    return text, with_nodes(text, name, 1, ["players={}", "clients={}"])
+
+
+class Flight:
+    """One seed under way: the system, the laws that watch it, and its healing."""
+
+    def __init__(self, text: str, name: str, plan: Plan, settings: Settings) -> None:
+        text, alone = worlds(text, name, plan.nodes, plan.seed % WORLDS)
+        self.plan = plan
+        self.seen = 0
+        self._healed_ns = -1
+        self._last_commit_ns = 0
+        self._replica = Replica(alone, name, load_deployment(alone, name))
+        self.laws = Laws(self._replica, load_deployment(text, name))
+        chosen = replace(
+            settings,
+            node=WatchedNode if settings.node is NodeCore else settings.node,
+            weather=plan.weather,
+            clocks=dict(plan.clocks),
+            clients={PROBER: lambda core: Prober(core).step},
+            restart_ns=RESTART_NS,
+            keeps_journals=True,
+            observer=self._see,
+            observes=("journal", "publish"),
+            on_closing=self.laws.close,
+            on_commit=self._committed,
+        )
+        self.system = System(RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), plan.ticks), chosen)
+        self.laws.flipped = self.system.flipped
+        for fault in plan.faults:
+            self.system.at_tick(fault.tick, partial(fault.do, self.system))
+        self.system.at_tick(plan.healed_tick, self._heal)
+
+    def run(self) -> None:
+        """Run to the end; raise Broken for a law that does not hold, or what a core asserts."""
+        try:
+            self.system.run()
+            end = self.system.supervisor.end
+            if end is None or end.reason != "done":
+                raise Broken(f"the run ended: {'not at all' if end is None else end.reason}")
+            self.laws.end(self.system, self.plan.nodes)
+        finally:
+            self.system.close()
+            self._replica.close()
+
+    def _see(self, traced: Traced) -> None:
+        self.seen += 1
+        idle_ns = traced.now_ns - self._last_commit_ns
+        if idle_ns > (IDLE_NS if self._healed_ns < 0 else PROGRESS_NS):
+            raise Broken(f"{'healed, ' * (self._healed_ns >= 0)}no tick is committed for {idle_ns / 1e9:.0f} s")
+        self.laws.see(traced)
+        if traced.what == "journal" and traced.process == channels.VHUB and self.system.hub.state is not None:
+            self.laws.packets.account(self.system.hub.state)
+
+    def _committed(self, _: Frame) -> None:
+        self._last_commit_ns = self.system.bus.now_ns
+
+    def _heal(self) -> None:
+        """Fine weather from now on: who is down comes up, who is slow is quick, who stood still goes on."""
+        system = self.system
+        self._healed_ns = self._last_commit_ns = system.bus.now_ns
+        system.healed = True
+        system.bus.heal()
+        ask(system, "rate", pace=HEALED_PACE)
+        for name, process in list(system.processes.items()):
+            process.slow_ns = 0
+            system.resume(name)
+        for number in range(1, self.plan.nodes + 1):
+            ask(system, "start", node=f"n{number}")
+            revive(system, f"n{number}")
+
+
+@lru_cache(maxsize=4 * WORLDS)
+def undisturbed(text: str, name: str, world: int, ticks: int) -> bytes:
+    """Return the chain of a world in which nothing happens."""
+    flight = Flight(text, name, Plan(world, NODES[0], CALM, (), (), ticks), Settings())
+    flight.run()
+    return flight.system.supervisor.chain
+
+
+def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks: int = TICKS) -> Flown:
+    """Rehearse a deployment under the faults of a seed, on the pure engine. `settings` may plant faulty cores.
+
+    Where no fault changes the world, it has to be that of the run in which nothing happened (law 3).
+    """
+    plan = plan_of(seed, ticks)
+    flown = Flown(seed, plan.nodes, plan.kinds, [f"tick {fault.tick}: {fault.what}" for fault in plan.faults])
+    flight = Flight(text, name, plan, settings or Settings())
     try:
-        system.run()
-    except AssertionError as error:
-        flown.broken = f"{type(error).__name__}: {error}"
-    finally:
-        system.close()
-        replica.close()
-    told = system.supervisor.recovery.recovered
-    flown.ticks, flown.chain = laws.ticks, system.supervisor.chain.hex()
+        flight.run()
+        if not CHANGES_THE_WORLD & {*plan.kinds}:
+            same = flight.system.supervisor.chain == undisturbed(text, name, seed % WORLDS, ticks)
+            hold(same, "the world is not the one that would have been")
+    except (AssertionError, Refused, ArithmeticError, LookupError, TypeError, ValueError) as error:
+        flown.broken = f"{type(error).__name__}: {error}"  # what a core raises would have ended its process
+    system, told = flight.system, flight.system.supervisor.recovery.recovered
+    flown.ticks, flown.chain, flown.seen = flight.laws.ticks, system.supervisor.chain.hex(), flight.seen
+    flown.epochs, flown.virtual_s = flight.laws.epoch, system.bus.now_ns / 1e9
     flown.losses = sum(entry.what == "node" for entry in told)
     flown.joins = sum(entry.what == "join" for entry in told)
-    end = system.supervisor.end
-    if not flown.broken and (end is None or end.reason != "done"):
-        flown.broken = f"the run ended: {'not at all' if end is None else end.reason}"
+    flown.restarts = sum(entry.what == channels.SUPERVISOR for entry in told)
+    if system.hub.state is not None:
+        packets = system.hub.state.packets
+        flown.packets = {"offered": packets.offered, "delivered": packets.delivered, "dropped": packets.dropped}
     return flown
-
-
-def _heal(system: System, nodes: int) -> None:
-    """Fine weather from now on: who is down comes up, who is slow is quick."""
-    system.bus.weather = CALM
-    for process in system.processes.values():
-        process.slow_ns = 0
-    for number in range(1, nodes + 1):
-        system.request("start", node=f"n{number}")
-        _revive(system, f"n{number}")

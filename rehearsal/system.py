@@ -7,82 +7,42 @@ the virtual clock (`slow_ns`), may have its engines rebuilt, may be asked someth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import replace
 from heapq import heappop, heappush
 from typing import Any, Final
 
 from foosim.client.core import ClientCore
 from foosim.client.player import PlayerLoop, load_player
-from foosim.node.core import NodeCore
-from foosim.node.engines.interface import EngineFactory
 from foosim.node.solver import Solver
-from foosim.protocol import channels
+from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Answer, Epoch, Request
-from foosim.rehearsal.bus import CALM, Bus, Observer, Traced, Weather
+from foosim.protocol.messages import Answer, Request
+from foosim.rehearsal.bus import Bus, Message, Traced
+from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.hub_journal import Ending, HubJournal
-from foosim.supervisor.core import SupervisorCore
+from foosim.rehearsal.settings import Process, Settings
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
-from foosim.vhub.records import Closing
+
+__all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
 
 OPERATOR: Final = "operator"
+NEVER_NS: Final = limits.COUNTER_MAX
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
-
-
 HUB_BACK_NS: Final = 300_000_000
 """After how long a vHub that ended is there again, as a launcher starts it."""
 
 
 class Stuck(AssertionError):
     """No commit for too long on the virtual clock."""
-
-
-@dataclass(slots=True)
-class Process:
-    """One process of the rehearsal: its core, and what a shell would know."""
-
-    name: str
-    core: Any
-    turn: Callable[[int], None]
-    slow_ns: int = 0
-    """Virtual time that each of its turns takes which says something."""
-    busy_until_ns: int = 0
-    took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
-    """Told how long its turns took, as a shell tells."""
-
-
-@dataclass(slots=True)
-class Settings:
-    """How to rehearse: everything beside the deployment. `slow_ns` is by process name."""
-
-    run: str = "rehearsal"
-    ticks: int = 0
-    weather: Weather = CALM
-    slow_ns: Mapping[str, int] = field(default_factory=dict)
-    factory: EngineFactory | None = None
-    hub: type[HubCore] = HubCore
-    supervisor: type[SupervisorCore] = SupervisorCore
-    node: type[NodeCore] = NodeCore
-    """The cores' classes: tests plant faults by subclasses."""
-    keeps_journals: bool = False
-    """Whether the supervisor's journal is kept, so that it can be started again."""
-    restart_ns: int = 0
-    """Virtual time after which a node that was refused is started again, as a launcher does; 0: it is not."""
-    observer: Observer | None = None
-    on_commit: Callable[[Frame], None] | None = None
-    on_closing: Callable[[Closing], None] | None = None
-    on_epoch: Callable[[Epoch], None] | None = None
-    on_say: Callable[[str, str, str], None] | None = None
-    on_journal: Callable[[str, bytes], None] | None = None
 
 
 class System:
@@ -95,6 +55,13 @@ class System:
         self.solvers: dict[str, Solver] = {}
         self.players: dict[str, PlayerLoop] = {}
         self.answers: dict[str, Answer] = {}
+        self.healed = False
+        """Whether a test has said that nothing new is to happen."""
+        self.flipped: set[str] = set()
+        """Nodes whose memory a test has changed."""
+        self.asked: list[str] = []
+        """Ids of what was requested."""
+        self._traces_receive = rehearsal.observer is not None and "receive" in rehearsal.observes
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
@@ -104,46 +71,41 @@ class System:
         self._dying: dict[str, int] = {}
         """Processes that end amid their next actions: how many of these they still perform."""
         self._boots = 0
+        self._soonest_ns = self._last_commit_ns = 0
+        """No process is woken before the first, as far as is known without looking at each."""
+        self._clocks = {name: replace(clock) for name, clock in rehearsal.clocks.items()}
+        self._behind: dict[str, Process] = {}
+        """Processes with something in their inbox."""
         self._run = settings
         self._journal: list[bytes] = []
         """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
-        self.supervisor = rehearsal.supervisor(settings, fingerprint, 0)
-        self.hub_journal = HubJournal()
-        self.hub: HubCore
+        self.supervisor = rehearsal.supervisor(settings, fingerprint, self._clock(channels.SUPERVISOR).at(0))
         deployment = self.supervisor.deployment
         self._enter_supervisor()
+        self.hub_journal = HubJournal()
+        self.hub: HubCore
         self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
-        for name, player in sorted(deployment.players.items()):
-            assert player.lockstep, "a rehearsal has lockstep players only"
-            core = ClientCore(name, "boot", 0)
-            loop = self.players[name] = PlayerLoop(core, load_player)
-            self._enter(name, core, loop.step, channels.CLIENT_READS)
+        self._enter_clients()
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
-        self._last_commit_ns = 0
         self._hub_back_ns = HUB_BACK_NS
 
     def _enter(
         self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
     ) -> None:
         self.bus.subscribe(name, reads)
-        self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
+        process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
+        process.clock = self._clock(name)
+        process.wake_ns = self._soonest_ns = self.bus.now_ns
 
-    def _enter_hub(self, fingerprint: bytes) -> None:
-        """Let a vHub in, which goes on from the journal of the one before."""
-        self._boots += 1
-        hub = self.hub = self.settings.hub(f"boot-{self._boots}", fingerprint, self.bus.now_ns)
+    def _clock(self, name: str) -> Clock:
+        return self._clocks.setdefault(name, Clock())
 
-        def turn(now_ns: int) -> None:
-            build = hub.member.build
-            if build is not None and hub.state is None:
-                hub.begin(self.hub_journal.past(hub, build.run), now_ns)
-            hub.advance(now_ns)
-
-        self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
-        self.processes[channels.VHUB].took = hub.waits.took
+    def _now_of(self, name: str) -> int:
+        """Return what a process's clock shows now."""
+        return self._clock(name).at(self.bus.now_ns)
 
     def _enter_supervisor(self) -> None:
         core = self.supervisor
@@ -151,9 +113,35 @@ class System:
         self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
         self.processes[channels.SUPERVISOR].took = core.watch.took
 
+    def _enter_hub(self, fingerprint: bytes) -> None:
+        """Let a vHub in, which goes on from the journal of the one before."""
+        self._boots += 1
+        hub = self.hub = self.settings.hub(f"boot-{self._boots}", fingerprint, self._now_of(channels.VHUB))
+
+        def turn(now_ns: int) -> None:
+            build = hub.member.build
+            if build is not None and hub.state is None:
+                hub.begin(self.hub_journal.past(hub, build.run), now_ns)
+            hub.advance(now_ns)
+            if hub.member.refusal and self.settings.restart_ns and self.hub is hub:
+                self._next.append(lambda: self._hub_again(hub))
+
+        self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
+        self.processes[channels.VHUB].took = hub.waits.took
+
+    def _enter_clients(self) -> None:
+        for name, player in sorted(self.supervisor.deployment.players.items()):
+            assert player.lockstep, "a rehearsal has lockstep players only"
+            core = ClientCore(name, "boot", self._now_of(name))
+            loop = self.players[name] = PlayerLoop(core, load_player)
+            self._enter(name, core, loop.step, channels.CLIENT_READS)
+        for name, client in sorted(self.settings.clients.items()):
+            core = ClientCore(name, "boot", self._now_of(name))
+            self._enter(name, core, client(core), channels.CLIENT_READS)
+
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
-        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.bus.now_ns)
+        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self._now_of(name))
         solver = self.solvers[name] = Solver(core, self.settings.factory)
 
         def turn(now_ns: int) -> None:
@@ -172,83 +160,111 @@ class System:
     def run(self) -> None:
         """Run until the supervisor has finished."""
         bus = self.bus
-        self._wake_all()
+        self._wake_due()
         while not self.supervisor.finished:
             while self._next:
                 self._next.pop(0)()
             arrival_ns = bus.next_ns()
-            if arrival_ns is not None and arrival_ns <= bus.now_ns:
-                self._deliver()
-                continue
-            deadline_ns = self._deadline_ns()
-            if self._timers and self._timers[0][0] <= min(deadline_ns, arrival_ns or deadline_ns):
+            free_ns = min([process.busy_until_ns for process in self._behind.values()]) if self._behind else NEVER_NS
+            if self._timers and self._timers[0][0] <= min(free_ns, arrival_ns, self._soonest_ns):
                 self._go_off()
-                continue
-            if arrival_ns is not None and arrival_ns <= deadline_ns:
-                bus.now_ns = arrival_ns
+            elif free_ns <= arrival_ns and free_ns <= self._soonest_ns:
+                bus.now_ns = max(bus.now_ns, free_ns)
+                self._catch_up()
+            elif arrival_ns <= self._soonest_ns:
+                bus.now_ns = max(bus.now_ns, arrival_ns)
                 self._deliver()
-                continue
-            bus.now_ns = max(bus.now_ns, deadline_ns)
-            self._wake_all()
-            self._check_deadlines()
-            if bus.now_ns - self._last_commit_ns > IDLE_NS_MAX and not self.supervisor.pacer.paused:
-                raise Stuck(self._where())
+            elif self._is_soonest_known():
+                bus.now_ns = max(bus.now_ns, self._soonest_ns)
+                self._wake_due()
+                if bus.now_ns - self._last_commit_ns > IDLE_NS_MAX and not self.supervisor.pacer.paused:
+                    raise Stuck(self._where())
 
     def close(self) -> None:
         """Free the engines."""
         for solver in self.solvers.values():
             solver.close()
 
+    def _is_soonest_known(self) -> bool:
+        """Look when the next process is to be woken; False when it is later than was thought."""
+        soonest_ns = min([process.wake_ns for process in self.processes.values()])
+        known, self._soonest_ns = soonest_ns == self._soonest_ns, soonest_ns
+        return known
+
     def _deliver(self) -> None:
+        """Hand the next message of the bus to its receiver, or put it behind what waits there already."""
         message = self.bus.pop()
-        _, _, receiver, channel, name, payload = message
-        process = self.processes.get(receiver)
-        now_ns = self.bus.now_ns
+        process = self.processes.get(message[2])
         if process is None:
-            if receiver == OPERATOR:
-                self._answered(payload)
-            return
-        if process.busy_until_ns > now_ns:
-            self.bus.hold(message, process.busy_until_ns)
-            return
-        self._trace(now_ns, process, "receive", channel.name, payload)
+            if message[2] == OPERATOR:
+                self._answered(message[5])
+        elif process.inbox or process.busy_until_ns > self.bus.now_ns:
+            process.inbox.append(message)
+            self._behind[process.name] = process
+        else:
+            self._hand(process, message)
+
+    def _catch_up(self) -> None:
+        """Hand the oldest message that waits to a process that is free again."""
+        process = min(self._behind.values(), key=lambda process: process.busy_until_ns)
+        message = process.inbox.popleft()
+        if not process.inbox:
+            self._behind.pop(process.name)
+        self._hand(process, message)
+
+    def _hand(self, process: Process, message: Message) -> None:
+        """Let a process take one message and do what follows from it."""
+        _, _, _, channel, name, payload = message
+        if self._traces_receive:
+            self._trace(self.bus.now_ns, process, "receive", channel.name, payload, name)
+        now_ns = process.clock.at(self.bus.now_ns)
         process.core.receive(channel, name, payload, now_ns)
         process.turn(now_ns)
-        if process.slow_ns and self._core_deadline_ns(process) <= now_ns:  # no backlog keeps it from its heartbeat
+        if (
+            process.slow_ns and self._core_deadline_ns(process) <= self.bus.now_ns
+        ):  # no backlog keeps it from its heartbeat
             process.core.wake(now_ns)
             process.turn(now_ns)
         self._perform(process)
+        self._plan_wake(process)
 
-    def _wake_all(self) -> None:
+    def _wake_due(self) -> None:
+        """Wake all processes whose time has come."""
         now_ns = self.bus.now_ns
         for process in list(self.processes.values()):
-            if process.busy_until_ns <= now_ns:
+            if max(process.wake_ns, process.busy_until_ns) <= now_ns:
                 self._wake(process)
 
     def _wake(self, process: Process) -> None:
-        process.core.wake(self.bus.now_ns)
-        process.turn(self.bus.now_ns)
+        now_ns = process.clock.at(self.bus.now_ns)
+        process.core.wake(now_ns)
+        process.turn(now_ns)
         self._perform(process)
+        process.wake_ns = NEVER_NS
+        self._plan_wake(process)
+        assert process.wake_ns > self.bus.now_ns, f"{process.name} has a deadline that waking did not move"
 
     def _turn(self, process: Process) -> None:
-        process.turn(self.bus.now_ns)
+        process.turn(process.clock.at(self.bus.now_ns))
         self._perform(process)
+        self._plan_wake(process)
 
     def _core_deadline_ns(self, process: Process) -> int:
-        core = process.core
-        deadline: int = core.deadline_ns(self.bus.now_ns) if core is self.supervisor else core.deadline_ns()
-        return deadline
+        """Return when a core has something to do next, in virtual time."""
+        core, clock = process.core, process.clock
+        now_ns = clock.at(self.bus.now_ns)
+        return clock.when(core.deadline_ns(now_ns) if core is self.supervisor else core.deadline_ns())
 
-    def _deadline_of(self, process: Process) -> int:
-        return max(self._core_deadline_ns(process), process.busy_until_ns)
+    def _plan_wake(self, process: Process) -> None:
+        """After a turn: see when the process has something to do by time, as its loop does.
 
-    def _deadline_ns(self) -> int:
-        return min(self._deadline_of(process) for process in self.processes.values())
-
-    def _check_deadlines(self) -> None:
-        """A core that was just woken has its next deadline in the future; else its process would never sleep."""
-        late = [name for name, process in self.processes.items() if self._deadline_of(process) <= self.bus.now_ns]
-        assert not late, f"{late} have deadlines that waking did not move"
+        The supervisor's deadline counts from now: it may come sooner by what happens, and never later.
+        """
+        wake_ns = self._core_deadline_ns(process)
+        if process.core is self.supervisor:
+            wake_ns = min(wake_ns, process.wake_ns)
+        process.wake_ns = max(wake_ns, process.busy_until_ns)
+        self._soonest_ns = min(self._soonest_ns, process.wake_ns)
 
     def _perform(self, process: Process) -> None:
         """Perform what a core asked for, in order."""
@@ -258,12 +274,12 @@ class System:
         left = self._dying.pop(process.name, None)
         if left is not None:
             del actions[left:]
-            self.processes.pop(process.name)
+            self._leave(process.name)
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
             process.busy_until_ns = leaves_ns
-            process.took(self.bus.now_ns, leaves_ns)
+            process.took(process.clock.at(self.bus.now_ns), process.clock.at(leaves_ns))
         for action in actions:
             if self.hub_journal.ending and type(action) is Journal and process.core is self.hub:
                 if self.hub_journal.ending == "unsaid":
@@ -271,7 +287,7 @@ class System:
                 self._end_hub()
                 return
             if type(action) is Publish:
-                self._trace(leaves_ns, process, "publish", action.channel.name, action.payload)
+                self._trace(leaves_ns, process, "publish", action.channel.name, action.payload, action.name)
                 self.bus.put(process.name, action.channel, action.name, action.payload, leaves_ns)
             else:
                 self._keep(leaves_ns, process, action)
@@ -281,7 +297,12 @@ class System:
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             farewell = self.hub.farewell()
             self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
-            self.processes.pop(process.name)
+            self._leave(process.name)
+
+    def _leave(self, name: str) -> None:
+        """A process has ended: what is on its way to it is lost."""
+        self.processes.pop(name)
+        self._behind.pop(name, None)
 
     def _keep(self, now_ns: int, process: Process, action: Any) -> None:
         """Hand what is written or said to those who asked for it."""
@@ -305,9 +326,11 @@ class System:
         elif isinstance(action, Say) and settings.on_say is not None:
             settings.on_say(process.name, action.level, action.text)
 
-    def _trace(self, now_ns: int, process: Process, what: str, channel: str, payload: bytes) -> None:
-        if self.settings.observer is not None:
-            self.settings.observer(Traced(now_ns, process.name, what, channel, payload))
+    def _trace(  # what a Traced has
+        self, now_ns: int, process: Process, what: str, channel: str, payload: bytes, name: str = ""
+    ) -> None:
+        if self.settings.observer is not None and what in self.settings.observes:
+            self.settings.observer(Traced(now_ns, process.name, what, channel, payload, name))
 
     def _tell_commits(self, was_cut: bool) -> None:
         """Tell of the frames that were committed; what a supervisor that ended had not written never was."""
@@ -343,7 +366,7 @@ class System:
 
     def kill(self, name: str) -> None:
         """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
-        self.processes.pop(name)
+        self._leave(name)
         if name == channels.SUPERVISOR:
             return
         self.solvers.pop(name).close()
@@ -364,9 +387,8 @@ class System:
             self._boots += 1
             history = fold(self.supervisor.deployment, self._journal)
             boot = f"boot-{self._boots}"
-            self.supervisor = self.settings.supervisor(
-                self._run, library_fingerprint(), self.bus.now_ns, boot, history=history
-            )
+            now_ns = self._now_of(name)
+            self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)
             self._enter_supervisor()
         else:
             self._enter_node(name, library_fingerprint())
@@ -376,7 +398,7 @@ class System:
         """A process that is refused ends; its launcher starts another one after a while."""
         if self.solvers.get(name) is not refused:
             return
-        self.processes.pop(name)
+        self._leave(name)
         self.solvers.pop(name).close()
         self._enter_node(name, library_fingerprint())
         self.pause(name, self.settings.restart_ns)
@@ -393,39 +415,72 @@ class System:
 
     def _end_hub(self) -> None:
         """What the vHub had not done yet is not done; the others see its connections close."""
-        self.hub_journal.ending = None
-        self.processes.pop(channels.VHUB)
-        self.hub.actions.clear()
-        self.later(self._hub_back_ns, self._start_hub)
+        self._leave_hub()
         self._supervisor_sees_gone(channels.VHUB)
-        for name, loop in self.players.items():
-            loop.core.hub_gone(self.bus.now_ns)
-            self._turn(self.processes[name])
 
     def _supervisor_sees_gone(self, name: str) -> None:
         if channels.SUPERVISOR in self.processes:
-            self.supervisor.process_gone(name, self.bus.now_ns)
+            self.supervisor.process_gone(name, self._now_of(channels.SUPERVISOR))
             self._turn(self.processes[channels.SUPERVISOR])
+
+    def _leave_hub(self) -> None:
+        self.hub_journal.ending = None
+        self._leave(channels.VHUB)
+        self.hub.actions.clear()
+        self.later(self._hub_back_ns, self._start_hub)
+        for client in self._clients():
+            client.core.hub_gone(client.clock.at(self.bus.now_ns))
+            self._turn(client)
+
+    def _hub_again(self, refused: HubCore) -> None:
+        """A vHub that is refused ends, was never present to the supervisor, and is started again after a while."""
+        if self.hub is refused and channels.VHUB in self.processes:
+            self._hub_back_ns = self.settings.restart_ns
+            self._leave_hub()
 
     def _start_hub(self) -> None:
         self._enter_hub(library_fingerprint())
         self._wake(self.processes[channels.VHUB])
-        for name, loop in self.players.items():
-            loop.core.hub_here(self.bus.now_ns)
-            self._wake(self.processes[name])
+        for client in self._clients():
+            client.core.hub_here(client.clock.at(self.bus.now_ns))
+            self._wake(client)
+
+    def _clients(self) -> list[Process]:
+        return [process for process in self.processes.values() if isinstance(process.core, ClientCore)]
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""
         process = self.processes[name]
         process.busy_until_ns = max(process.busy_until_ns, self.bus.now_ns + for_ns)
+        process.wake_ns = max(process.wake_ns, process.busy_until_ns)
 
-    def request(self, verb: str, **arguments: Any) -> str:
-        """Ask the supervisor for something; return the request's id."""
+    def resume(self, name: str) -> None:
+        """Let a process go on that was stopped."""
+        process = self.processes[name]
+        process.busy_until_ns = process.wake_ns = self._soonest_ns = self.bus.now_ns
+
+    def set_forward(self, name: str, by_ns: int) -> None:
+        """Let a process's clock jump, as when its machine slept."""
+        self._clock(name).offset_ns += by_ns
+        process = self.processes.get(name)
+        if process is not None:
+            self._plan_wake(process)
+
+    def request(self, verb: str, *, again_ns: int = 0, **arguments: Any) -> str:
+        """Ask the supervisor for something, every `again_ns` until it answers (0: once); return the request's id."""
         self._requests += 1
         identity = f"request-{self._requests}"
-        request = Request(OPERATOR, identity, verb, encode_json(arguments))
-        self.bus.put(OPERATOR, channels.REQUEST, OPERATOR, encode(request), self.bus.now_ns)
+        self.asked.append(identity)
+        payload = encode(Request(OPERATOR, identity, verb, encode_json(arguments)))
+        self._ask(identity, payload, again_ns)
         return identity
+
+    def _ask(self, identity: str, payload: bytes, again_ns: int) -> None:
+        if identity in self.answers:
+            return
+        self.bus.put(OPERATOR, channels.REQUEST, OPERATOR, payload, self.bus.now_ns)
+        if again_ns:
+            self.later(again_ns, lambda: self._ask(identity, payload, again_ns))
 
     def _answered(self, payload: bytes) -> None:
         answer = decode(Answer, payload)

@@ -278,6 +278,7 @@ class Requests:
         node = _chosen("node", _name(arguments, "node"), core.members)
         tick = core.frame.tick
         if core.owners[robot] == node:
+            core.recovery.moved(robot)
             return self._accept(request, tick, f"{robot} is on {node} already, at tick {tick}")
         owners = {**core.owners, robot: node}
         core.recovery.moved(robot)

@@ -72,6 +72,7 @@ SHELLS = {
     "supervisor/guard.py",
     "supervisor/hosts.py",
     "supervisor/install.py",
+    "supervisor/detach.py",
     "supervisor/doctor.py",
     "supervisor/doctor_command.py",
     "supervisor/journal_room.py",

@@ -211,15 +211,13 @@ def _least(kind: Any) -> Any:
 
 def _least_value(kind: inspect.Type) -> object:
     if isinstance(kind, inspect.UnionType):
-        return _least_value(kind.types[-1])
+        return None  # where a field may be left out
     if isinstance(kind, inspect.IntType):
         return kind.ge
     if isinstance(kind, inspect.StrType):
         return "x" * (kind.min_length or 0)
     if isinstance(kind, inspect.BytesType):
         return bytes(kind.min_length or 0)
-    if isinstance(kind, inspect.UnionType):
-        return None
     return {inspect.FloatType: 0.0, inspect.BoolType: False, inspect.ListType: []}[type(kind)]
 
 

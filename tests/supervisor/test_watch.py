@@ -171,7 +171,7 @@ class _StuckNode(NodeCore):
 def test_a_node_that_stops_answering_is_named_and_then_lost() -> None:
     seen = Seen(sets=DEADLINES, ticks=300)
     seen.settings.node = _StuckNode
-    assert ended(seen.go()) == ("lost n2: tick 60 is overdue by 1.1 s", 60)
+    assert ended(seen.go()) == ("lost n2: tick 60 is overdue by 1.0 s", 60)
     named = [line for line in seen.lines if "waits for" in line]
     assert named == ["tick 60 waits for n2 since 0.6 s"]
 
@@ -199,7 +199,7 @@ def test_who_keeps_the_vhub_waiting_for_samples_is_lost_not_the_vhub() -> None:
     seen = Seen(sets=DEADLINES, ticks=300)
     seen.settings.node = _BlindNode
     reason, tick = ended(seen.go())
-    assert reason == f"lost n2: tick {tick} is overdue by 1.1 s" and 60 <= tick <= 62
+    assert reason == f"lost n2: tick {tick} is overdue by 1.0 s" and 60 <= tick <= 62
 
 
 class _StuckHub(HubCore):
@@ -213,7 +213,7 @@ def test_a_vhub_that_stops_closing_is_named_and_lost() -> None:
     """It says that it lives all the time: that does not bring it back."""
     seen = Seen(sets=(*DEADLINES, "deadlines.vhub_back=5 s"), ticks=300)
     seen.settings.hub = _StuckHub
-    assert ended(seen.go()) == ("lost vhub: tick 61 is overdue by 1.1 s; it did not come back within 5 s", 61)
+    assert ended(seen.go()) == ("lost vhub: tick 61 is overdue by 1.0 s; it did not come back within 5 s", 61)
 
 
 def stopped(process: str, **changes: Any) -> Seen:

@@ -1,0 +1,251 @@
+"""Bugs of the supervisor: epochs, orders, commits, requests, and its start after its end.
+
+Neighbours: `planting`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from bench.mutants.planting import Mutant, Planting, Register
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Journal, Publish
+from foosim.supervisor import core, records, take_over
+from foosim.supervisor.arrivals import Arrivals
+from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.handshake import Handshake
+from foosim.supervisor.pacing import Pacer
+from foosim.supervisor.recovery import Recovery
+from foosim.supervisor.requests import Requests
+from foosim.supervisor.roster import Roster
+
+register = Register()
+
+
+class _AnyBasis(bytes):
+    """Equals every basis."""
+
+    __slots__ = ()
+
+    def __ne__(self, other: object) -> bool:
+        return False
+
+    def __eq__(self, other: object) -> bool:
+        return True
+
+    __hash__ = bytes.__hash__
+
+
+@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 6)
+def _old_epochs(planting: Planting) -> None:
+    def on_part(self: Any, part: Any, payload: bytes, now_ns: int) -> None:
+        self.arrivals.take_part(part, self.frame.tick, self.members)
+
+    planting.swap(SupervisorCore, "_on_part", on_part)
+
+
+@register("supervisor does not compare bases", "a part counts if its basis is the supervisor's", 2)
+def _any_basis(planting: Planting) -> None:
+    before: Any = planting.swap(
+        core, "basis_of", lambda digest, edits, delivered: _AnyBasis(before(digest, edits, delivered))
+    )
+
+
+@register("acknowledgements are counted", "a part counts if its sender is in the roster, once for each sender", 1)
+def _counted(planting: Planting) -> None:
+    def take_part(self: Any, part: Any, committed: int, members: Any) -> bool:
+        if not committed < part.tick <= committed + limits.KEPT_TICKS:
+            return False
+        self.parts.setdefault(part.tick, []).append(part)
+        return True
+
+    planting.swap(Arrivals, "take_part", take_part)
+
+
+@register("supervisor does not ask again", "who has had no progress asks again (supervisor)", 2)
+def _patient(planting: Planting) -> None:
+    planting.swap(SupervisorCore, "_ask_again", lambda self, now_ns: self._patience.asked(now_ns))
+
+
+@register("supervisor does not answer who asks", "supervisor and vHub keep the last 16 ticks", 1)
+def _mute(planting: Planting) -> None:
+    planting.swap(SupervisorCore, "_on_want", lambda self, want, payload, now_ns: None)
+
+
+def _spoken_first(actions: list[Any], first: int) -> None:
+    """Put what is said before what is written, from a place on."""
+    said = [action for action in actions[first:] if isinstance(action, Publish)]
+    rest = [action for action in actions[first:] if not isinstance(action, Publish)]
+    actions[first:] = said + rest
+
+
+@register("commit is said before it is written", "the supervisor journals commits before it publishes", 1)
+def _hasty_commit(planting: Planting) -> None:
+    def say_commit(self: Any, *given: Any) -> None:
+        first = len(self.actions)
+        before(self, *given)
+        _spoken_first(self.actions, first)
+
+    before: Any = planting.swap(SupervisorCore, "_say_commit", say_commit)
+
+
+@register("epoch is said before it is written", "the supervisor journals epochs before it publishes", 1)
+def _hasty_epoch(planting: Planting) -> None:
+    def open_epoch(self: Any, *given: Any) -> None:
+        first = len(self.actions)
+        before(self, *given)
+        _spoken_first(self.actions, first)
+
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+
+
+@register("requests are not journalled", "a request is journalled when its tick is chosen, then answered", 1)
+def _unwritten(planting: Planting) -> None:
+    def accept(self: Any, *given: Any, **named: Any) -> Any:
+        actions = self._core.actions
+        first = len(actions)
+        answer = before(self, *given, **named)
+        actions[first:] = [action for action in actions[first:] if not isinstance(action, Journal)]
+        return answer
+
+    before: Any = planting.swap(Requests, "_accept", accept)
+
+
+@register("requests are done each time they come", "the same id gets the same answer", 1)
+def _each_time(planting: Planting) -> None:
+    def take(self: Any, request: Any, payload: bytes, now_ns: int) -> None:
+        self._answers.pop((request.sender, request.id), None)
+        before(self, request, payload, now_ns)
+
+    before: Any = planting.swap(Requests, "take", take)
+
+
+@register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 8)
+def _forgotten(planting: Planting) -> None:
+    planting.swap(Requests, "resume", lambda self, edits, answers: None)
+
+
+@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 2)
+def _other_orders(planting: Planting) -> None:
+    def open_epoch(self: Any, *given: Any) -> None:
+        for tick in range(self.frame.tick, self.released):
+            self.orders[tick] = []
+        before(self, *given)
+
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+
+
+@register("orders are not issued again", "orders from c on are issued again", 1)
+def _no_orders(planting: Planting) -> None:
+    def open_epoch(self: Any, *given: Any) -> None:
+        said, self.released = self.released, self.frame.tick
+        before(self, *given)
+        self.released = said
+
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+    planting.swap(SupervisorCore, "_on_want", lambda self, want, payload, now_ns: None)
+
+
+@register("orders run ahead", "order k is released once tick k - W is committed", 1)
+def _run_ahead(planting: Planting) -> None:
+    before: Any = planting.swap(
+        Pacer, "may_release", lambda self, tick, committed, now_ns: before(self, tick, committed + 3, now_ns)
+    )
+
+
+@register("epoch does not grow", "epochs only grow", 1)
+def _same_epoch(planting: Planting) -> None:
+    def open_epoch(self: Any, *given: Any) -> None:
+        self.epoch = max(0, self.epoch - (self.epoch % 3 == 2))
+        before(self, *given)
+
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+
+
+@register("epochs are volatile", "a restarted supervisor goes on with a greater epoch", 2)
+def _volatile(planting: Planting) -> None:
+    def stand_on(core: Any, history: Any) -> None:
+        before(core, history)
+        core.epoch = 0
+
+    before: Any = planting.swap(take_over, "stand_on", stand_on)
+    planting.swap(take_over.TakeOver, "standing", _standing_without_epoch)
+
+
+def _standing_without_epoch(self: Any, standing: Any) -> bool:
+    self._standing = self._standing or standing
+    return True
+
+
+@register("robots are not adopted", "a lost node's robots are adopted", 1)
+def _orphans(planting: Planting) -> None:
+    planting.swap(Recovery, "adopted", lambda self, lost, members: dict(self._core.owners))
+
+
+@register("robots do not go back", "adopted robots go back to the node that returns", 1)
+def _kept_robots(planting: Planting) -> None:
+    def join(self: Any, process: Any, now_ns: int) -> None:
+        if self._core.members:
+            self.returns.clear()
+        before(self, process, now_ns)
+
+    before: Any = planting.swap(Recovery, "join", join)
+
+
+@register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 13)
+def _unmoved(planting: Planting) -> None:
+    planting.swap(Recovery, "moved", lambda self, robot: None)
+
+
+@register("a lost node stays on the list", "a lost node may come back by the handshake", 1)
+def _never_lost(planting: Planting) -> None:
+    planting.swap(Roster, "lose", lambda self, process: None)
+
+
+@register("a stopped node comes back", "who was stopped is not let in until it is started", 8)
+def _unstopped(planting: Planting) -> None:
+    def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
+        self._core.roster.stopped.discard(hello.name)
+        before(self, hello, payload, now_ns)
+
+    before: Any = planting.swap(Handshake, "hello", hello)
+
+
+@register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 22)
+def _untold(planting: Planting) -> None:
+    def say_epoch(self: Any) -> None:
+        self.count_repeat()
+
+    planting.swap(SupervisorCore, "say_epoch", say_epoch)
+
+
+@register("edits are folded for ever", "a fold gives what is not committed yet", 1)
+def _stale_edits(planting: Planting) -> None:
+    def commit(history: Any, record: Any) -> None:
+        edits = {tick: list(each) for tick, each in history.edits.items()}
+        before(history, record)
+        history.edits.update(edits)
+
+    before: Any = planting.swap(records, "_commit", commit)
+
+
+@register("the roster of the epoch is not kept", "the barrier passes with every node of the epoch", 1)
+def _short_roster(planting: Planting) -> None:
+    def open_epoch(self: Any, owners: Any, now_ns: int, members: Any = None) -> None:
+        before(self, owners, now_ns, members)
+        owning = {*owners.values()}
+        self.members = tuple(name for name in self.members if name in owning)[: max(1, len(owning) - 1)]
+
+    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+
+
+@register("a lost commit is not said again", "commits are asked for again and kept", 1)
+def _lost_commit(planting: Planting) -> None:
+    def on_want(self: Any, want: Any, payload: bytes, now_ns: int) -> None:
+        if want.kind != channels.COMMIT.name:
+            before(self, want, payload, now_ns)
+
+    before: Any = planting.swap(SupervisorCore, "_on_want", on_want)
+
+
+MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

@@ -1,0 +1,180 @@
+"""Bugs of the vHub: closing of ticks, account, deliveries, clients, fold.
+
+Neighbours: `planting`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from bench.mutants.planting import Mutant, Planting, Register
+from foosim.protocol import channels
+from foosim.protocol.actions import Publish
+from foosim.protocol.codec import encode
+from foosim.protocol.messages import Deliveries
+from foosim.vhub import core, records, state
+from foosim.vhub.commits import Commits
+from foosim.vhub.core import HubCore
+from foosim.vhub.sessions import Sessions
+from foosim.vhub.state import HubState
+
+register = Register()
+
+
+@register("vHub speaks before it writes", "the vHub writes one record per tick before it publishes", 1)
+def _hasty(planting: Planting) -> None:
+    def close_clients(self: Any, now_ns: int) -> bool:
+        first = len(self.actions)
+        closed = bool(before(self, now_ns))
+        self.actions[first:] = reversed(self.actions[first:])
+        return closed
+
+    before: Any = planting.swap(HubCore, "_close_clients", close_clients)
+
+
+@register("vHub does not ask again", "who has had no progress asks again (vHub)", 1)
+def _patient(planting: Planting) -> None:
+    planting.swap(HubCore, "_ask_again", lambda self, now_ns: self._patience.asked(now_ns))
+
+
+@register("vHub does not answer who asks", "supervisor and vHub keep the last 16 ticks", 2)
+def _mute(planting: Planting) -> None:
+    planting.swap(HubCore, "_on_want", lambda self, want, payload, now_ns: None)
+
+
+@register("deliveries are said otherwise again", "deliveries are final when published", 1)
+def _not_final(planting: Planting) -> None:
+    def on_want(self: Any, want: Any, payload: bytes, now_ns: int) -> None:
+        packets = self.state.deliveries.get(want.tick)
+        if want.kind == channels.DELIVERIES.name and packets is not None:
+            again = encode(Deliveries(want.tick, packets))
+            self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, again))
+        else:
+            before(self, want, payload, now_ns)
+
+    before: Any = planting.swap(HubCore, "_on_want", on_want)
+
+
+@register("samples of any frame", "samples with that D(k) of every robot in frame k", 24)
+def _any_frame(planting: Planting) -> None:
+    def world_packets(samples: Any, digest: bytes, frame: Any, sampling: Any) -> Any:
+        told = list(samples)
+        return before(told, told[0].digest if told else digest, frame, sampling)
+
+    before: Any = planting.swap(core, "world_packets", world_packets)
+
+
+@register("samples of some robots", "closing waits for the samples of every robot", 0)
+def _some_robots(planting: Planting) -> None:
+    def world_packets(samples: Any, digest: bytes, frame: Any, sampling: Any) -> Any:
+        told = list(samples)
+        packets = before(told, digest, frame, sampling)
+        return [packet for one in told for packet in one.packets] if packets is None and told else packets
+
+    before: Any = planting.swap(core, "world_packets", world_packets)
+
+
+@register("early commits are forgotten", "what comes before its turn waits for it", 0)
+def _no_early(planting: Planting) -> None:
+    def take(self: Any, commit: Any, payload: bytes) -> Any:
+        taken = before(self, commit, payload)
+        self._early.clear()
+        return taken
+
+    before: Any = planting.swap(Commits, "take", take)
+
+
+@register("account leaks", "offered = delivered + dropped + in flight", 0)
+def _leak(planting: Planting) -> None:
+    def arrive(self: Any, tick: int, fates: Any) -> Any:
+        released = before(self, tick, fates)
+        self.packets.delivered -= len(released) > 1
+        return released
+
+    before: Any = planting.swap(HubState, "_arrive_at_clients", arrive)
+
+
+@register("packets stay in flight", "each packet has one fate", 0)
+def _stay(planting: Planting) -> None:
+    def take_arrivals(self: Any, tick: int, to_robots: bool) -> Any:
+        taken = before(self, tick, to_robots)
+        if to_robots and len(taken) > 2:
+            self._flights.setdefault(tick + 1, []).append(taken[0])
+        return taken
+
+    before: Any = planting.swap(HubState, "_take_arrivals", take_arrivals)
+
+
+@register("deliveries out of order", "deliveries are in (due, source, sequence, copy) order", 0)
+def _disorder(planting: Planting) -> None:
+    planting.swap(state, "_order", lambda flight: (flight.destination, -flight.due_ns, flight.sequence))
+
+
+@register("deliveries come early", "what is sent at k arrives at ceil(due / T)", 0)
+def _early(planting: Planting) -> None:
+    def send(self: Any, flight: Any, tick: int, fates: Any) -> None:
+        before(self, flight, tick, fates)
+        later = self._flights.get(tick + 2, [])
+        if flight in later and flight.destination in self._robots:
+            later.remove(flight)
+            self._flights.setdefault(tick + 1, []).append(flight)
+
+    before: Any = planting.swap(HubState, "_send", send)
+
+
+@register("robots' numbers repeat", "a robot's sequence number is tick x 2^16 + index", 0)
+def _numbers(planting: Planting) -> None:
+    planting.swap(state, "OUTBOX_SHIFT", 0)
+
+
+@register("final too far ahead", "deliveries of ticks ahead are final only where nothing can reach robots", 0)
+def _too_final(planting: Planting) -> None:
+    before: Any = planting.swap(HubState, "_following", lambda self, tick: before(self, tick) + 1)
+
+
+@register("Go is said once", "Go is repeated until it is answered", 0)
+def _go_once(planting: Planting) -> None:
+    def repeat(self: Any, waited: Any, now_ns: int) -> None:
+        for name in waited:
+            session = self.by_name[name]
+            session.again_ns = max(session.again_ns, now_ns + session.again_after_ns)
+
+    planting.swap(Sessions, "repeat", repeat)
+
+
+@register("any Done will do", "Done(k) answers Go(k)", 0)
+def _any_done(planting: Planting) -> None:
+    def on_done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
+        session = self.sessions.by_name.get(done.name)
+        if session is not None and self._world is not None and done.name in self._world.waited:
+            self._world.waited.remove(done.name)
+            session.done = done
+
+    planting.swap(HubCore, "_on_done", on_done)
+
+
+@register("downlinks are not numbered", "each downlink has the next number", 0)
+def _same_number(planting: Planting) -> None:
+    def say_go(self: Any, session: Any, number: int, *given: Any) -> None:
+        before(self, session, number - number % 2, *given)
+
+    before: Any = planting.swap(Sessions, "say_go", say_go)
+
+
+@register("fold forgets downlinks", "a fold of the journal gives the state again", 0)
+def _fold(planting: Planting) -> None:
+    planting.swap(records, "count_downlinks", lambda state, tick, released: None)
+
+
+@register("what clients sent is not written", "the record holds the admitted bytes", 0)
+def _unwritten(planting: Planting) -> None:
+    before: Any = planting.swap(
+        core,
+        "tick_record",
+        lambda closing, commit, samples, admitted, state, deliveries: before(
+            closing, commit, samples, {}, state, deliveries
+        ),
+    )
+
+
+MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

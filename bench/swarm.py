@@ -1,0 +1,62 @@
+"""How many seeds of the swarm one core flies in a second: rehearsals under random faults, with every law watched.
+
+Counted is processor time, so that a busy machine tells the same. Neighbours: `rehearsal.swarm`.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from bench.runs import BenchError
+from foosim.rehearsal.swarm import Flown, fly
+
+TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
+SEEDS: Final = 40
+WARM: Final = range(1001, 1013)
+"""Flown before, so that the worlds are made."""
+
+
+@dataclass(frozen=True, slots=True)
+class SwarmFigures:
+    """What the seeds had and took, each on average."""
+
+    seeds_per_s: float
+    ticks: float
+    faults: float
+    nodes: float
+    seen: float
+
+
+def swarm(seconds: float | None = None) -> SwarmFigures:
+    """Fly seeds: 40, or about as many as take that processor time."""
+    text = TABLE.read_text()
+    for seed in WARM:
+        fly(text, TABLE.name, seed)
+    begun_s = time.process_time()
+    flown: list[Flown] = []
+    while len(flown) < SEEDS if seconds is None else time.process_time() - begun_s < seconds:
+        flown.append(fly(text, TABLE.name, len(flown) + 1))
+    took_s = time.process_time() - begun_s
+    broken = [flight.seed for flight in flown if flight.broken]
+    if broken:
+        raise BenchError(f"seeds {broken} broke a law: foosim-rehearse deploy/table.yaml --swarm --seed {broken[0]}")
+    count = len(flown)
+    return SwarmFigures(
+        round(count / took_s, 2),
+        round(sum(flight.ticks for flight in flown) / count, 1),
+        round(sum(len(flight.faults) for flight in flown) / count, 1),
+        round(sum(flight.nodes for flight in flown) / count, 1),
+        round(sum(flight.seen for flight in flown) / count),
+    )
+
+
+def lines(figures: SwarmFigures) -> list[str]:
+    """Return the figures for people."""
+    return [
+        f"{figures.seeds_per_s:.2f} seeds a second of one core",
+        f"each {figures.ticks:.0f} ticks on {figures.nodes:.1f} nodes, {figures.faults:.1f} faults, "
+        f"{figures.seen:.0f} things written and said",
+    ]

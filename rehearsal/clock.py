@@ -1,0 +1,33 @@
+"""The clocks of a rehearsal's processes: each has a monotonic one of its own, as machines have.
+
+They differ in where they began and a little in their speed; no two processes may compare them. Neighbours: `system`
+gives each core the time of its own clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MILLION = 1_000_000
+
+
+@dataclass(slots=True)
+class Clock:
+    """One process's clock: what it shows at virtual time 0, and how much faster it goes."""
+
+    offset_ns: int = 0
+    drift_ppm: int = 0
+
+    def at(self, virtual_ns: int) -> int:
+        """Return what it shows at a virtual time."""
+        return virtual_ns + self.offset_ns + virtual_ns * self.drift_ppm // MILLION
+
+    def when(self, clock_ns: int) -> int:
+        """Return the first virtual time at which it shows at least this."""
+        passed_ns = clock_ns - self.offset_ns
+        if not self.drift_ppm:
+            return passed_ns
+        virtual_ns = passed_ns * MILLION // (MILLION + self.drift_ppm)
+        while self.at(virtual_ns) < clock_ns:
+            virtual_ns += 1
+        return virtual_ns

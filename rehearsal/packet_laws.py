@@ -1,0 +1,156 @@
+"""The laws of packets: what the vHub takes, judges, delivers and releases, watched from outside.
+
+Neighbours: `laws` tells of what is written and said.
+"""
+
+from __future__ import annotations
+
+from foosim.client.core import ClientCore
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.messages import Delivered, Deliveries, Done, Down, Go, RobotPacket, Samples
+from foosim.protocol.sampling import Sampling
+from foosim.rehearsal.replica import Replica
+from foosim.rehearsal.system import System
+from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT
+from foosim.vhub.records import Closing, TickRecord, world_packets
+from foosim.vhub.state import HubState
+
+
+class Broken(AssertionError):
+    """A law does not hold."""
+
+
+def hold(law: bool, what: str) -> None:
+    """Raise Broken unless the law holds."""
+    if not law:
+        raise Broken(what)
+
+
+class PacketLaws:
+    """Watches packets. `said` are the deliveries of each tick as nodes take them, the bytes that are final."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.closed = -1
+        self.said: dict[int, bytes] = {0: encode(Deliveries(0, []))}
+        self._deployment = deployment
+        self._sampling = Sampling(deployment)
+        self._written: dict[int, bytes] = {0: self.said[0]}
+        self._delivered: set[tuple[str, int, int]] = set()
+        self._samples: dict[int, list[Samples]] = {}
+        self._sequences: dict[str, int] = {}
+        self._downlinks: dict[str, dict[int, bytes]] = {}
+        self._go_ticks: dict[str, int] = {}
+        self._dones: dict[tuple[str, int], bytes] = {}
+        self._fates: dict[tuple[str, str, int, int], str] = {}
+
+    # --- the vHub's side ---------------------------------------------------------------------------------------------
+
+    def closes(self, record: TickRecord, digest: bytes) -> None:
+        """A record: the next tick, from samples of the committed frame, with nothing that clients sent left out."""
+        tick = record.tick
+        hold(tick == self.closed + 1, f"the vHub closes tick {tick} after {self.closed}")
+        self.closed = tick
+        samples = [decode(Samples, raw) for raw in record.samples]
+        wrong = [message.node for message in samples if message.tick != tick or message.digest != digest]
+        hold(not wrong, f"the samples of {wrong} at tick {tick} are not of its frame")
+        self._samples[tick] = samples
+        for client, sent in record.admitted:
+            for packet in sent:
+                known = self._sequences.get(client, 0)
+                hold(packet.sequence <= known + 1, f"{client}: packet {packet.sequence} is taken after {known}")
+                self._sequences[client] = max(known, packet.sequence)
+        deliveries = decode(Deliveries, record.deliveries)
+        hold(deliveries.tick == tick + 1, f"record {tick} has deliveries {deliveries.tick}")
+        if tick + 1 not in self._written:
+            self._written[tick + 1] = record.deliveries
+            for following in range(tick + 2, deliveries.last + 1):
+                self._written[following] = encode(Deliveries(following, []))
+        hold(
+            not deliveries.packets or self._written[tick + 1] == record.deliveries, f"deliveries {tick + 1} were final"
+        )
+
+    def delivers(self, deliveries: Deliveries, raw: bytes) -> None:
+        """Law 3: deliveries are written before they are said, and then they never change. Law 4: each packet once."""
+        for tick in range(deliveries.tick, deliveries.last + 1):
+            payload = raw if tick == deliveries.tick else encode(Deliveries(tick, []))
+            written = self._written.get(tick)
+            hold(written is not None, f"deliveries {tick} are said before they are written")
+            hold(written == payload, f"deliveries {tick} are said otherwise than they are written")
+            if tick not in self.said:
+                self.said[tick] = payload
+                self._reach(tick, deliveries.packets if tick == deliveries.tick else [])
+
+    def _reach(self, tick: int, packets: list[Delivered]) -> None:
+        order = [(packet.due_ns, packet.source, packet.sequence, packet.copy) for packet in packets]
+        hold(order == sorted(order), f"deliveries {tick} are out of order")
+        late = tick * self._deployment.tick_ns
+        hold(all(packet.due_ns <= late for packet in packets), f"deliveries {tick} come before they are due")
+        keys = {(packet.source, packet.sequence, packet.copy) for packet in packets}
+        hold(len(keys) == len(packets) and not keys & self._delivered, f"deliveries {tick}: a packet comes twice")
+        self._delivered |= keys
+
+    def fates(self, closing: Closing) -> None:
+        """Law 5: each packet has one fate; a robot's has the number of its tick and place."""
+        for flight in closing.fates:
+            key = flight.source, flight.destination, flight.sequence, flight.copy
+            hold(key not in self._fates, f"packet {key} has two fates")
+            self._fates[key] = flight.cause
+            if flight.source in self._deployment.robots:
+                sent = (flight.sequence >> 16) * self._deployment.tick_ns
+                hold(flight.sent_ns == sent, f"packet {key} of a robot has another tick's number")
+
+    def senses(self, frame: Frame, replica: Replica) -> None:
+        """What robots sent at a frame is a function of it, whoever owned them."""
+        samples = self._samples.pop(frame.tick, [])
+        taken = world_packets(samples, frame.digest, frame, self._sampling)
+        sensed: list[RobotPacket] = [] if self._sampling.is_silent(frame) else replica.sense()
+        hold(taken is None or taken == sensed, f"what robots sent at tick {frame.tick} is not what they sense")
+
+    # --- the clients' side -------------------------------------------------------------------------------------------
+
+    def downlink(self, client: str, down: Go | Down, raw: bytes) -> None:
+        """Downlinks are numbered one after the other, and each number stands for one thing."""
+        known = self._downlinks.setdefault(client, {})
+        hold(down.number <= len(known) + 1, f"downlink {down.number} of {client} after {len(known)}")
+        hold(known.setdefault(down.number, raw) == raw, f"downlink {down.number} of {client} says two things")
+        if isinstance(down, Go):
+            hold(down.tick <= self.closed + 1, f"Go {down.tick} before tick {down.tick - 1} is written")
+            known_tick = self._go_ticks.setdefault(client, -1)
+            hold(down.tick >= known_tick, f"Go {down.tick} of {client} after {known_tick}")
+            self._go_ticks[client] = down.tick
+
+    def answers(self, done: Done, raw: bytes) -> None:
+        """A lockstep client's answer to a tick is one."""
+        hold(self._dones.setdefault((done.name, done.tick), raw) == raw, f"{done.name} has two Dones of {done.tick}")
+
+    # --- account -----------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def account(state: HubState) -> None:
+        """Law 5: offered = delivered + dropped + in flight, in all and for every link."""
+        packets, flying = state.packets, state.in_flight()
+        hold(packets.in_flight == len(flying), f"{packets.in_flight} packets in flight, there are {len(flying)}")
+        links = [link.state for link in state.links.values()]
+        total = sum(link.offered for link in links), sum(link.delivered for link in links)
+        hold(total == (packets.offered, packets.delivered), "the links' account is not that of all")
+        hold(all(link.offered >= link.delivered + link.dropped for link in links), "a link has more fates than packets")
+
+    def end(self, system: System) -> None:
+        """Every packet that was offered has its fate, and every downlink has come."""
+        state = system.hub.state
+        assert state is not None
+        self.account(state)
+        hold(state.packets.refused == 0, f"lockstep clients repeat nothing, {state.refusals} were refused")
+        counted = {DELIVERED: 0, DROPPED: 0, IN_FLIGHT: 0}
+        for cause in self._fates.values():
+            counted[DELIVERED if not cause else IN_FLIGHT if cause == IN_FLIGHT else DROPPED] += 1
+        packets = state.packets
+        told = {DELIVERED: packets.delivered, DROPPED: packets.dropped, IN_FLIGHT: packets.in_flight}
+        hold(counted == told, f"fates {counted}, the account says {told}")
+        for name, process in system.processes.items():
+            if isinstance(process.core, ClientCore):
+                statistics = process.core.statistics()
+                hold(statistics.missing == 0, f"{name} misses {statistics.missing} downlinks")
+                hold(statistics.sent >= self._sequences.get(name, 0), f"{name} sent less than was taken")
