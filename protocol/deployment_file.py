@@ -40,12 +40,9 @@ from foosim.protocol.yaml_tree import (
     write_yaml,
 )
 
-DEPLOYMENTS_KEPT: Final = 16
-"""How many of the last texts need not be read again."""
 PROBLEMS_MAX: Final = 100
 """How many problems are looked for and shown: a hostile file may hold many thousands, each with names to compare."""
-
-DEPLOYMENTS_KEPT: Final = 8
+DEPLOYMENTS_KEPT: Final = 16
 """Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time."""
 
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
