@@ -31,7 +31,7 @@ from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.packet_laws import PacketLaws, hold
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import System
-from foosim.supervisor.records import CommitRecord, RequestRecord
+from foosim.supervisor.records import CommitRecord, OrderedRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
 from foosim.vhub.records import Closing, HubRecord, TickRecord
@@ -99,6 +99,8 @@ class Laws:
             self._commits_one(record.commit, decode(Commit, record.commit))
         elif isinstance(record, Epoch):
             self._begins(record, traced.payload)
+        elif isinstance(record, OrderedRecord):
+            self._ordered.setdefault(record.tick, []).extend(record.edits)
         elif isinstance(record, RequestRecord):
             key = record.answer.sender, record.answer.id
             hold(key not in self._answers, f"request {key} is carried out twice")
@@ -202,9 +204,7 @@ class Laws:
         """The same request, the same answer."""
         answer = decode(Answer, traced.payload)
         key = answer.sender, answer.id
-        if not answer.accepted:
-            hold(self._answers.setdefault(key, traced.payload) == traced.payload, f"{key} has two answers")
-        elif not answer.result or answer.result == b"{}":
+        if answer.result == b"{}":  # any other is a status, which changes
             hold(self._answers.get(key) == traced.payload, f"{key} is answered, and not or otherwise written")
 
     def _down(self, traced: Traced) -> None:

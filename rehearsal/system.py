@@ -187,7 +187,7 @@ class System:
 
     def _is_soonest_known(self) -> bool:
         """Look when the next process is to be woken; False when it is later than was thought."""
-        soonest_ns = min([process.wake_ns for process in self.processes.values()])
+        soonest_ns = min([max(process.wake_ns, process.busy_until_ns) for process in self.processes.values()])
         known, self._soonest_ns = soonest_ns == self._soonest_ns, soonest_ns
         return known
 

@@ -105,7 +105,14 @@ class Requests:
         self._core.actions.append(Publish(channels.ANSWER, answer.sender, encode(answer)))
 
     def _refuse(self, request: Request, why: str) -> Answer:
-        return self._keep(Answer(request.sender, request.id, False, self._core.released, why[:TEXT_MAX], b"{}"))
+        """Journal a refusal as well: asked again, a supervisor that was started again might see it otherwise."""
+        answer = Answer(request.sender, request.id, False, self._core.released, why[:TEXT_MAX], b"{}")
+        return self._keep(self._write(answer, [], self._core.owners))
+
+    def _write(self, answer: Answer, edits: list[Edit], owners: dict[str, str]) -> Answer:
+        record = RequestRecord(answer.tick, edits, answer, self._core.control(), owners)
+        self._core.actions.append(Journal(encode(record)))
+        return answer
 
     def _keep(self, answer: Answer) -> Answer:
         """Keep an answer for when the request is repeated."""
@@ -130,9 +137,7 @@ class Requests:
     ) -> Answer:
         """Journal a request whose tick is chosen, with all that it does, and keep its answer."""
         answer = Answer(request.sender, request.id, True, tick, text, b"{}")
-        core = self._core
-        record = RequestRecord(tick, edits or [], answer, core.control(), owners or core.owners)
-        core.actions.append(Journal(encode(record)))
+        self._write(answer, edits or [], owners or self._core.owners)
         if edits:
             self._edits.setdefault(tick, []).extend(edits)
         return self._keep(answer)

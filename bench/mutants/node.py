@@ -37,7 +37,7 @@ def _new_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node goes back to an old epoch", "epochs only grow", 0)
+@register("node goes back to an old epoch", "epochs only grow", 28)
 def _epochs_fall(planting: Planting) -> None:
     def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
         if self.epoch > epoch.epoch and self.name in epoch.roster:
@@ -164,7 +164,7 @@ def _ready_once(planting: Planting) -> None:
     before: Any = planting.swap(Member, "wake", wake)
 
 
-@register("lost node does not say ready again", "an epoch without a node is no answer to its ready", 24)
+@register("lost node does not say ready again", "an epoch without a node is no answer to its ready", 152)
 def _answered_by_another(planting: Planting) -> None:
     def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
         is_present = epoch.epoch == self.epoch

@@ -111,6 +111,14 @@ def _unwritten(planting: Planting) -> None:
     before: Any = planting.swap(Requests, "_accept", accept)
 
 
+@register("refusals are not journalled", "the same id gets the same answer over restarts", 1)
+def _unwritten_refusal(planting: Planting) -> None:
+    def write(self: Any, answer: Any, edits: Any, owners: Any) -> Any:
+        return before(self, answer, edits, owners) if answer.accepted else answer
+
+    before: Any = planting.swap(Requests, "_write", write)
+
+
 @register("requests are done each time they come", "the same id gets the same answer", 1)
 def _each_time(planting: Planting) -> None:
     def take(self: Any, request: Any, payload: bytes, now_ns: int) -> None:

@@ -13,8 +13,8 @@ from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Deliveries
 from foosim.vhub import core, records, state
-from foosim.vhub.commits import Commits
 from foosim.vhub.core import HubCore
+from foosim.vhub.door import Door
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
 
@@ -55,16 +55,7 @@ def _not_final(planting: Planting) -> None:
     before: Any = planting.swap(HubCore, "_on_want", on_want)
 
 
-@register("samples of any frame", "samples with that D(k) of every robot in frame k", 24)
-def _any_frame(planting: Planting) -> None:
-    def world_packets(samples: Any, digest: bytes, frame: Any, sampling: Any) -> Any:
-        told = list(samples)
-        return before(told, told[0].digest if told else digest, frame, sampling)
-
-    before: Any = planting.swap(core, "world_packets", world_packets)
-
-
-@register("samples of some robots", "closing waits for the samples of every robot", 0)
+@register("samples of some robots", "closing waits for the samples of every robot", 1)
 def _some_robots(planting: Planting) -> None:
     def world_packets(samples: Any, digest: bytes, frame: Any, sampling: Any) -> Any:
         told = list(samples)
@@ -74,17 +65,7 @@ def _some_robots(planting: Planting) -> None:
     before: Any = planting.swap(core, "world_packets", world_packets)
 
 
-@register("early commits are forgotten", "what comes before its turn waits for it", 0)
-def _no_early(planting: Planting) -> None:
-    def take(self: Any, commit: Any, payload: bytes) -> Any:
-        taken = before(self, commit, payload)
-        self._early.clear()
-        return taken
-
-    before: Any = planting.swap(Commits, "take", take)
-
-
-@register("account leaks", "offered = delivered + dropped + in flight", 0)
+@register("account leaks", "offered = delivered + dropped + in flight", 1)
 def _leak(planting: Planting) -> None:
     def arrive(self: Any, tick: int, fates: Any) -> Any:
         released = before(self, tick, fates)
@@ -94,7 +75,7 @@ def _leak(planting: Planting) -> None:
     before: Any = planting.swap(HubState, "_arrive_at_clients", arrive)
 
 
-@register("packets stay in flight", "each packet has one fate", 0)
+@register("packets stay in flight", "each packet has one fate", 1)
 def _stay(planting: Planting) -> None:
     def take_arrivals(self: Any, tick: int, to_robots: bool) -> Any:
         taken = before(self, tick, to_robots)
@@ -105,12 +86,12 @@ def _stay(planting: Planting) -> None:
     before: Any = planting.swap(HubState, "_take_arrivals", take_arrivals)
 
 
-@register("deliveries out of order", "deliveries are in (due, source, sequence, copy) order", 0)
+@register("deliveries out of order", "deliveries are in (due, source, sequence, copy) order", 1)
 def _disorder(planting: Planting) -> None:
     planting.swap(state, "_order", lambda flight: (flight.destination, -flight.due_ns, flight.sequence))
 
 
-@register("deliveries come early", "what is sent at k arrives at ceil(due / T)", 0)
+@register("deliveries come early", "what is sent at k arrives at ceil(due / T)", 1)
 def _early(planting: Planting) -> None:
     def send(self: Any, flight: Any, tick: int, fates: Any) -> None:
         before(self, flight, tick, fates)
@@ -122,17 +103,17 @@ def _early(planting: Planting) -> None:
     before: Any = planting.swap(HubState, "_send", send)
 
 
-@register("robots' numbers repeat", "a robot's sequence number is tick x 2^16 + index", 0)
+@register("robots' numbers repeat", "a robot's sequence number is tick x 2^16 + index", 1)
 def _numbers(planting: Planting) -> None:
     planting.swap(state, "OUTBOX_SHIFT", 0)
 
 
-@register("final too far ahead", "deliveries of ticks ahead are final only where nothing can reach robots", 0)
+@register("final too far ahead", "deliveries of ticks ahead are final only where nothing can reach robots", 1)
 def _too_final(planting: Planting) -> None:
     before: Any = planting.swap(HubState, "_following", lambda self, tick: before(self, tick) + 1)
 
 
-@register("Go is said once", "Go is repeated until it is answered", 0)
+@register("Go is said once", "Go is repeated until it is answered", 2)
 def _go_once(planting: Planting) -> None:
     def repeat(self: Any, waited: Any, now_ns: int) -> None:
         for name in waited:
@@ -142,18 +123,18 @@ def _go_once(planting: Planting) -> None:
     planting.swap(Sessions, "repeat", repeat)
 
 
-@register("any Done will do", "Done(k) answers Go(k)", 0)
+@register("any Done will do", "Done(k) answers Go(k)", 10)
 def _any_done(planting: Planting) -> None:
-    def on_done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
-        session = self.sessions.by_name.get(done.name)
-        if session is not None and self._world is not None and done.name in self._world.waited:
-            self._world.waited.remove(done.name)
+    def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
+        session = self._session(done)
+        if session is not None and self._core.waits_for(done.name):
+            self._core.take_done(done.name)
             session.done = done
 
-    planting.swap(HubCore, "_on_done", on_done)
+    planting.swap(Door, "done", done)
 
 
-@register("downlinks are not numbered", "each downlink has the next number", 0)
+@register("downlinks are not numbered", "each downlink has the next number", 1)
 def _same_number(planting: Planting) -> None:
     def say_go(self: Any, session: Any, number: int, *given: Any) -> None:
         before(self, session, number - number % 2, *given)
@@ -161,12 +142,12 @@ def _same_number(planting: Planting) -> None:
     before: Any = planting.swap(Sessions, "say_go", say_go)
 
 
-@register("fold forgets downlinks", "a fold of the journal gives the state again", 0)
+@register("fold forgets downlinks", "a fold of the journal gives the state again", 1)
 def _fold(planting: Planting) -> None:
     planting.swap(records, "count_downlinks", lambda state, tick, released: None)
 
 
-@register("what clients sent is not written", "the record holds the admitted bytes", 0)
+@register("what clients sent is not written", "the record holds the admitted bytes", 1)
 def _unwritten(planting: Planting) -> None:
     before: Any = planting.swap(
         core,
