@@ -133,7 +133,7 @@ def _forgotten(planting: Planting) -> None:
     planting.swap(Requests, "resume", lambda self, edits, answers: None)
 
 
-@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 2)
+@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 3)
 def _other_orders(planting: Planting) -> None:
     def open_epoch(self: Any, *given: Any) -> None:
         for tick in range(self.frame.tick, self.released):
@@ -210,7 +210,7 @@ def _never_lost(planting: Planting) -> None:
     planting.swap(Roster, "lose", lambda self, process: None)
 
 
-@register("a stopped node comes back", "who was stopped is not let in until it is started", 8)
+@register("a stopped node comes back", "who was stopped is not let in until it is started", 38)
 def _unstopped(planting: Planting) -> None:
     def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
         self._core.roster.stopped.discard(hello.name)
@@ -219,7 +219,7 @@ def _unstopped(planting: Planting) -> None:
     before: Any = planting.swap(Handshake, "hello", hello)
 
 
-@register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 22)
+@register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 12)
 def _untold(planting: Planting) -> None:
     def say_epoch(self: Any) -> None:
         self.count_repeat()

@@ -298,7 +298,7 @@ def test_a_vhub_whose_presence_ends_and_that_is_heard_later_is_back() -> None:
     assert seen.result["reason"] == "done" and seen.result["ticks"] == 600
     (entry,) = seen.result["recoveries"]
     assert (entry["what"], entry["name"], entry["reason"]) == ("vhub", "vhub", "its connection closed")
-    assert entry["tick"] == 60 and entry["epoch"] == 1 and entry["outage_ms"] is not None
+    assert entry["tick"] >= 60 and entry["epoch"] == 1 and entry["outage_ms"] is not None
     assert any(line.startswith("lost the vHub: its connection closed; the run waits for it") for line in seen.lines)
     assert any(line.startswith("the vHub is back after 0.") for line in seen.lines)
 
