@@ -61,7 +61,8 @@ class Handshake:
         """A layout is built: the run may begin, a node may join, a change of the world may be ordered."""
         core = self._core
         process = core.roster.by_name.get(ready.name)
-        if process is None or process.boot != ready.boot or ready.name in core.roster.stopped:
+        is_known = process is not None and process.boot == ready.boot and ready.name not in core.roster.stopped
+        if process is None or not is_known or (process.lost and process.gone_ns):
             core.count_repeat()
             return
         process.heard_ns = now_ns

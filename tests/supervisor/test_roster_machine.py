@@ -156,9 +156,10 @@ class Membership(RuleBasedStateMachine):
         name = sorted(self.owner)[robot]
         accepted = self.ask("move", robot=name, node=node)
         assert accepted == (self.opened > 0 and node in self.members)
-        if accepted and self.owner[name] != node:
-            self.owner[name] = self.home[name] = node
-            self.opened += 1
+        if accepted:
+            self.home[name] = node
+            self.opened += self.owner[name] != node
+            self.owner[name] = node
 
     @rule(node=st.sampled_from(NODES))
     def stop(self, node: str) -> None:

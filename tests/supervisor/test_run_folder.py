@@ -115,7 +115,9 @@ def test_a_name_that_is_no_run_gets_the_nearest_one() -> None:
 
 
 def test_a_name_that_is_taken_or_none_is_refused() -> None:
-    create_run("table", "mine")
+    folder = create_run("table", "mine")
+    assert create_run("table", "mine").path == folder.path, "nothing has run in it: it was made for who asks now"
+    folder.hold_launcher()
     with pytest.raises(Refused, match="there is a run mine already"):
         create_run("table", "mine")
     with pytest.raises(BadValue, match=r"--run: a name is a lower case letter, .*, '\.\./mine'"):
