@@ -219,7 +219,7 @@ def _unstopped(planting: Planting) -> None:
     before: Any = planting.swap(Handshake, "hello", hello)
 
 
-@register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 12)
+@register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 22)
 def _untold(planting: Planting) -> None:
     def say_epoch(self: Any) -> None:
         self.count_repeat()
