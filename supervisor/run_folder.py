@@ -95,35 +95,32 @@ class RunFolder:
 
     def hold(self) -> None:
         """Lock the folder as its live supervisor, until this process ends. Raises NoRun when another one does."""
-        lock = os.open(self.path / LOCK_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        for _ in range(HOLD_TRIES):  # who looks whether the run is live has the lock for a moment, too
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                time.sleep(0.01)
-                continue
-            self._lock = lock
-            (self.path / SPARE_FILE).write_bytes(bytes(SPARE_BYTES))
-            return
-        os.close(lock)
-        raise NoRun(f"run {self.name} has a supervisor already")
+        self._lock = self._take(LOCK_FILE)
+        if self._lock is None:
+            raise NoRun(f"run {self.name} has a supervisor already")
+        (self.path / SPARE_FILE).write_bytes(bytes(SPARE_BYTES))
 
     def hold_launcher(self) -> None:
         """Lock the folder as the launcher of its run, until this process ends: somebody looks after the run.
 
         Raises Refused when another one does.
         """
-        lock = os.open(self.path / LAUNCHER_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        for _ in range(HOLD_TRIES):  # who looks whether the run is left has the lock for a moment, too
+        self._launcher = self._take(LAUNCHER_FILE)
+        if self._launcher is None:
+            raise Refused(f"run {self.name} is looked after by the launcher that started it")
+
+    def _take(self, name: str) -> int | None:
+        """Lock a file of the folder until this process ends; None when another process has it."""
+        lock = os.open(self.path / name, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        for _ in range(HOLD_TRIES):  # who looks whether it is locked has the lock for a moment, too
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 time.sleep(0.01)
                 continue
-            self._launcher = lock
-            return
+            return lock
         os.close(lock)
-        raise Refused(f"run {self.name} is looked after by the launcher that started it")
+        return None
 
     def write_launch(self, launch: Launch) -> None:
         """Write how the run was launched, so that it can be launched again."""
