@@ -5,6 +5,11 @@ measures in wall time is off, because the machines that run the tests are shared
 `make test ARGS='--hypothesis-profile=search tests/laws'`; what it finds becomes an `@example`.
 """
 
+import os
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
 import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
@@ -41,3 +46,25 @@ class WireTogether(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no t
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> WireTogether:
     """The order in which workers get their tests. (xdist 3.8's own groups have no effect with pytest 9.2.)"""
     return WireTogether(config, log)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
+    """Mounts file systems of so many KiB."""
+    if os.geteuid() != 0:
+        pytest.skip("mounting a file system takes root")
+    mounted: list[Path] = []
+
+    def mount(kib: int) -> Path:
+        place = tmp_path / f"disk-{kib}"
+        place.mkdir()
+        command = ["mount", "-t", "tmpfs", "-o", f"size={kib}k", "foosim-test", str(place)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            pytest.skip(f"no tmpfs can be mounted here: {done.stderr.strip()}")
+        mounted.append(place)
+        return place
+
+    yield mount
+    for place in mounted:
+        subprocess.run(["umount", "-l", str(place)], check=True)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-import subprocess
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -166,28 +165,6 @@ def test_levels_of_room() -> None:
     levels = [Room(left, 100, "").level for left in (200, 199, 100, 99, 25, 24, 0, -5)]
     assert levels == [Level.FINE, Level.LOW, Level.LOW, Level.FULL, Level.FULL, Level.OUT, Level.OUT, Level.OUT]
     assert str(Room(-5, 64_000_000, "on its disk")) == "0.0 MB left on its disk, the reserve is 64.0 MB"
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
-    """Mounts file systems of so many KiB."""
-    if os.geteuid() != 0:
-        pytest.skip("mounting a file system takes root")
-    mounted: list[Path] = []
-
-    def mount(kib: int) -> Path:
-        place = tmp_path / f"disk-{kib}"
-        place.mkdir()
-        command = ["mount", "-t", "tmpfs", "-o", f"size={kib}k", "foosim-test", str(place)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            pytest.skip(f"no tmpfs can be mounted here: {done.stderr.strip()}")
-        mounted.append(place)
-        return place
-
-    yield mount
-    for place in mounted:
-        subprocess.run(["umount", "-l", str(place)], check=True)
 
 
 def test_on_a_disk_that_is_really_full(hub_run: HubRun, small_disk: Callable[[int], Path]) -> None:

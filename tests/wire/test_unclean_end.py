@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -23,28 +21,6 @@ from tests.wire.conftest import House
 def last_json(out: str) -> dict[str, Any]:
     content: dict[str, Any] = msgspec.json.decode(out.splitlines()[-1])
     return content
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
-    """Mounts a file system of so many KiB."""
-    if os.geteuid() != 0:
-        pytest.skip("mounting a file system takes root")
-    mounted: list[Path] = []
-
-    def mount(kib: int) -> Path:
-        place = tmp_path / f"disk-{kib}"
-        place.mkdir()
-        command = ["mount", "-t", "tmpfs", "-o", f"size={kib}k", "foosim-test", str(place)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            pytest.skip(f"no tmpfs can be mounted here: {done.stderr.strip()}")
-        mounted.append(place)
-        return place
-
-    yield mount
-    for place in mounted:
-        subprocess.run(["umount", "-l", str(place)], check=True)
 
 
 def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(house: House) -> None:
