@@ -353,6 +353,8 @@ class NodeCore:
         waiting.append(part)
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
+        if want.of and self.name not in want.of:
+            return
         if want.kind == channels.PART.name and want.epoch == self.epoch:
             sent = self._sent_parts.get(want.tick)
             if sent is not None:
@@ -368,22 +370,19 @@ class NodeCore:
             self._say_samples(frame, mine)
         elif self.frame is not None and self.frame.tick - limits.KEPT_TICKS <= tick < self.frame.tick:
             self._unsampled = {kept for kept in self._unsampled if kept >= self.frame.tick - limits.KEPT_TICKS} | {tick}
-            message = encode(Want(self.name, channels.COMMIT.name, tick, self.epoch))
+            message = encode(Want(self.name, channels.COMMIT.name, tick, self.epoch, []))
             self.actions.append(Publish(channels.WANT, self.name, message))
 
     def _ask_again(self, now_ns: int) -> None:
         """Ask for whatever the current tick lacks, the wait doubling."""
         tick = 0 if self.frame is None else self.frame.tick
-        kinds: list[tuple[str, int]] = []
         if self._awaited_epoch is not None:
-            kinds.append((channels.COMMIT.name, self._awaited_epoch.tick))
+            wants = [Want(self.name, channels.COMMIT.name, self._awaited_epoch.tick, self.epoch, [])]
         elif self._barrier is not None:
-            kinds.append((channels.PART.name, tick + 1))
+            wants = [Want(self.name, channels.PART.name, tick + 1, self.epoch, self._barrier.missing)]
         else:
-            kinds += [(channel.name, tick) for channel in self._inputs.missing(tick)]
-        for kind, wanted in kinds:
-            message = encode(Want(self.name, kind, wanted, self.epoch))
-            self.actions.append(Publish(channels.WANT, self.name, message))
+            wants = [Want(self.name, channel.name, tick, self.epoch, []) for channel in self._inputs.missing(tick)]
+        self.actions += [Publish(channels.WANT, self.name, encode(want)) for want in wants]
         self._patience.asked(now_ns)
 
     # --- epochs, layouts, start and end ------------------------------------------------------------------------------
@@ -432,7 +431,7 @@ class NodeCore:
         if own is not None and own.digest == epoch.digest:
             self._resume(own, now_ns)
         else:
-            message = encode(Want(self.name, channels.COMMIT.name, epoch.tick, epoch.epoch))
+            message = encode(Want(self.name, channels.COMMIT.name, epoch.tick, epoch.epoch, []))
             self.actions.append(Publish(channels.WANT, self.name, message))
             self._patience.progress(self.deployment.tick_ns, now_ns)
 

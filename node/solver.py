@@ -28,8 +28,8 @@ ENGINES_KEPT: Final = 3
 class Solver:
     """Builds what a node's core wants and solves its work. The engines that were used last are kept."""
 
-    def __init__(self, core: NodeCore, factory: EngineFactory | None = None) -> None:
-        """`factory` overrides the deployment's engine."""
+    def __init__(self, core: NodeCore, factory: EngineFactory | None = None, fingerprint: bytes = b"") -> None:
+        """`factory` overrides the deployment's engine; `fingerprint` is that of another solver of this process."""
         self._core = core
         self._factory = factory
         self._engines: dict[bytes, Engine] = {}
@@ -37,7 +37,8 @@ class Solver:
         self._told = 0
         """For how many of the layouts that the core wants it was told of an engine."""
         self._building: tuple[Layout, Generator[None, None, Engine]] | None = None
-        self._fingerprint = b""
+        self.fingerprint = fingerprint
+        """The digest of the fixed small run, empty before the first engine is built."""
 
     # --- building ----------------------------------------------------------------------------------------------------
 
@@ -73,17 +74,17 @@ class Solver:
         if self._factory is not None:
             yield
             return self._factory(deployment, layout)
-        if not self._fingerprint:
+        if not self.fingerprint:
             prepare_spares(deployment)
         return (yield from build_in_steps(deployment, layout))
 
     def _take(self, layout: Layout, engine: Engine) -> None:
         """Keep a new engine and tell the core."""
         self._engines[layout.digest] = engine
-        if not self._fingerprint:
-            self._fingerprint = engine_fingerprint(engine, self._core.stepper(layout))
+        if not self.fingerprint:
+            self.fingerprint = engine_fingerprint(engine, self._core.stepper(layout))
         self._told += 1
-        self._core.engine_ready(layout, self._fingerprint)
+        self._core.engine_ready(layout, self.fingerprint)
 
     def rebuild(self) -> None:
         """Replace every engine by a new one: nothing that matters is lost."""

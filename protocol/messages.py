@@ -188,12 +188,13 @@ class Commit(Message, frozen=True):
 
 
 class Want(Message, frozen=True):
-    """Ask again for `kind` (a channel's name) of `tick` in `epoch`."""
+    """Ask again for `kind` (a channel's name) of `tick` in `epoch`; `of` are the nodes that are asked, none for all."""
 
     sender: Name
     kind: Name
     tick: Counter
     epoch: Counter
+    of: Annotated[list[Name], Meta(max_length=limits.NODES_MAX)]
 
 
 DONE_OF: Final = "Done of "

@@ -17,8 +17,8 @@ from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.rehearsal.hub_journal import ENDINGS
 from foosim.rehearsal.system import System
 
-TICKS: Final = 230
-HEALED_TICK: Final = 200
+TICKS: Final = 208
+HEALED_TICK: Final = 180
 """From here on nothing new happens, and what is down comes up."""
 MS: Final = 1_000_000
 HOUR_NS: Final = 3_600_000 * MS

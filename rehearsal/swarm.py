@@ -259,6 +259,7 @@ class Flight:
         self._healed_ns = self._last_commit_ns = system.bus.now_ns
         system.healed = True
         system.bus.heal()
+        system.give_up("rate")  # or one that was lost before comes after this one
         ask(system, "rate", pace=HEALED_PACE)
         for name, process in list(system.processes.items()):
             process.slow_ns = 0

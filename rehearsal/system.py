@@ -59,8 +59,8 @@ class System:
         """Whether a test has said that nothing new is to happen."""
         self.flipped: set[str] = set()
         """Nodes whose memory a test has changed."""
-        self.asked: list[str] = []
-        """Ids of what was requested."""
+        self.asked: dict[str, str] = {}
+        """The verb of what was requested and not given up, by id."""
         self._traces_receive = rehearsal.observer is not None and "receive" in rehearsal.observes
         self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
@@ -76,6 +76,8 @@ class System:
         self._clocks = {name: replace(clock) for name, clock in rehearsal.clocks.items()}
         self._behind: dict[str, Process] = {}
         """Processes with something in their inbox."""
+        self._simulation = b""
+        """The fingerprint of the engine, once a node has built one."""
         self._run = settings
         self._journal: list[bytes] = []
         """The supervisor's, where it may be started again."""
@@ -142,10 +144,12 @@ class System:
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
         core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self._now_of(name))
-        solver = self.solvers[name] = Solver(core, self.settings.factory)
+        # The processes of a rehearsal are one: the small run of one node is that of all.
+        solver = self.solvers[name] = Solver(core, self.settings.factory, self._simulation)
 
         def turn(now_ns: int) -> None:
             solver.build_wanted()
+            self._simulation = self._simulation or solver.fingerprint
             core.advance(now_ns)
             while core.work is not None:
                 solver.solve(core.work)
@@ -252,8 +256,9 @@ class System:
     def _core_deadline_ns(self, process: Process) -> int:
         """Return when a core has something to do next, in virtual time."""
         core, clock = process.core, process.clock
-        now_ns = clock.at(self.bus.now_ns)
-        return clock.when(core.deadline_ns(now_ns) if core is self.supervisor else core.deadline_ns())
+        if core is self.supervisor:
+            return clock.when(core.deadline_ns(clock.at(self.bus.now_ns)))
+        return clock.when(core.deadline_ns())
 
     def _plan_wake(self, process: Process) -> None:
         """After a turn: see when the process has something to do by time, as its loop does.
@@ -470,13 +475,18 @@ class System:
         """Ask the supervisor for something, every `again_ns` until it answers (0: once); return the request's id."""
         self._requests += 1
         identity = f"request-{self._requests}"
-        self.asked.append(identity)
+        self.asked[identity] = verb
         payload = encode(Request(OPERATOR, identity, verb, encode_json(arguments)))
         self._ask(identity, payload, again_ns)
         return identity
 
+    def give_up(self, verb: str) -> None:
+        """Ask no more for what is not answered yet."""
+        for identity in [known for known, what in self.asked.items() if what == verb and known not in self.answers]:
+            self.asked.pop(identity)
+
     def _ask(self, identity: str, payload: bytes, again_ns: int) -> None:
-        if identity in self.answers:
+        if identity in self.answers or identity not in self.asked:
             return
         self.bus.put(OPERATOR, channels.REQUEST, OPERATOR, payload, self.bus.now_ns)
         if again_ns:

@@ -406,11 +406,12 @@ class SupervisorCore:
     def _ask_again(self, now_ns: int) -> None:
         """Ask for what the next commit lacks, the wait doubling."""
         tick = self.frame.tick
-        wants = [] if tick in self.arrivals.deliveries else [(channels.DELIVERIES, tick)]
-        wants += [(channels.PART, tick + 1)] if self.missing_nodes else []
-        for channel, wanted in wants:
-            want = Want(channels.SUPERVISOR, channel.name, wanted, self.epoch)
-            self.actions.append(Publish(channels.WANT, channels.SUPERVISOR, encode(want)))
+        wants: list[Want] = []
+        if tick not in self.arrivals.deliveries:
+            wants.append(Want(channels.SUPERVISOR, channels.DELIVERIES.name, tick, self.epoch, []))
+        if missing := self.missing_nodes:
+            wants.append(Want(channels.SUPERVISOR, channels.PART.name, tick + 1, self.epoch, missing))
+        self.actions += [Publish(channels.WANT, channels.SUPERVISOR, encode(want)) for want in wants]
         self._patience.asked(now_ns)
 
     # --- epochs ------------------------------------------------------------------------------------------------------

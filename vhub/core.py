@@ -448,7 +448,7 @@ class HubCore:
         tick = self.state.closed + 1
         kind = channels.SAMPLES.name if tick in self._commits else channels.COMMIT.name
         if self._world is None:
-            want = Want(channels.VHUB, kind, tick, self._epoch)
+            want = Want(channels.VHUB, kind, tick, self._epoch, [])
             self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
         self._patience.asked(now_ns)
 

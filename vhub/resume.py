@@ -65,7 +65,7 @@ class Past:
         words.append(Publish(channels.DELIVERIES, channels.VHUB, self.published))
         for tick in range(state.closed + 1, state.final + 2):
             for kind in (channels.COMMIT, channels.SAMPLES):
-                want = Want(channels.VHUB, kind.name, tick, epoch)
+                want = Want(channels.VHUB, kind.name, tick, epoch, [])
                 words.append(Publish(channels.WANT, channels.VHUB, encode(want)))
         return words
 

@@ -232,7 +232,7 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
 
 def lies(system: System) -> list[Lie]:
     """Well-formed messages that are not what they say, as they would be at the present tick."""
-    stranger = Want(NOBODY, "dragon", FAR, FAR)
+    stranger = Want(NOBODY, "dragon", FAR, FAR, [])
     welcome = ClientWelcome("player-red", "other", "hub", 0, 0, "t", "")
     return [
         *lies_to_nodes(system),

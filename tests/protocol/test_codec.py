@@ -151,7 +151,7 @@ def test_bytes_that_break_careless_readers_are_malformed(payload: bytes) -> None
 
 
 def test_another_version_is_named_with_both_versions() -> None:
-    fields = plain(Want("n1", "part", 7, 1))
+    fields = plain(Want("n1", "part", 7, 1, []))
     assert isinstance(fields, list)
     for tag, other in (("want.2", "2"), ("want.0", "0"), ("part.17", "17")):
         with pytest.raises(Malformed, match=rf"protocol version {other}, this is {limits.PROTOCOL_VERSION}"):
@@ -231,8 +231,8 @@ def sent(payload: bytes) -> Sent:
 
 LONGEST = limits.NAME_LENGTH_MAX
 OVERSIZED: Final[dict[str, tuple[Any, Any, Any]]] = {
-    "a name": (Want, Want("n" * LONGEST, "k", 0, 0), Want("n" * (LONGEST + 1), "k", 0, 0)),
-    "an empty name": (Want, Want("n", "k", 0, 0), Want("", "k", 0, 0)),
+    "a name": (Want, Want("n" * LONGEST, "k", 0, 0, []), Want("n" * (LONGEST + 1), "k", 0, 0, [])),
+    "an empty name": (Want, Want("n", "k", 0, 0, []), Want("", "k", 0, 0, [])),
     "a digest": (Part, Part(1, 1, "n", bytes(32), [], b"", b"", []), Part(1, 1, "n", bytes(33), [], b"", b"", [])),
     "a payload": (
         Deliveries,
@@ -292,9 +292,9 @@ def test_what_is_longer_than_its_limit_is_refused(what: str) -> None:
 
 
 def test_unknown_and_missing_fields_are_refused() -> None:
-    fields = plain(Want("n1", "part", 7, 1))
+    fields = plain(Want("n1", "part", 7, 1, []))
     assert isinstance(fields, list)
-    for wrong in ([*fields, 0], fields[:-1], fields[1:], dict(enumerate(fields)), [*fields[:3], "7", 1]):
+    for wrong in ([*fields, 0], fields[:-1], fields[1:], dict(enumerate(fields)), [*fields[:3], "7", *fields[4:]]):
         with pytest.raises(Malformed):
             decode(Want, msgpack.packb(wrong))
 

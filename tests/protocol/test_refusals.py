@@ -37,7 +37,7 @@ class Guard:
 
 
 def true_want(name: str) -> bytes:
-    return encode(Want(name, "part", 1, 1))
+    return encode(Want(name, "part", 1, 1, []))
 
 
 def test_the_first_refusals_of_each_sender_are_told_with_their_bytes() -> None:

@@ -72,7 +72,7 @@ def test_each_tick_of_them_is_said_again_when_asked_for() -> None:
     hub.close(0)
     hub.said()
     for tick, last in ((1, 5), (3, 3), (5, 5)):
-        hub.say(channels.WANT, "n1", Want("n1", channels.DELIVERIES.name, tick, 1))
+        hub.say(channels.WANT, "n1", Want("n1", channels.DELIVERIES.name, tick, 1, []))
         assert covered(hub) == [(tick, last)]
 
 
