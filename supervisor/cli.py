@@ -259,9 +259,10 @@ def stop(node: Node, run: Run = None, json: Json = False) -> None:
 
 @app.command()
 def start(node: Node, run: Run = None, json: Json = False) -> None:
-    """Let a node that was stopped take part again, with its robots.
+    """Let a node take part again, with its robots: one that was stopped, or that its launcher has given up.
 
-    `up` starts the processes of local nodes; one that is launched by hand has to be started by hand.
+    `up` starts the processes of local nodes, with a new count of their ends; one that is launched by hand has to be
+    started by hand.
     """
     _show(control.start(node, run), json)
 
