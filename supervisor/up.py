@@ -166,7 +166,7 @@ class Up:
             return False
         self._launch(VHUB, self._vhub_command(info))
         for name, node in sorted(self.plan.deployment.nodes.items()):
-            command = ["foosim-node", "--name", name, "--connect", info.simulation, *options.pki_arguments()]
+            command = ["foosim-node", "--name", name, "--connect", info.simulation, *self._pki_arguments(name)]
             if node.launch != "manual":
                 self._launch(name, command)
             else:
@@ -175,7 +175,7 @@ class Up:
         if info is None:
             return False
         for name in sorted(self.plan.deployment.players):
-            command = ["foosim-player", "--name", name, "--connect", info.radio, *options.pki_arguments()]
+            command = ["foosim-player", "--name", name, "--connect", info.radio, *self._pki_arguments(name)]
             self._launch(name, command)
         return True
 
@@ -188,9 +188,15 @@ class Up:
             folder, capture = Path(), None if capture is None else Path(CAPTURE)
         command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(listen)]
         command += ["--insecure"] if options.insecure else []
-        command += options.pki_arguments()
+        command += self._pki_arguments(VHUB)
         command += ["--run-folder", str(folder)]
         return [*command, "--no-capture"] if capture is None else [*command, "--capture", str(capture)]
+
+    def _pki_arguments(self, name: str) -> list[str]:
+        """Return where a process finds its certificate: in the folder of this machine, or of the one that it is on."""
+        remote = self._launcher.remotes.get(name)
+        given = self.plan.options.pki_arguments()
+        return remote.pki_arguments() if given and remote is not None else given
 
     def _bring_home(self) -> None:
         """Fetch the capture from the machine on which the vHub wrote it."""
