@@ -23,7 +23,8 @@ from foosim.protocol.draws import Slot
 from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Counter, Delivered, Edit, Epoch, Freeze, Push, Remove, Thaw
+from foosim.protocol.message_types import Counter
+from foosim.protocol.messages import Add, Delivered, Edit, Epoch, Freeze, Push, Remove, Thaw
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
 from foosim.vhub.records import Closing
 
