@@ -48,6 +48,8 @@ OUTBOX_PACKETS_MAX: Final = 64
 OUTBOX_BYTES_MAX: Final = 1024
 
 INBOX_MESSAGES_MAX: Final = 65_536
+RECOVERIES_PER_COMMIT_MAX: Final = 1_024
+"""How many losses and returns a commit tells of; what is beyond it is told by the next one."""
 KEPT_TICKS: Final = 16
 """How many ticks of what it sent each process keeps for those that ask again."""
 RELEASE_AHEAD: Final = 4

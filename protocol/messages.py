@@ -11,21 +11,10 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-from msgspec import Meta
+from msgspec import Meta, field
 
 from foosim.protocol import limits
-from foosim.protocol.message_types import (
-    Counter,
-    Digest,
-    Item,
-    Message,
-    Name,
-    Names,
-    Numbers,
-    Payload,
-    Text,
-    Vector,
-)
+from foosim.protocol.message_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text, Vector
 
 # --- what changes the world: the edits of an order -------------------------------------------------------------------
 
@@ -159,10 +148,25 @@ class Part(Message, frozen=True):
     outboxes: Outboxes
 
 
+class Recovered(Item, frozen=True):
+    """A loss or a return that is over: `what` (node, join, supervisor, vhub) of `name`, behind frame `tick`, with
+    `epoch` the first without or with it; `outage_ns` is the supervisor's wall time without a commit."""
+
+    what: Name
+    name: Name
+    reason: Text
+    tick: Counter
+    epoch: Counter
+    outage_ns: Counter
+
+
+Recoveries = Annotated[list[Recovered], Meta(max_length=limits.RECOVERIES_PER_COMMIT_MAX)]
+
+
 class Commit(Message, frozen=True):
     """Frame `tick` as the supervisor assembled it, with the order that led to it (none for frame 0).
 
-    `last` says that the run ends with this frame: its tick is not closed.
+    `last` says that the run ends with this frame: its tick is not closed. `recovered` is what ends with this frame.
     """
 
     epoch: Counter
@@ -172,6 +176,7 @@ class Commit(Message, frozen=True):
     outboxes: Outboxes
     edits: Edits
     last: bool
+    recovered: Recoveries = field(default_factory=list)
 
 
 class Want(Message, frozen=True):
