@@ -98,6 +98,7 @@ def _start(core: HubCore, text: str, journal: Journal | None) -> None:
     """Build the hub, let the clients join, begin."""
     build = Build(channels.VHUB, "boot", "first", "bench", TABLE.name, text, "fast", [])
     core.receive(channels.BUILD, channels.VHUB, encode(build), 0)
+    core.begin(None, 0)
     for name in CLIENTS:
         hello = ClientHello(name, "boot", limits.PROTOCOL_VERSION, "", 0)
         core.receive(channels.CLIENT_HELLO, name, encode(hello), 0)

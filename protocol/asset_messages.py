@@ -1,6 +1,6 @@
 """The messages by which files travel that a deployment refers to; the same rules as for all others.
 
-Neighbours: `messages` has what they share, `fetching` says and takes them.
+Neighbours: `message_types` has what they share, `fetching` says and takes them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from foosim.protocol import limits
-from foosim.protocol.messages import Counter, Digest, Message, Name
+from foosim.protocol.message_types import Counter, Digest, Message, Name
 
 
 class Fetch(Message, frozen=True):

@@ -15,7 +15,7 @@ import msgspec
 
 from foosim.protocol import limits
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import VERSION_SUFFIX
+from foosim.protocol.message_types import VERSION_SUFFIX
 
 _json_encoder = msgspec.json.Encoder()
 

@@ -48,6 +48,18 @@ OUTBOX_PACKETS_MAX: Final = 64
 OUTBOX_BYTES_MAX: Final = 1024
 
 INBOX_MESSAGES_MAX: Final = 65_536
+CLIENT_INBOX_BYTES_MAX: Final = 8 * 1024 * 1024
+"""What one client says between two closings of the vHub; what is beyond it is refused."""
+CLIENT_INBOXES_BYTES_MAX: Final = 32 * 1024 * 1024
+"""The same of all clients: half of what a record of the vHub's journal may be."""
+PACKET_HEAD_BYTES_MAX: Final = 128
+"""What a packet takes in a message beside its payload."""
+ROBOTS_BYTES_PER_TICK_MAX: Final = 3 * 1024 * 1024
+"""What reaches robots at one tick, which is one message; what is beyond it is dropped."""
+CLIENT_BYTES_PER_TICK_MAX: Final = 768 * 1024
+"""The same of one client."""
+RECOVERIES_PER_COMMIT_MAX: Final = 1_024
+"""How many losses and returns a commit tells of; what is beyond it is told by the next one."""
 KEPT_TICKS: Final = 16
 """How many ticks of what it sent each process keeps for those that ask again."""
 RELEASE_AHEAD: Final = 4

@@ -11,34 +11,10 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-import msgspec
-from msgspec import Meta
+from msgspec import Meta, field
 
 from foosim.protocol import limits
-
-Counter = Annotated[int, Meta(ge=0, le=limits.COUNTER_MAX)]
-Name = Annotated[str, Meta(min_length=1, max_length=limits.NAME_LENGTH_MAX)]
-Text = Annotated[str, Meta(max_length=limits.TEXT_LENGTH_MAX)]
-Digest = Annotated[bytes, Meta(min_length=32, max_length=32)]
-Payload = Annotated[bytes, Meta(max_length=limits.PAYLOAD_BYTES_MAX)]
-Numbers = Annotated[bytes, Meta(max_length=limits.MESSAGE_BYTES_MAX)]
-Names = Annotated[list[Name], Meta(max_length=limits.ENTITIES_MAX)]
-Vector = tuple[float, float, float]
-
-VERSION_SUFFIX = f".{limits.PROTOCOL_VERSION}"
-
-
-def _tag(class_name: str) -> str:
-    return class_name.lower() + VERSION_SUFFIX
-
-
-class Message(msgspec.Struct, frozen=True, array_like=True, tag=_tag, forbid_unknown_fields=True, gc=False):
-    """What every message of the wire shares: array form, a tag with the version, no unknown fields."""
-
-
-class Item(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, gc=False):
-    """A part of a message, without a tag of its own."""
-
+from foosim.protocol.message_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text, Vector
 
 # --- what changes the world: the edits of an order -------------------------------------------------------------------
 
@@ -172,10 +148,25 @@ class Part(Message, frozen=True):
     outboxes: Outboxes
 
 
+class Recovered(Item, frozen=True):
+    """A loss or a return that is over: `what` (node, join, supervisor, vhub) of `name`, behind frame `tick`, with
+    `epoch` the first without or with it; `outage_ns` is the supervisor's wall time without a commit."""
+
+    what: Name
+    name: Name
+    reason: Text
+    tick: Counter
+    epoch: Counter
+    outage_ns: Counter
+
+
+Recoveries = Annotated[list[Recovered], Meta(max_length=limits.RECOVERIES_PER_COMMIT_MAX)]
+
+
 class Commit(Message, frozen=True):
     """Frame `tick` as the supervisor assembled it, with the order that led to it (none for frame 0).
 
-    `last` says that the run ends with this frame: its tick is not closed.
+    `last` says that the run ends with this frame: its tick is not closed. `recovered` is what ends with this frame.
     """
 
     epoch: Counter
@@ -185,6 +176,7 @@ class Commit(Message, frozen=True):
     outboxes: Outboxes
     edits: Edits
     last: bool
+    recovered: Recoveries = field(default_factory=list)
 
 
 class Want(Message, frozen=True):

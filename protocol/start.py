@@ -16,7 +16,8 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.protocol.layout import Entity, Layout, build_layout
-from foosim.protocol.messages import Added, AddedEntity, Numbers, Origin, Outboxes
+from foosim.protocol.message_types import Numbers
+from foosim.protocol.messages import Added, AddedEntity, Origin, Outboxes
 
 
 def place_ball(

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 
+from msgspec.structs import replace
+
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
@@ -25,13 +27,14 @@ from foosim.protocol.messages import (
     Go,
     Order,
     Part,
+    Recovered,
 )
 from foosim.protocol.start import initial_frame
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.packet_laws import PacketLaws, hold
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import System
-from foosim.supervisor.records import CommitRecord, OrderedRecord, RequestRecord
+from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
 from foosim.vhub.records import Closing, HubRecord, TickRecord
@@ -66,6 +69,10 @@ class Laws:
         self._answers: dict[tuple[str, str], bytes] = {}
         self._chosen = deployment.owners()
         """The owner of each robot by the deployment, or by who moved it last."""
+        self._untold: list[Recovered] = []
+        """Losses and returns that are written, and of which no commit has told."""
+        self._told: dict[int, list[Recovered]] = {}
+        """What each commit has told that no closing has, by tick."""
         self._journals: dict[str, list[bytes]] = {channels.SUPERVISOR: [], channels.VHUB: []}
         self._readers: Mapping[tuple[str, str], Callable[[Traced], None]] = {
             ("journal", channels.SUPERVISOR): self._supervisor_writes,
@@ -101,6 +108,8 @@ class Laws:
             self._begins(record, traced.payload)
         elif isinstance(record, OrderedRecord):
             self._ordered.setdefault(record.tick, []).extend(record.edits)
+        elif isinstance(record, RecoveredRecord):
+            self._untold.append(record.entry.message())
         elif isinstance(record, RequestRecord):
             key = record.answer.sender, record.answer.id
             hold(key not in self._answers, f"request {key} is carried out twice")
@@ -118,6 +127,7 @@ class Laws:
         hold(tick == self.committed + 1, f"commit {tick} after {self.committed}")
         hold(epoch == self.epoch, f"commit {tick} of epoch {epoch} in epoch {self.epoch}")
         self._commits[tick] = raw
+        self._tells(commit)
         if tick == 0:
             hold(commit.digest == self._digests[0], "frame 0 is not that of the deployment")
             return
@@ -134,6 +144,14 @@ class Laws:
         hold(solved == list(range(len(solved))), f"tick {tick}: entities {solved} are solved")
         for old in [key for key in self._parts if key[1] <= tick]:
             self._parts.pop(old)
+
+    def _tells(self, commit: Commit) -> None:
+        """Whoever was lost or came is told of by the commit behind it, once, in the order of the journal."""
+        told = [replace(entry, outage_ns=-1) for entry in commit.recovered]
+        hold(told == self._untold, f"commit {commit.tick} tells of {told}, and {self._untold} were written")
+        self._untold.clear()
+        if commit.recovered:
+            self._told[commit.tick] = commit.recovered
 
     def _basis(self, tick: int, edits: list[Edit]) -> bytes:
         """Return what all parts of frame `tick` have to start from."""
@@ -222,6 +240,8 @@ class Laws:
         """Compute the tick again from what led to it: the frame must be the same to the last bit."""
         frame = closing.frame
         self.packets.fates(closing)
+        told = self._told.pop(frame.tick, [])
+        hold(closing.recovered == told, f"tick {frame.tick} is captured with {closing.recovered}, commits tell {told}")
         if frame.tick != self._replica.frame.tick + 1:
             return  # frame 0, or the last one of a run that ended before all was closed
         again = self._replica.step(closing.edits, closing.delivered)
@@ -253,6 +273,7 @@ class Laws:
         hold(not strayed, f"healed, {strayed} are not where they belong")
         asked = [identity for identity in system.asked if identity not in system.answers]
         hold(not asked, f"{asked} are not answered")
+        hold(not self._told, f"what ticks {[*self._told]} tell is not in the capture")
         history = fold_supervisor(self._deployment, self._journals[channels.SUPERVISOR])
         hold(
             history.chain == self._chain and history.frame.digest == supervisor.frame.digest, "another chain is folded"

@@ -51,7 +51,7 @@ def foosim_replay(version: VersionOption = False) -> None:
 
 @app.command()
 def info(capture: Capture, json: Json = False) -> None:
-    """Show what a capture holds: run, duration, digests, nodes and their arithmetic, packets, topics."""
+    """Show what a capture holds: run, duration, digests, nodes and their arithmetic, packets, recoveries, topics."""
     with _read():
         found = capture_info(capture)
     typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
@@ -71,6 +71,7 @@ def _describe(found: CaptureInfo) -> str:
         f"  nodes {', '.join(found.nodes) or 'not known'}",
         f"  arithmetic {', '.join(found.arithmetic) or 'not known'}",
         f"  packets {', '.join(f'{count} {fate}' for fate, count in packets.items())}",
+        f"  recoveries {found.recoveries}",
         "  topics",
         *(f"    {topic}: {count}" for topic, count in found.topics.items()),
         "  versions",

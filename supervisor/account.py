@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from foosim.protocol import limits, messages
+
 
 @dataclass(slots=True)
 class Account:
@@ -40,10 +42,20 @@ class Recovered:
     epoch: int
     outage_ns: int = -1
 
+    def message(self) -> messages.Recovered:
+        """Return it as a commit tells of it, when it is over."""
+        return messages.Recovered(self.what, self.name, self.reason, self.tick, self.epoch, self.outage_ns)
 
-def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int) -> None:
-    """A frame is committed at `now_ns`, the one before it was at `before_ns`: what was out goes on."""
-    for entry in reversed(recovered):
-        if entry.outage_ns >= 0:
-            return
+
+def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int) -> list[Recovered]:
+    """A frame is committed at `now_ns`, the one before it was at `before_ns`: what was out goes on.
+
+    Return what is over by that, the oldest first; no more of it than a commit can tell of, the rest by the next one.
+    """
+    first = len(recovered)
+    while first > 0 and recovered[first - 1].outage_ns < 0:
+        first -= 1
+    over = list(recovered[first : first + limits.RECOVERIES_PER_COMMIT_MAX])
+    for entry in over:
         entry.outage_ns = max(0, now_ns - before_ns)
+    return over

@@ -23,7 +23,8 @@ from foosim.protocol.command import PKI_VARIABLE
 from foosim.protocol.errors import BadValue, Failed, Malformed, Refused
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Wire
-from foosim.protocol.messages import Answer, Request, Vector
+from foosim.protocol.message_types import Vector
+from foosim.protocol.messages import Answer, Request
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.protocol.units import parse_pace

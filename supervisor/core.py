@@ -43,14 +43,14 @@ from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain, first_frame
 from foosim.supervisor.absence import Absence
-from foosim.supervisor.account import Account
+from foosim.supervisor.account import Account, Recovered
 from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.balance import Balancer
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.plan import RunSettings
-from foosim.supervisor.records import CommitRecord, Control, History, RunRecord, solved_by
+from foosim.supervisor.records import CommitRecord, Control, History, RunRecord, Solved, solved_by
 from foosim.supervisor.recovery import Recovery
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
@@ -367,17 +367,17 @@ class SupervisorCore:
         self._take_frame(frame, edits, solved_by(barrier, frame), now_ns)
         return True
 
-    def _take_frame(self, frame: Frame, edits: list[Edit], solved: tuple[list[str], str], now_ns: int) -> None:
+    def _take_frame(self, frame: Frame, edits: list[Edit], solved: Solved, now_ns: int) -> None:
         self.frame = frame
         self.account.count(*solved)
         self.chain = chain_next(self.chain, frame.digest)
-        self.recovery.committed(self.committed_ns, now_ns)
+        recovered = self.recovery.committed(self.committed_ns, now_ns)
         self.absence.committed(self.committed_ns, now_ns)
         self.committed_ns = now_ns
         self._patience.progress(self.deployment.tick_ns, now_ns)
         due_ns = self.pacer.release_ns(frame.tick - 1) or 0
         moved_ns = self.pacer.committed(frame.tick, now_ns)
-        self._say_commit(edits, solved, now_ns)
+        self._say_commit(edits, solved, now_ns, recovered)
         if self.on_commit is not None:
             self.on_commit(frame)
         late = self.watch.committed(frame.tick, self.pacer.last_lag_ns, due_ns, now_ns)
@@ -386,11 +386,12 @@ class SupervisorCore:
         elif late:
             self.say("info", late)
 
-    def _say_commit(self, edits: list[Edit], solved: tuple[list[str], str], now_ns: int) -> None:
-        """Journal a frame and who solved it, then publish it to the vHub."""
+    def _say_commit(self, edits: list[Edit], solved: Solved, now_ns: int, recovered: Iterable[Recovered] = ()) -> None:
+        """Journal a frame, who solved it and what is over by it, then publish it to the vHub."""
         frame = self.frame
         last = self.stop_at > 0 and frame.tick >= self.stop_at
-        commit = Commit(self.epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, edits, last)
+        content = frame.digest, frame.values.tobytes(), frame.outbox_items, edits
+        commit = Commit(self.epoch, frame.tick, *content, last, [entry.message() for entry in recovered])
         payload = encode(commit)
         self.commits[frame.tick] = payload
         self.commits.pop(frame.tick - limits.KEPT_TICKS, None)

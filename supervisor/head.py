@@ -13,6 +13,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import added_entities
 from foosim.protocol.units import parse_pace
+from foosim.supervisor.account import close_outages
 from foosim.supervisor.records import Control, HeadRecord, History
 
 if TYPE_CHECKING:
@@ -74,4 +75,6 @@ def stand_at(core: SupervisorCore, frame: Frame, chain: bytes, commit: bytes) ->
     core.frame, core.chain = frame, chain
     core.released, core.arrivals.delivered = frame.tick, frame.tick - 1
     core.commits = {frame.tick: commit}
+    # What was open is over by a commit that the journal lost, and that told how long it took: it is not told again.
+    close_outages(core.recovery.recovered, core.committed_ns, core.committed_ns)
     core.actions.append(Journal(head_of(core)))

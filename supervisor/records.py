@@ -145,7 +145,11 @@ class History:
     end: End | None = None
 
 
-def solved_by(barrier: Barrier, frame: Frame) -> tuple[list[str], str]:
+Solved = tuple[list[str], str]
+"""The nodes that solved a body on the way to a frame, and who solved the ball (empty for the first frame)."""
+
+
+def solved_by(barrier: Barrier, frame: Frame) -> Solved:
     """Return the nodes that solved a body on the way to a frame, and who solved the ball."""
     entities = frame.layout.entities
     names = [name for name, part in barrier.parts.items() if any(entities[index].has_body for index in part.solved)]
@@ -243,5 +247,7 @@ def _commit(history: History, record: CommitRecord) -> None:
     history.account.count(record.solved, record.ball_solver)
     if record.lag_ns >= 0:
         history.lags.add(record.lag_ns)
-    close_outages(history.recovered, history.committed_ns, record.now_ns)
+    over = close_outages(history.recovered, history.committed_ns, record.now_ns)
+    for entry, told in zip(over, commit.recovered, strict=False):
+        entry.outage_ns = told.outage_ns  # the vHub's is longer than that between two commits
     history.committed_ns = record.now_ns

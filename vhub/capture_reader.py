@@ -52,6 +52,7 @@ from foosim.vhub.rows import (
     LAYOUT,
     PACKETS,
     PROFILE,
+    RECOVERIES,
     ROW_TYPES,
     TICK,
     CaptureError,
@@ -60,6 +61,7 @@ from foosim.vhub.rows import (
     FrameRow,
     LayoutRow,
     PacketRow,
+    RecoveryRow,
     Row,
     TickRow,
     delivered_of,
@@ -184,6 +186,7 @@ class CaptureData:
     """Captured frames, a block for each layout."""
     clients: tuple[ClientRow, ...]
     epochs: tuple[EpochRow, ...]
+    recoveries: tuple[RecoveryRow, ...]
 
     @property
     def path(self) -> Path:
@@ -273,7 +276,7 @@ def open_capture(path: Path | str) -> CaptureData:
     digests: list[bytes] = []
     layouts: list[LayoutRow] = []
     frames: list[list[FrameRow]] = []
-    others: dict[str, list[Any]] = {CLIENTS: [], EPOCHS: []}
+    others: dict[str, list[Any]] = {CLIENTS: [], EPOCHS: [], RECOVERIES: []}
     for message in scan.messages():
         if message.topic == TICK:
             tick_row = scan.decode(_DECODERS[TICK], message)
@@ -307,6 +310,7 @@ def open_capture(path: Path | str) -> CaptureData:
         tuple(blocks),
         tuple(others[CLIENTS]),
         tuple(others[EPOCHS]),
+        tuple(others[RECOVERIES]),
     )
 
 
@@ -338,7 +342,7 @@ class CaptureInfo:
     """A capture in short, for people and scripts. Digests are hex; `packets` counts fates.
 
     `first_tick` is that of the frame that the run began with, `ticks` that of the last one. `nodes` are those that took
-    part; `arithmetic` has each digest of a fixed small run of their engine.
+    part; `arithmetic` has each digest of a fixed small run of their engine. `recoveries` counts losses and returns.
     """
 
     path: str
@@ -358,6 +362,7 @@ class CaptureInfo:
     nodes: tuple[str, ...]
     arithmetic: tuple[str, ...]
     packets: Mapping[str, int]
+    recoveries: int
     topics: Mapping[str, int]
 
 
@@ -403,5 +408,6 @@ def capture_info(path: Path | str) -> CaptureInfo:
         tuple(sorted(nodes)),
         tuple(sorted(arithmetic - {""})),
         {"offered": fates.total(), **{fate: fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
+        topics[RECOVERIES],
         dict(sorted(topics.items())),
     )

@@ -52,7 +52,7 @@ from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
 from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closing
 from foosim.vhub.packet import Flight
-from foosim.vhub.records import Closing, HeadRecord, missing_robots, tick_record, world_packets
+from foosim.vhub.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
 from foosim.vhub.report import HubStatistics, report, statistics
 from foosim.vhub.resume import Past
@@ -243,9 +243,7 @@ class HubCore:
             state.leave(name)
         for joining in joins:
             state.join(joining, tick)
-        closing = Closing(
-            frame, commit.digest, commit.edits, state.deliveries.get(tick - 1, []), joins, leaves, wall_ns=now_ns
-        )
+        closing = closing_of(frame, commit, state, joins, leaves, now_ns)
         released = state.close_world(frame, packets, closing.fates)
         due = state.due_members(tick)
         for name in due:

@@ -112,7 +112,7 @@ class Door:
         session = self._session(up)
         if session is None or core.state is None:
             return
-        if len(session.inbox) + len(up.packets) > limits.INBOX_MESSAGES_MAX:
+        if not core.sessions.admits(session, len(up.packets), len(payload)):
             core.state.refuse_at_door("inbox_full", len(up.packets))
             return
         repeated = session.take(up.packets)

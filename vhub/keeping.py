@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from foosim.protocol.messages import Epoch
 from foosim.vhub.commits import Committed
 from foosim.vhub.packet import IN_FLIGHT
-from foosim.vhub.records import Closing
+from foosim.vhub.records import Closing, closing_of
 from foosim.vhub.state import HubState
 
 
@@ -54,7 +54,6 @@ def last_closing(state: HubState, committed: Committed, half_closed: Closing | N
     flights = state.in_flight()
     for flight in flights:
         flight.cause = IN_FLIGHT
-    delivered = state.deliveries.get(frame.tick - 1, [])
-    closing = half_closed or Closing(frame, commit.digest, commit.edits, delivered, wall_ns=now_ns)
+    closing = half_closed or closing_of(frame, commit, state, [], [], now_ns)
     closing.fates += flights
     return closing

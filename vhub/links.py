@@ -53,10 +53,13 @@ class Link:
                 return False
         return True
 
-    def arrive(self, flight: Flight, receiver_down: bool) -> bool:
-        """Judge a packet at arrival: True when it is delivered, False when it is dropped."""
+    def arrive(self, flight: Flight, hindered: str) -> bool:
+        """Judge a packet at arrival: True when it is delivered, False when it is dropped.
+
+        `hindered` is why its receiver does not take it; empty when it does.
+        """
         for stage in self._stages:
-            cause = stage.at_arrival(flight, receiver_down)
+            cause = stage.at_arrival(flight, hindered)
             if cause:
                 flight.cause = cause
                 self.state.dropped += 1

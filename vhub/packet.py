@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from foosim.protocol.limits import PACKET_HEAD_BYTES_MAX
+
 DELIVERED: Final = "delivered"
 DROPPED: Final = "dropped"
 IN_FLIGHT: Final = "in_flight"
@@ -52,3 +54,8 @@ class Flight:
         self.words: tuple[int, ...] = ()
         """The draws of the packet, when a stage asked for them: eight 64-bit words."""
         self.released_wall_ns = 0
+
+
+def size_of(flight: Flight) -> int:
+    """Return how many bytes a packet takes in a message at most."""
+    return PACKET_HEAD_BYTES_MAX + len(flight.payload)

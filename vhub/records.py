@@ -18,7 +18,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Build, Commit, Delivered, Edit, Epoch, RobotPacket, Samples, Sent
+from foosim.protocol.messages import Build, Commit, Delivered, Edit, Epoch, Recovered, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
 from foosim.protocol.start import first_chain
 from foosim.vhub.packet import Flight
@@ -90,6 +90,17 @@ class Closing:
     leaves: list[str] = field(default_factory=list)
     fates: list[Flight] = field(default_factory=list)
     wall_ns: int = 0
+    recovered: Sequence[Recovered] = ()
+    """Losses and returns that were over with this frame."""
+
+
+def closing_of(
+    frame: Frame, commit: Commit, state: HubState, joins: list[Joining], leaves: list[str], wall_ns: int = 0
+) -> Closing:
+    """Return the closing of a committed frame's tick, without its fates; `state` is that before it."""
+    delivered = state.deliveries.get(frame.tick - 1, [])
+    came = joins, leaves
+    return Closing(frame, commit.digest, commit.edits, delivered, *came, wall_ns=wall_ns, recovered=commit.recovered)
 
 
 def tick_record(
@@ -183,9 +194,7 @@ class Fold:
         packets = world_packets(samples, commit.digest, frame, state.sampling)
         if packets is None or frame.tick != state.closed + 1 or record.tick != frame.tick:
             raise Malformed(f"record {record.tick} of the vHub's journal does not follow on tick {state.closed}")
-        closing = Closing(
-            frame, commit.digest, commit.edits, state.deliveries.get(frame.tick - 1, []), record.joins, record.leaves
-        )
+        closing = closing_of(frame, commit, state, record.joins, record.leaves)
         for name in record.leaves:
             state.leave(name)
         for joining in record.joins:

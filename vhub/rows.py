@@ -23,7 +23,8 @@ from foosim.protocol.draws import Slot
 from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Counter, Delivered, Edit, Epoch, Freeze, Push, Remove, Thaw
+from foosim.protocol.message_types import Counter
+from foosim.protocol.messages import Add, Delivered, Edit, Epoch, Freeze, Push, Recovered, Remove, Thaw
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
 from foosim.vhub.records import Closing
 
@@ -191,7 +192,23 @@ class EpochRow(Row, frozen=True):
     arithmetic: ArithmeticHex
 
 
+class RecoveryRow(Row, frozen=True):
+    """A process that was lost or came behind frame `tick`, and the `epoch` that is the first without or with it.
+
+    `what` is `node` (a node was lost), `join` (one came), `supervisor` (it was started again) or `vhub` (it was lost,
+    and is back). `wall_outage_ns` is the wall time without a commit, by the supervisor's clock.
+    """
+
+    what: str
+    name: str
+    reason: str
+    tick: Counter
+    epoch: Counter
+    wall_outage_ns: Counter
+
+
 EPOCHS: Final = "/epochs"
+RECOVERIES: Final = "/recoveries"
 TICK: Final = "/tick"
 LAYOUT: Final = "/layout"
 FRAME: Final = "/frame"
@@ -200,6 +217,7 @@ CLIENTS: Final = "/clients"
 
 ROW_TYPES: Final[Mapping[str, type[Row]]] = {
     EPOCHS: EpochRow,
+    RECOVERIES: RecoveryRow,
     LAYOUT: LayoutRow,
     CLIENTS: ClientRow,
     TICK: TickRow,
@@ -263,6 +281,7 @@ def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
         if known is None or known.layout.digest != frame.layout.digest:
             entries.append((LAYOUT, at_ns, at_ns, mark, layout_row(frame, plan.base)))
         entries += [(CLIENTS, at_ns, at_ns, mark, row) for row in _client_rows(closing)]
+        entries += [_recovery_entry(entry, plan) for entry in closing.recovered]
         entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
         if known is None or frame.tick % plan.frames_every == 0:
             entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
@@ -331,6 +350,13 @@ def epoch_entry(epoch: Epoch, plan: Plan) -> Entry:
     owners = [OwnerRow(robot, node) for robot, node in epoch.owners]
     row = EpochRow(epoch.tick, epoch.epoch, epoch.digest.hex(), list(epoch.roster), owners, epoch.arithmetic.hex())
     return EPOCHS, at_ns, at_ns, epoch.tick & 0xFFFF_FFFF, row
+
+
+def _recovery_entry(entry: Recovered, plan: Plan) -> Entry:
+    """Return the row of a loss or return, at the tick behind which it was."""
+    at_ns = entry.tick * plan.tick_ns
+    row = RecoveryRow(entry.what, entry.name, entry.reason, entry.tick, entry.epoch, entry.outage_ns)
+    return RECOVERIES, at_ns, at_ns, entry.tick & 0xFFFF_FFFF, row
 
 
 def layout_row(frame: Frame, base: Layout) -> LayoutRow:

@@ -66,11 +66,13 @@ class Session:
     allowed_ns: int = 0
     done: Done | None = None
     inbox: list[Sent] = field(default_factory=list)
+    inbox_bytes: int = 0
+    """As they came."""
 
     def come(self, boot: str, received: int, sequence: int) -> None:
         """A process of the client is here; it goes on behind these numbers."""
         if boot != self.boot:
-            self.inbox, self.next_sequence = [], 1
+            self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
         self.is_present = self.is_present and boot == self.boot
         self.boot, self.received, self.is_behind, self.away_ns = boot, received, True, -1
         self.next_sequence = max(self.next_sequence, sequence + 1)
@@ -102,6 +104,8 @@ class Sessions:
         self.joins: dict[str, Joining] = {}
         """Joins that wait for a tick, by client."""
         self.downlinks = Downlinks()
+        self._waiting_bytes = 0
+        """Of what all of them sent between closings."""
         self._left_behind: dict[str, list[Sent]] = {}
         """What clients had sent before they went."""
         self._hub_boot = hub_boot
@@ -197,6 +201,17 @@ class Sessions:
         self.joins.pop(name, None)
         self._left_behind.setdefault(name, []).extend(session.inbox)
 
+    def admits(self, session: Session, packets: int, size: int) -> bool:
+        """Count what a free-running client says, so many packets in so many bytes; False when that is too much."""
+        whole = self._waiting_bytes + size
+        of_it = session.inbox_bytes + size
+        if len(session.inbox) + packets > limits.INBOX_MESSAGES_MAX or of_it > limits.CLIENT_INBOX_BYTES_MAX:
+            return False
+        if whole > limits.CLIENT_INBOXES_BYTES_MAX:
+            return False
+        self._waiting_bytes, session.inbox_bytes = whole, of_it
+        return True
+
     def take_sent(self) -> dict[str, list[Sent]]:
         """Take what clients have sent since the last call, by client.
 
@@ -206,12 +221,13 @@ class Sessions:
         for name, session in self.by_name.items():
             packets: list[Sent] = []
             if name not in self.joins:
-                packets, session.inbox = session.inbox, []
+                packets, session.inbox, session.inbox_bytes = session.inbox, [], 0
             if session.done is not None:
                 packets = [*packets, *session.done.packets]
                 session.done = None
             if packets:
                 taken[name] = taken.get(name, []) + packets
+        self._waiting_bytes = sum(session.inbox_bytes for session in self.by_name.values())
         return taken
 
     def say_go(self, session: Session, number: int, tick: int, packets: Sequence[Received], acknowledged: int) -> None:

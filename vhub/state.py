@@ -24,6 +24,8 @@ from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.jitter import gamma_quantiles_ns
 from foosim.vhub.links import Link, LinkState
 from foosim.vhub.packet import Flight
+from foosim.vhub.room import Room
+from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
 
 OUTBOX_SHIFT = 16
 """A robot's sequence number is tick x 2^16 + index."""
@@ -290,14 +292,17 @@ class HubState:
 
     def _arrive_at_clients(self, tick: int, fates: list[Flight]) -> dict[str, list[Flight]]:
         released: dict[str, list[Flight]] = {}
-        for flight in self._take_arrivals(tick, to_robots=False):
+        arriving = self._take_arrivals(tick, to_robots=False)
+        room = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False)
+        for flight in arriving:
             member = self.members.get(flight.destination)
             if member is not None and member.active and member.release_tick(tick) != tick:
                 flight.arrival_tick = member.release_tick(tick)
                 self._flights.setdefault(flight.arrival_tick, []).append(flight)
                 continue
             down = member is None or not member.active
-            if self.links[flight.source, flight.destination].arrive(flight, receiver_down=down):
+            hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
+            if self.links[flight.source, flight.destination].arrive(flight, hindered):
                 self.packets.delivered += 1
                 released.setdefault(flight.destination, []).append(flight)
             else:
@@ -307,10 +312,13 @@ class HubState:
 
     def _arrive_at_robots(self, tick: int, frame: Frame, fates: list[Flight]) -> list[Delivered]:
         deliveries = []
-        for flight in self._take_arrivals(tick, to_robots=True):
+        arriving = self._take_arrivals(tick, to_robots=True)
+        room = Room(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True)
+        for flight in arriving:
             down = flight.destination in frame.layout and frame.at(flight.destination, "down") != 0.0
             fates.append(flight)
-            if not self.links[flight.source, flight.destination].arrive(flight, receiver_down=down):
+            hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
+            if not self.links[flight.source, flight.destination].arrive(flight, hindered):
                 self.packets.dropped += 1
                 continue
             self.packets.delivered += 1

@@ -23,7 +23,7 @@ from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import plan_of, rows_of
+from foosim.vhub.rows import RECOVERIES, plan_of, rows_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 240
@@ -52,14 +52,15 @@ class Seen:
                 self.told.setdefault(traced.process, {}).setdefault(message.number, set()).add(traced.payload)
 
     def rows(self) -> list[Any]:
-        """The rows of all closings in their order, without the wall's time."""
+        """The rows of all closings in their order, without the wall's time and who was lost."""
         rows: list[Any] = []
         known = None
         plan = plan_of(DEPLOYMENT)
         for closing in self.closings:
             for topic, at_ns, _, number, row in rows_of(closing, plan, known):
                 fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
-                rows.append((topic, at_ns, number, fields))
+                if topic != RECOVERIES:
+                    rows.append((topic, at_ns, number, fields))
             known = closing.frame
         return rows
 

@@ -18,7 +18,8 @@ from foosim.protocol.actions import Publish
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.deployment_file import apply_sets
-from foosim.protocol.messages import Answer, Epoch, Heartbeat, Hello, Message, Part, Ready, Request
+from foosim.protocol.message_types import Message
+from foosim.protocol.messages import Answer, Epoch, Heartbeat, Hello, Part, Ready, Request
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.supervisor.core import SupervisorCore

@@ -38,6 +38,7 @@ from foosim.protocol.messages import (
     Heard,
     Join,
     Push,
+    Recovered,
     Remove,
     RobotPacket,
     Samples,
@@ -59,6 +60,11 @@ ADDED_AT, PUSHED_AT, REMOVED_AT = 25, 30, 45
 DOWN_FROM, DOWN_TO = 20, 40
 GONE_AT, BACK_AT = 35, 50
 EPOCH_AT = 28
+RECOVERED = {
+    29: [Recovered("node", "n1", "its connection closed", 28, 2, 3_100_000)],
+    41: [Recovered("join", "n1", "back", 40, 2, 0), Recovered("vhub", "vhub", "no heartbeat for 1 s", 38, 1, 2**62)],
+}
+"""What the commits of these frames tell of."""
 SETS = (
     "clients={watcher: {lockstep: false}}",
     "network.links=[{id: slow, from: watcher, to: '*', delay: 7 ms},"
@@ -166,7 +172,8 @@ class Driver:
             self.begin_epoch(2, "n2", noise(32, "arithmetic"))
         frame = self.frame(tick)
         epoch = len(self.run.epochs)
-        commit = Commit(epoch, tick, frame.digest, frame.values.tobytes(), frame.outbox_items, self.edits(tick), last)
+        content = frame.digest, frame.values.tobytes(), frame.outbox_items, self.edits(tick)
+        commit = Commit(epoch, tick, *content, last, RECOVERED.get(tick, []))
         self.say(channels.COMMIT, channels.VHUB, encode(commit))
         if last:
             return

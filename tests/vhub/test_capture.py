@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jsonschema
+import msgspec
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -23,7 +24,7 @@ from foosim.protocol.table_scene import build_scene
 from foosim.vhub.capture_reader import CaptureData, capture_info, open_capture
 from foosim.vhub.rows import ROW_TYPES, CaptureError, EpochRow, OwnerRow, row_schema
 from foosim.vhub.viewing import VIEW_TYPES
-from tests.vhub.conftest import noise
+from tests.vhub.conftest import RECOVERED, noise
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -121,9 +122,7 @@ def test_what_the_run_was_is_in_the_capture(capture: CaptureData, hub_run: HubRu
         (35, "watcher", "leaves"),
         (50, "watcher", "joins"),
     ]
-    with pytest.raises(
-        CaptureError, match="no rows of '/tock', there are /clients, /epochs, /frame, /layout, /packets, /tick"
-    ):
+    with pytest.raises(CaptureError, match="no rows of '/tock', there are " + ", ".join(sorted(ROW_TYPES))):
         list(capture.rows("/tock"))
 
 
@@ -139,6 +138,12 @@ def test_epochs_come_back_with_nodes_owners_and_arithmetic(capture: CaptureData,
     assert (first.arithmetic, second.arithmetic) == ("", noise(32, "arithmetic").hex())
     info = capture_info(path)
     assert (info.nodes, info.arithmetic) == (("n1", "n2"), (second.arithmetic,))
+
+
+def test_recoveries_come_back_as_the_commits_told_them(capture: CaptureData) -> None:
+    assert list(capture.rows("/recoveries")) == list(capture.recoveries)
+    found = [(r.what, r.name, r.reason, r.tick, r.epoch, r.wall_outage_ns) for r in capture.recoveries]
+    assert found == [msgspec.structs.astuple(told) for each in RECOVERED.values() for told in each]
 
 
 def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
@@ -162,10 +167,12 @@ def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
         "/layout": 3,
         "/log": 3,
         "/packets": account.offered,
+        "/recoveries": 3,
         "/scene": 3,
         "/tf": 9,
         "/tick": 65,
     }
+    assert info.recoveries == 3
     assert info.finished and info.bytes == path.stat().st_size
 
 

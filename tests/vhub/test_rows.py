@@ -20,6 +20,7 @@ from foosim.vhub.rows import (
     FRAME,
     LAYOUT,
     PACKETS,
+    RECOVERIES,
     ROW_TYPES,
     TICK,
     CaptureError,
@@ -211,4 +212,4 @@ def test_an_edit_of_a_wrong_shape_is_refused() -> None:
 
 
 def test_topics_are_those_of_the_readme() -> None:
-    assert {EPOCHS, TICK, LAYOUT, FRAME, PACKETS, CLIENTS} == set(ROW_TYPES)
+    assert {EPOCHS, RECOVERIES, TICK, LAYOUT, FRAME, PACKETS, CLIENTS} == set(ROW_TYPES)

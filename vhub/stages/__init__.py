@@ -30,8 +30,11 @@ class Stage(Protocol):
     def at_sending(self, flight: Flight, memory: Memory) -> str:
         """Judge a packet that is sent; return the cause of its drop, or an empty string."""
 
-    def at_arrival(self, flight: Flight, receiver_down: bool) -> str:
-        """Judge a packet that arrives; return the cause of its drop, or an empty string."""
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        """Judge a packet that arrives; return the cause of its drop, or an empty string.
+
+        `hindered` is why its receiver does not take it; empty when it does.
+        """
 
 
 STAGES: Final[tuple[Callable[[LinkRule | None], Stage | None], ...]] = (

@@ -41,5 +41,5 @@ class Delay:
         flight.due_ns = due_ns
         return ""
 
-    def at_arrival(self, flight: Flight, receiver_down: bool) -> str:
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
         return ""

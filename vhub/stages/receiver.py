@@ -1,8 +1,8 @@
-"""Receiver: who is down, or gone, when a packet arrives does not take it."""
+"""Receiver: who is down, or gone, or has got too much already, when a packet arrives does not take it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from foosim.protocol.deployment import LinkRule
 from foosim.vhub.packet import Flight
@@ -10,11 +10,14 @@ from foosim.vhub.packet import Flight
 if TYPE_CHECKING:
     from foosim.vhub.stages import Memory
 
-RECEIVER_DOWN = "rx_down"
+RECEIVER_DOWN: Final = "rx_down"
+RECEIVER_FULL: Final = "rx_full"
+"""What reaches a receiver at one tick is one message: what does not fit into it is lost, before anybody refuses it."""
 
 
 class Receiver:
-    """Is told of a robot's flag `down` in the newest frame before arrival, and of clients that have left."""
+    """Is told of a robot's flag `down` in the newest frame before arrival, of clients that have left, of full messages.
+    """
 
     @classmethod
     def for_rule(cls, rule: LinkRule | None) -> Receiver:
@@ -23,5 +26,5 @@ class Receiver:
     def at_sending(self, flight: Flight, memory: Memory) -> str:
         return ""
 
-    def at_arrival(self, flight: Flight, receiver_down: bool) -> str:
-        return RECEIVER_DOWN if receiver_down else ""
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        return hindered

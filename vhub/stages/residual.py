@@ -27,5 +27,5 @@ class Residual:
     def at_sending(self, flight: Flight, memory: Memory) -> str:
         return RANDOM_LOSS if flight.words[Slot.LOSS] < self._threshold else ""
 
-    def at_arrival(self, flight: Flight, receiver_down: bool) -> str:
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
         return ""

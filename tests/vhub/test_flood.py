@@ -1,0 +1,104 @@
+"""Clients that say far too much: every message stays one that its readers take, and what is too much is counted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from foosim.protocol import channels, limits
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.journal import Journal
+from foosim.protocol.messages import Deliveries, RobotPacket, Sent, Up
+from foosim.vhub.records import fold
+from tests.vhub.conftest import Driver, HubRun
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SETS: Final = ("clients={loud-1: {}, loud-2: {}, quiet: {}}", "network.links=[]", "players={}")
+LOUD: Final = ("loud-1", "loud-2")
+TICKS: Final = 6
+FLOODED: Final = 3
+
+
+class Flood(Driver):
+    """Two clients flood a robot and a third client, which says a word at each tick."""
+
+    def __init__(self, packets: int, size: int) -> None:
+        super().__init__(SETS)
+        self.sent = dict.fromkeys((*LOUD, "quiet"), 0)
+        self.said: Counter[str] = Counter()
+        """Packets by client."""
+        self._packets, self._payload = packets, bytes(size)
+
+    def _samples(self, tick: int, robot: str) -> list[RobotPacket]:
+        return []
+
+    def _clients_before(self, tick: int) -> None:
+        if tick == 0:
+            for name in self.sent:
+                self.join(name, 0, [])
+            return
+        if tick < TICKS:
+            self._say("quiet", 1, "blue.goal")
+        if tick == FLOODED:
+            for name in LOUD:
+                for part in range(4):
+                    self._say(name, self._packets // 4, ("red.goal", "quiet")[part % 2])
+
+    def _say(self, name: str, count: int, destination: str) -> None:
+        """Say as many packets as fit into a message at a time."""
+        at_once = limits.RADIO_MESSAGE_BYTES_MAX // (limits.PACKET_HEAD_BYTES_MAX + len(self._payload))
+        while count > 0:
+            numbers = range(self.sent[name] + 1, self.sent[name] + 1 + min(count, at_once))
+            packets = [Sent(number, destination, "talk", 0, self._payload) for number in numbers]
+            self.say(channels.UP, name, encode(Up(name, "one", packets)))
+            self.sent[name] = numbers[-1]
+            self.said[name] += len(numbers)
+            count -= len(numbers)
+
+
+def flooded(packets: int, size: int) -> tuple[Flood, HubRun]:
+    driver = Flood(packets, size)
+    driver.start()
+    for _ in range(TICKS):
+        driver.close()
+    return driver, driver.end()
+
+
+@pytest.mark.parametrize(("packets", "size"), [(60_000, 0), (2_000, 32_000)])
+def test_a_flood_is_refused_and_dropped_and_counted_and_fits_into_every_message(
+    packets: int, size: int, tmp_path: Path
+) -> None:
+    driver, run = flooded(packets, size)
+    state = driver.core.state
+    assert state is not None
+    for payload in (payload for payloads in run.deliveries.values() for payload in payloads):
+        decode(Deliveries, payload)
+    for _, down in run.downs:
+        decode(type(down), encode(down), limits.RADIO_MESSAGE_BYTES_MAX)
+    fates = Counter(flight.cause for closing in run.closings for flight in closing.fates)
+    account = driver.core.statistics()
+    assert fates["rx_full"] > 0 and fates["rx_full"] == account.dropped
+    assert account.offered == fates.total() and account.in_flight == fates["in_flight"]
+    behind_a_gap = driver.said.total() - account.offered - account.refused
+    assert state.refusals.keys() == ({"inbox_full"} if size else set())
+    assert behind_a_gap == 0 or size > 0, "what follows on what was refused is sent again by a client"
+    with Journal(tmp_path, "vhub") as journal:
+        for record in run.journal:
+            journal.append(record)
+    assert [again.snapshot() for again, _ in fold(driver.deployment, run.journal)][-1] == run.snapshots[-1]
+
+
+def test_a_flood_costs_others_no_packet() -> None:
+    """The words of the quiet one all come; and it hears as much of each flood as fits, the first of it."""
+    _, run = flooded(60_000, 0)
+    words = [flight.cause for closing in run.closings for flight in closing.fates if flight.source == "quiet"]
+    assert len(words) == TICKS - 1 and {*words} == {""}
+    (heard,) = [down.packets for name, down in run.downs if name == "quiet" and down.packets]
+    for name in LOUD:
+        numbers = [packet.sequence for packet in heard if packet.source == name]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        assert len(numbers) == limits.CLIENT_BYTES_PER_TICK_MAX // 2 // limits.PACKET_HEAD_BYTES_MAX

@@ -1,0 +1,46 @@
+"""How much a receiver takes at one tick: as much as fits into one message, which its readers would refuse otherwise.
+
+Where more arrives, each source has an even share of the message, so that a flood costs others nothing; what is beyond
+its share is dropped. A function of what arrives alone. Neighbours: `state` asks, `stages.receiver` has the cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from foosim.vhub.packet import Flight, size_of
+
+
+class Room:
+    """What of some flights is taken, asked in their order. `bytes_max` is that of each receiver.
+
+    `is_shared`: all of them are one receiver, since one message goes to all.
+    """
+
+    def __init__(self, flights: Iterable[Flight], bytes_max: int, *, is_shared: bool) -> None:
+        self._is_shared = is_shared
+        wanted: dict[str, dict[str, int]] = {}
+        for flight in flights:
+            of_receiver = wanted.setdefault("" if is_shared else flight.destination, {})
+            of_receiver[flight.source] = of_receiver.get(flight.source, 0) + size_of(flight)
+        self._left = {
+            (receiver, source): bytes_max // len(of_receiver)
+            for receiver, of_receiver in wanted.items()
+            if sum(of_receiver.values()) > bytes_max
+            for source in of_receiver
+        }
+        """Where too much arrives: what each source has left of its share."""
+
+    def takes(self, flight: Flight) -> bool:
+        """Whether a flight is taken."""
+        if not self._left:
+            return True
+        key = "" if self._is_shared else flight.destination, flight.source
+        left = self._left.get(key)
+        if left is None:
+            return True
+        size = size_of(flight)
+        if size > left:
+            return False
+        self._left[key] = left - size
+        return True
