@@ -24,8 +24,10 @@ import msgspec
 from foosim.protocol import wall
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.certificates import CertificateError, read_ca
+from foosim.protocol.channels import VHUB
 from foosim.protocol.errors import Refused
 from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.hosts import places
 from foosim.supervisor.children import GUARD, OTHER_VERSION
 from foosim.supervisor.doctor import Case, Finding, examine, fingerprint, is_well
 from foosim.supervisor.doctor_there import CLOCK, GREETING, LINE_BYTES_MAX, Answer, Question
@@ -48,8 +50,8 @@ END_S: Final = 5.0
 class Told:
     """What was heard of one host: its answer, or a `problem` and its `remedy`.
 
-    Its clock is `offset_ns` ahead of the one here, give or take `error_ns`; `not_reached` says why a vHub there would
-    not be reached from here.
+    Its clock is `offset_ns` ahead of the one here, give or take `error_ns`. `radio` is where a vHub there would listen,
+    if that was tried, and `not_reached` why it would not be reached from here.
     """
 
     remote: Remote
@@ -58,6 +60,7 @@ class Told:
     remedy: str = ""
     offset_ns: int = 0
     error_ns: int = 0
+    radio: str = ""
     not_reached: str = ""
 
 
@@ -74,10 +77,15 @@ def examine_all(case: Case, name: str, text: str, limit_s: float = LIMIT_S) -> l
     address = case.address
     can_be_tried = bool(address.port) and not address.is_wildcard and is_well(placement)
     reach = str(address) if can_be_tried else ""
-    question = Question("", name, text, case.listen, case.insecure, _root(case), reach)
+    question = Question("", name, text, case.listen, case.insecure, _root(case), reach, "")
+
+    def ask_one(remote: Remote) -> Told:
+        radio = str(case.radio) if reach and remote.name == places(case.deployment).get(VHUB) else ""
+        return ask(remote, msgspec.structs.replace(question, host=remote.name, radio=radio), limit_s)
+
     listener = listening(address) if can_be_tried else nullcontext()
     with listener, ThreadPoolExecutor(min(len(hosts), HOSTS_AT_ONCE)) as pool:
-        told = list(pool.map(lambda remote: ask(remote, question, limit_s), hosts))
+        told = list(pool.map(ask_one, hosts))
     own = library_fingerprint().hex()
     return [*found, *(finding for one in told for finding in findings_of(one, own, case.deployment.mixed_cpu))]
 
@@ -127,7 +135,7 @@ def ask(remote: Remote, question: Question, limit_s: float) -> Told:
         limit = threading.Timer(limit_s, end)
         limit.start()
         try:
-            told = _converse(remote, msgspec.structs.replace(question, host=remote.name), process)
+            told = _converse(remote, question, process)
         finally:
             limit.cancel()
             code = _end(process)
@@ -151,10 +159,10 @@ def _converse(remote: Remote, question: Question, process: subprocess.Popen[byte
         _say(given, msgspec.json.encode(question))
         line = said.readline(LINE_BYTES_MAX)
         answer = msgspec.json.decode(line, type=Answer)
-        not_reached = why_not_reached(parse_address(answer.radio)) if answer.radio else ""
+        not_reached = why_not_reached(parse_address(question.radio)) if question.radio else ""
     except (OSError, ValueError, Refused):  # the connection ended, or what came is no answer: how it ended says why
         return None
-    return Told(remote, answer, "", "", offset_ns, error_ns, not_reached)
+    return Told(remote, answer, "", "", offset_ns, error_ns, question.radio, not_reached)
 
 
 def _compare_clocks(given: IO[bytes], said: IO[bytes]) -> tuple[int, int]:
@@ -218,8 +226,8 @@ def findings_of(told: Told, own_fingerprint: str, mixed_cpu: bool) -> list[Findi
         _clock_finding(told),
         _arithmetic_finding(name, answer.fingerprint, own_fingerprint, mixed_cpu),
     ]
-    if answer.radio:
-        compared.append(_radio_finding(name, answer.radio, told.not_reached))
+    if told.radio:
+        compared.append(_radio_finding(name, told.radio, told.not_reached))
     return [*compared, *(replace(finding, host=name) for finding in answer.findings)]
 
 

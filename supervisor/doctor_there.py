@@ -7,9 +7,8 @@ until standard input ends: whether others reach it can only be tried. Neighbours
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 from typing import IO, Final
 
@@ -31,8 +30,8 @@ LINE_BYTES_MAX: Final = 1 << 20
 class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What is to be run, and what is asked: `host` is which host this machine is.
 
-    `ca` is the fingerprint of the run's root, empty for a run without certificates; `reach` is where the
-    supervisor would listen, and somebody does meanwhile; empty where that cannot be tried.
+    `ca` is the fingerprint of the run's root, empty for a run without certificates. `reach` is where the supervisor
+    would listen, and somebody does meanwhile, `radio` where a vHub on this host would; empty what cannot be tried.
     """
 
     host: str
@@ -42,15 +41,14 @@ class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     insecure: bool
     ca: str
     reach: str
+    radio: str
 
 
 class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the host finds of itself; `radio` is where it listens meanwhile as a vHub would, if it does."""
+    """What the host finds of itself, and the fingerprint of its arithmetic."""
 
-    version: str
     fingerprint: str
     findings: list[Finding]
-    radio: str
 
 
 def serve(given: IO[bytes], told: IO[bytes]) -> None:
@@ -64,14 +62,9 @@ def serve(given: IO[bytes], told: IO[bytes]) -> None:
         question = msgspec.json.decode(line, type=Question)
     except msgspec.DecodeError as error:
         raise Malformed(f"not a question: {error}") from None
-    case = case_of(question)
-    findings = [*examine(case), *_reaches(question)]
-    radio = str(case.radio) if case.has_vhub and case.radio.port and not case.radio.is_wildcard else ""
-    with ExitStack() as opened:
-        if radio:
-            opened.enter_context(listening(case.radio))
-        here = importlib.metadata.version("foosim"), library_fingerprint().hex()
-        _say(told, msgspec.json.encode(Answer(*here, findings, radio)))
+    findings = [*examine(case_of(question)), *_reaches(question)]
+    with listening(parse_address(question.radio)) if question.radio else nullcontext():
+        _say(told, msgspec.json.encode(Answer(library_fingerprint().hex(), findings)))
         given.readline(LINE_BYTES_MAX)
 
 

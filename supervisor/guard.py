@@ -195,9 +195,9 @@ def run_command(
 @app.command("examine")
 def examine_command(version_of_launcher: VersionOfLauncher = "") -> None:
     """Answer a doctor on another machine how this one is, over standard input and output."""
+    _check_version(version_of_launcher)
     from foosim.supervisor.doctor_there import serve  # a guard of a process starts quickly
 
-    _check_version(version_of_launcher)
     serve(sys.stdin.buffer, sys.stdout.buffer)
     raise typer.Exit(DONE)
 

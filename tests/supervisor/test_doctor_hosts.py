@@ -31,8 +31,7 @@ HERS: Final = Finding("disk", "state", "fine", "9 GiB", host="who it takes itsel
 
 
 def told(**changes: Any) -> Told:
-    answer = {"version": "1", "fingerprint": "aa", "findings": [HERS], "radio": "", **changes.pop("answer", {})}
-    return Told(LEFT, Answer(**answer), **changes)
+    return Told(LEFT, Answer(changes.pop("fingerprint", "aa"), [HERS]), **changes)
 
 
 def found(heard: Told, check: str, subject: str, mixed_cpu: bool = False) -> Finding:
@@ -67,16 +66,15 @@ def test_a_clock_that_is_surely_off_is_told(offset_ns: int, error_ns: int, state
 
 
 def test_other_arithmetic_is_told_as_the_handshake_would() -> None:
-    other = {"answer": {"fingerprint": "bb"}}
     assert found(told(), "arithmetic", "compared").state == "fine"
-    assert found(told(**other), "arithmetic", "compared").state == "problem"
-    assert found(told(**other), "arithmetic", "compared", mixed_cpu=True).state == "warning"
+    assert found(told(fingerprint="bb"), "arithmetic", "compared").state == "problem"
+    assert found(told(fingerprint="bb"), "arithmetic", "compared", mixed_cpu=True).state == "warning"
 
 
 def test_a_vhub_that_would_not_be_reached_is_told() -> None:
-    radio = {"radio": "tcp/a.lan:7401"}
-    assert found(told(answer=radio), "network", "radio plane").state == "fine"
-    finding = found(told(answer=radio, not_reached="no answer within 3 s"), "network", "radio plane")
+    radio = "tcp/a.lan:7401"
+    assert found(told(radio=radio), "network", "radio plane").state == "fine"
+    finding = found(told(radio=radio, not_reached="no answer within 3 s"), "network", "radio plane")
     assert finding.state == "problem" and "tcp/a.lan:7401 is not reached from here: no answer" in finding.text
     assert not [finding for finding in findings_of(told(), "aa", False) if finding.check == "network"]
 
@@ -141,12 +139,13 @@ def test_a_host_answers_a_question_and_tries_to_reach_the_supervisor() -> None:
     text = apply_sets(CLUSTER.read_text(), "cluster.yaml", ["hosts.radio.address=127.0.0.1"])
     with closing(socket.create_server(("127.0.0.1", 0))) as taken:
         port = taken.getsockname()[1]
-        question = Question("radio", "cluster.yaml", text, f"127.0.0.1:{port - 1}", True, "", f"tcp/127.0.0.1:{port}")
+        where = f"tcp/127.0.0.1:{port}"
+        question = Question("radio", "cluster.yaml", text, f"127.0.0.1:{port - 1}", True, "", where, where)
         said = io.BytesIO()
         serve(io.BytesIO(b"clock\n" + msgspec.json.encode(question) + b"\n"), said)
         greeting, clock, line = said.getvalue().splitlines()
         answer = msgspec.json.decode(line, type=Answer)
-    assert greeting == GREETING.encode() and clock.isdigit() and answer.radio == f"tcp/127.0.0.1:{port}"
+    assert greeting == GREETING.encode() and clock.isdigit()
     by_subject = {finding.subject: finding for finding in answer.findings}
     assert by_subject["supervisor"].state == "fine"
     assert by_subject["radio plane"].state == "problem", "its port is taken"

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from foosim.protocol.deployment_file import apply_sets
-from foosim.supervisor.doctor import Finding
-from foosim.supervisor.doctor_hosts import ask, findings_of
+from foosim.supervisor import doctor_hosts
+from foosim.supervisor.doctor_hosts import LIMIT_S, ask, findings_of
 from foosim.supervisor.doctor_there import Question
+from foosim.supervisor.remote import Remote
 from foosim.vhub.capture_reader import capture_info
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE
@@ -86,10 +87,21 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
     assert capture_info(Path(house.folder / last_json(out)["capture"])).finished, "home from the vHub's host"
 
 
-def test_a_host_that_says_nothing_holds_nobody_up(other: There) -> None:
-    """As one that is stopped: it takes the connection, and that is all."""
+def why_silent(remote: Remote, limit_s: float = LIMIT_S) -> tuple[str, str]:
+    """What is said, and said to do, of a host that does not answer."""
+    (finding,) = findings_of(ask(remote, Question("there", "", "", "", False, "", "", ""), limit_s), "", False)
+    assert (finding.subject, finding.state, finding.host) == ("127.0.0.1", "problem", "there")
+    return finding.text, finding.remedy
+
+
+def test_why_a_host_does_not_answer_is_said(other: There, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that takes the connection and says nothing holds nobody up."""
     silent = other.remote("-o", "ProxyCommand=sleep 1000", "-o", "ConnectTimeout=1000")
-    (finding,) = findings_of(ask(silent, Question("", "", "", "", False, "", ""), 0.5), "", False)
-    assert finding == Finding(
-        "ssh", "127.0.0.1", "problem", "no answer within 0.5 s", f"make `{silent.typed}` work", "there"
-    )
+    assert why_silent(silent, 0.5) == ("no answer within 0.5 s", f"make `{silent.typed}` work")
+    text, remedy = why_silent(other.remote(commands="/nowhere"))
+    assert "there is no /nowhere/foosim-guard on host there" in text and remedy.startswith("install foosim ")
+    text, remedy = why_silent(other.remote())
+    assert text == "ended with exit code 2 on host there: :1:1: no YAML document, ''", "it was asked nonsense"
+    monkeypatch.setattr(doctor_hosts, "version", lambda name: "99.0")
+    text, remedy = why_silent(other.remote())
+    assert "is installed there, the run has 99.0" in text and remedy.startswith("install foosim 99.0 on host there")
