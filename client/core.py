@@ -117,6 +117,7 @@ class ClientCore:
         self._done_number = -1
         self._downlinks = self._repeated = self._missing = self._malformed = self._overflowed = 0
         self._received = self._sent = self._answered = self._unsent = self._returns = 0
+        self._losses = 0
         self._readers: dict[type[Any], Callable[[Any], None]] = {
             ClientWelcome: self._on_welcome,
             ClientRefusal: self._on_refusal,
@@ -172,6 +173,7 @@ class ClientCore:
         if self.deployment is None or self.is_away or self.ended:
             return
         self.is_away = True
+        self._losses += 1
         self._lost_ns = now_ns + self.deployment.deadlines.vhub_back_ns
         self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
         self._resend_ns = NEVER_NS
@@ -258,7 +260,9 @@ class ClientCore:
     # --- messages --------------------------------------------------------------------------------------------------
 
     def _on_welcome(self, welcome: ClientWelcome) -> None:
-        if not self._is_for_me(welcome) or self.refusal or (self.welcome is not None and not self.is_away):
+        # One that answers an earlier hello is of a vHub that is gone, too.
+        is_old = welcome.losses != self._losses or (self.welcome is not None and not self.is_away)
+        if not self._is_for_me(welcome) or self.refusal or is_old:
             self._repeated += 1
             return
         if self.welcome is not None:
@@ -412,8 +416,7 @@ class ClientCore:
 
     def _say_hello(self) -> None:
         received = min(self._gaps, default=self._downlink + 1) - 1
-        again = self.welcome is not None
-        hello = ClientHello(self.name, self.boot, limits.PROTOCOL_VERSION, self._world, received, again)
+        hello = ClientHello(self.name, self.boot, limits.PROTOCOL_VERSION, self._world, received, self._losses)
         self.actions.append(Publish(channels.CLIENT_HELLO, self.name, encode(hello)))
 
     def _count_sent(self, sent: Sequence[Sent]) -> None:

@@ -47,7 +47,8 @@ Listen = Annotated[str, StringConstraints(max_length=300), AfterValidator(_check
 class Host(Part):
     """A machine: where others reach it, how ssh does (by default at that address), its labels, where foosim is on it.
 
-    `commands` is the folder that has foosim's commands; by default they are found on the PATH of a login by ssh.
+    `commands` is the folder that has foosim's commands; by default they are found on the PATH of a login by ssh. `pki`
+    is the folder with the certificates of what runs there, for runs that have certificates.
     """
 
     address: Annotated[str, StringConstraints(pattern=ADDRESS_PATTERN, max_length=253)]
@@ -55,6 +56,7 @@ class Host(Part):
     ssh_options: list[SshOption] = Field(default=[], max_length=SSH_OPTIONS_MAX)
     labels: list[Name] = Field(default=[], max_length=16)
     commands: Folder | None = None
+    pki: Folder | None = None
 
     @property
     def destination(self) -> str:

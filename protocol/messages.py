@@ -374,7 +374,7 @@ class Subscription(Item, frozen=True):
 class ClientHello(Message, frozen=True, tag="clienthello"):
     """A client asks to be let in. `received` is the last downlink number it has.
 
-    `again`: it had been let in before, has lost the vHub, and goes on with its own numbers.
+    `losses` is how often it has lost the vHub that had let it in: after the first it goes on with its own numbers.
     """
 
     name: Name
@@ -382,13 +382,14 @@ class ClientHello(Message, frozen=True, tag="clienthello"):
     version: Counter
     world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     received: Counter
-    again: bool = False
+    losses: Counter = 0
 
 
 class ClientWelcome(Message, frozen=True):
     """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1.
 
-    Everything up to `sequence` is recorded, nothing behind it is: who comes back sends that again.
+    Everything up to `sequence` is recorded, nothing behind it is: who comes back sends that again. `losses` are those
+    of the hello that this answers.
     """
 
     name: Name
@@ -399,6 +400,7 @@ class ClientWelcome(Message, frozen=True):
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     run: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
+    losses: Counter = 0
 
 
 class ClientRefusal(Message, frozen=True, tag="clientrefusal"):

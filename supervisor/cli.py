@@ -22,6 +22,7 @@ from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
 from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
+from foosim.supervisor.pki_hosts import files_for, send_files
 from foosim.supervisor.plan import RunOptions, check_certificates, make_plan, plan_again
 from foosim.supervisor.remote import Remote, unit_name
 from foosim.supervisor.run_folder import create_run, open_run, run_exists
@@ -259,9 +260,10 @@ def stop(node: Node, run: Run = None, json: Json = False) -> None:
 
 @app.command()
 def start(node: Node, run: Run = None, json: Json = False) -> None:
-    """Let a node that was stopped take part again, with its robots.
+    """Let a node take part again, with its robots: one that was stopped, or that its launcher has given up.
 
-    `up` starts the processes of local nodes; one that is launched by hand has to be started by hand.
+    `up` starts the processes of local nodes, with a new count of their ends; one that is launched by hand has to be
+    started by hand.
     """
     _show(control.start(node, run), json)
 
@@ -317,6 +319,7 @@ def install_units(  # a command's options
     user: Annotated[bool, typer.Option("--user", help="Of a user's own systemd; with --print or --output.")] = False,
     show: Annotated[bool, typer.Option("--print", help="Print the units and change nothing.")] = False,
     output: Annotated[Path | None, typer.Option(help="Write them into this folder, not onto the host.")] = None,
+    pki: PkiOption = None,
     sets: Sets = None,
 ) -> None:
     """Write a unit of systemd for each node of a host, onto the host.
@@ -324,8 +327,11 @@ def install_units(  # a command's options
     A unit restarts a node that ends or hangs. `up` starts the units of nodes with `launch: systemd`. As root on the
     host they are units of the system; any other user gets units of its own systemd, which run without a login after
     `loginctl enable-linger`.
+
+    With --pki the units are for runs with certificates: a node has its own from the folder that the deployment names
+    as the host's `pki`. What belongs there is brought there as by `foosim-pki send`.
     """
-    plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=True))
+    plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=pki is None, pki=pki))
     deployment = plan.deployment
     units = units_of(deployment, host, plan.address, user)
     if show:
@@ -337,6 +343,8 @@ def install_units(  # a command's options
     else:
         remote = Remote(host, deployment.hosts[host])
         is_users = not is_root_there(remote)
+        if pki is not None:
+            print(*send_files(remote, pki, files_for(deployment, host)), sep="\n")
         print(*install(remote, units_of(deployment, host, plan.address, is_users), is_users), sep="\n")
     for name, node in deployment.nodes.items():
         if unit_name(name) in units and node.launch != "systemd":

@@ -190,7 +190,7 @@ def stop(node: str, run: str | None = None) -> Answer:
 
 
 def start(node: str, run: str | None = None) -> Answer:
-    """Let a node that was stopped take part again; where `up` starts nodes, it starts this one."""
+    """Let a node take part again that was stopped or given up; where `up` starts nodes, it starts this one."""
     return _ask(run, "start", node=node)
 
 

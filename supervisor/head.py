@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def control_of(core: SupervisorCore) -> Control:
     """Return what people have set."""
     pacer = core.pacer
-    people = sorted(core.roster.stopped), dict(core.recovery.returns)
+    people = sorted(core.roster.stopped), dict(core.recovery.returns), dict(core.roster.starts)
     return Control(str(pacer.pace), pacer.paused, pacer.granted, core.stop_at, *people)
 
 
@@ -65,7 +65,7 @@ def stand_on(core: SupervisorCore, history: History) -> None:
     control, pacer = history.control, core.pacer
     pacer.pace, pacer.paused, pacer.granted = parse_pace(control.pace), control.paused, control.granted
     pacer.lags = history.lags
-    core.roster.stopped = set(control.stopped)
+    core.roster.stopped, core.roster.starts = set(control.stopped), dict(control.starts)
     core.recovery.recovered, core.recovery.returns = history.recovered, dict(control.returns)
     core.requests.resume(history.edits, history.answers)
 

@@ -27,14 +27,26 @@ class OutOfReach(Refused):
     """Processes are to run on other machines, and the supervisor does not listen where those reach it."""
 
 
+class NoFolder(Refused):
+    """Processes are to run on another machine with certificates, and nothing says where they are there."""
+
+
 def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, Remote]) -> None:
-    """Raise OutOfReach when a process on another machine could not connect to where the supervisor listens."""
+    """Raise OutOfReach when a process on another machine could not connect to where the supervisor listens.
+
+    Raises NoFolder when it would have no certificate to do so.
+    """
     for name, remote in remotes.items():
         there = f"{name} on host {remote.name} ({remote.host.address})"
         if address.is_loopback and not parse_address(remote.host.address).is_loopback:
             raise OutOfReach(
                 f"{there} cannot connect to {address}; say --listen HOST[:PORT], or `listen:` in the deployment, "
                 "with an address of this machine that it reaches"
+            )
+        if address.protocol == "tls" and remote.host.pki is None:
+            raise NoFolder(
+                f"{there} has no certificate: say in hosts.{remote.name}.pki in which folder on it they are; "
+                f"`foosim-pki send DIR {remote.name} FILE` brings them there"
             )
         node = deployment.nodes.get(name)
         if node is not None and node.launch == "systemd" and address.port == 0:

@@ -21,7 +21,7 @@ USER_FOLDER: Final = "$HOME/.config/systemd/user"
 
 def is_root_there(remote: Remote) -> bool:
     """Whether ssh logs in as root. Raises Failed when it does not log in."""
-    return _run(remote, "id -u", "").strip() == "0"
+    return run_there(remote, "id -u", "").strip() == "0"
 
 
 def install(remote: Remote, units: Mapping[str, str], is_users: bool) -> list[str]:
@@ -31,8 +31,8 @@ def install(remote: Remote, units: Mapping[str, str], is_users: bool) -> list[st
     for name, text in sorted(units.items()):
         path = f'"{folder}/{name}"'
         script = f'mkdir -p "{folder}" && cat >{path}.new && mv {path}.new {path} && echo {path}'
-        paths.append(_run(remote, script, text))
-    _run(remote, f"{systemctl} daemon-reload", "")
+        paths.append(run_there(remote, script, text))
+    run_there(remote, f"{systemctl} daemon-reload", "")
     return [path.strip() for path in paths]
 
 
@@ -48,8 +48,8 @@ def write_units(folder: Path, units: Mapping[str, str]) -> list[Path]:
     return paths
 
 
-def _run(remote: Remote, script: str, text: str) -> str:
-    """Return what a script of the shell there says, with `text` as its input. Raises Failed."""
+def run_there(remote: Remote, script: str, text: str) -> str:
+    """Return what a script of the shell on a host says, with `text` as its input. Raises Failed."""
     command = remote.ssh(["sh", "-c", script])
     try:
         done = subprocess.run(command, input=text, capture_output=True, text=True, timeout=INSTALL_S, check=False)

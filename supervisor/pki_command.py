@@ -18,8 +18,11 @@ from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_ap
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.identity import FORMS, identities_of
+from foosim.protocol.names import nearest_name
 from foosim.supervisor import pki
 from foosim.supervisor.pki import LEAF_DAYS, Shown
+from foosim.supervisor.pki_hosts import files_for, send_files
+from foosim.supervisor.remote import Remote
 
 app = new_app()
 
@@ -32,8 +35,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 def foosim_pki(version: VersionOption = False) -> None:
     """Make the certificates that a run needs where other machines reach it.
 
-    `init` makes a root, `issue` a certificate and key for each process, client and operator. Copy to a machine the root
-    ca.pem and what belongs to its processes; keep ca.key where certificates are issued.
+    `init` makes a root, `issue` a certificate and key for each process, client and operator, `send` brings to a host
+    of a deployment what belongs to its processes. To any other machine copy the root ca.pem and what belongs to its
+    processes; keep ca.key where certificates are issued.
 
     Exit codes: 0 done, 1 a certificate would not be accepted (show), 2 bad input, 3 refused.
     """
@@ -107,6 +111,26 @@ def renew(
     it is started again.
     """
     for path in pki.renew(folder, identities or (), within, host or ()):
+        print(path)
+
+
+@app.command()
+def send(
+    folder: Folder,
+    host: Annotated[str, typer.Argument(help="A host of the deployment.", show_default=False)],
+    deployment: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")] = Path(
+        "deploy/cluster.yaml"
+    ),
+) -> None:
+    """Bring to a host the root, and the certificates and keys of what the deployment places there, through ssh.
+
+    They go into the folder that the deployment names as the host's `pki`, readable by who logs in there alone. No key
+    of anybody else is sent. What is there already under these names is replaced: send again after `renew`.
+    """
+    found = load_deployment(read_deployment_text(deployment), str(deployment))
+    if host not in found.hosts:
+        raise BadValue("unknown host", host, nearest_name(host, found.hosts))
+    for path in send_files(Remote(host, found.hosts[host]), folder, files_for(found, host)):
         print(path)
 
 

@@ -18,6 +18,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.hosts import places
 from foosim.protocol.journal import journal_files
 from foosim.protocol.messages import Origin
 from foosim.protocol.start import Start
@@ -122,13 +123,16 @@ class Plan:
 
 
 def check_certificates(plan: Plan) -> list[str]:
-    """Return which certificates end soon, of everybody whom `up` starts and of the operator that it is itself.
+    """Return which certificates end soon, of everybody whom `up` starts here and of the operator that it is itself.
 
-    Raises CertificateError when somebody would not be let in.
+    Raises CertificateError when somebody would not be let in. Those on other machines have theirs there.
     """
     pki, deployment = plan.options.pki, plan.deployment
-    nodes = [identity.node(name) for name, node in deployment.nodes.items() if node.launch == "local"]
-    everybody = (SUPERVISOR, VHUB, *nodes, *map(identity.client, deployment.players))
+    elsewhere = places(deployment)
+    local = [name for name, node in deployment.nodes.items() if node.launch == "local" and name not in elsewhere]
+    players = [identity.client(name) for name in deployment.players if name not in elsewhere]
+    servers = [SUPERVISOR] if VHUB in elsewhere else [SUPERVISOR, VHUB]
+    everybody = (*servers, *map(identity.node, local), *players)
     found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]
     warnings = [credentials.ends_soon(wall.now_utc()) for credentials in found if credentials is not None]
     return [warning for warning in warnings if warning]

@@ -43,7 +43,7 @@ class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_
 
 class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbid_unknown_fields=True):
     """What people have set, as it is now; `granted` is the tick up to which `step` allows, `returns` says which node
-    gets a robot back that was adopted."""
+    gets a robot back that was adopted, `starts` how often somebody asked for a node to be started."""
 
     pace: str
     paused: bool
@@ -51,6 +51,7 @@ class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbi
     stop_at: int
     stopped: list[str]
     returns: dict[str, str]
+    starts: dict[str, int]
 
 
 class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request", forbid_unknown_fields=True):
@@ -183,7 +184,7 @@ def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
     """Return the history that a file's first record stands for."""
     if isinstance(first, RunRecord):
         begun = 0 if first.start is None else first.start.origin.tick
-        control = Control(first.pace, False, 0, first.ticks and begun + first.ticks, [], {})
+        control = Control(first.pace, False, 0, first.ticks and begun + first.ticks, [], {}, {})
         account = Account(dict.fromkeys(sorted(deployment.nodes), 0))
         frame = first_frame(deployment, first.start)
         chain = first_chain(None if first.start is None else first.start.origin)

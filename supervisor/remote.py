@@ -65,6 +65,10 @@ class Remote:
         """Return one of foosim's commands as it is called there."""
         return command if self.host.commands is None else f"{self.host.commands.rstrip('/')}/{command}"
 
+    def pki_arguments(self) -> list[str]:
+        """Return where the certificates are there, as a process of a run with certificates is told it."""
+        return [] if self.host.pki is None else ["--pki", self.host.pki]
+
     def guarded(self, run: str, name: str, command: Sequence[str]) -> list[str]:
         """Return the command line that starts a process of a run there, and ends it when the connection ends."""
         guard = [self.path(GUARD), "run", "--version-of-launcher", version("foosim"), run, name, *command]

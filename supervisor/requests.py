@@ -310,10 +310,10 @@ class Requests:
     def _start_node(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         core = self._core
         node = _chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
-        if node not in core.roster.stopped:
-            doing = "takes part" if node in core.members else "is expected"
-            return self._accept(request, core.frame.tick, f"{node} {doing} already")
+        if node in core.members:
+            return self._accept(request, core.frame.tick, f"{node} takes part already")
         core.roster.stopped.discard(node)
+        core.roster.starts[node] = core.roster.starts.get(node, 0) + 1
         text = f"{node} may take part from tick {core.frame.tick} on, when it has built the world"
         return self._accept(request, core.frame.tick, text)
 

@@ -50,6 +50,10 @@ class Restarts:
         known.due_s = now_s + wait_s
         return wait_s
 
+    def forget(self, name: str) -> None:
+        """Somebody wants this process: what ended before does not count any more."""
+        self._by_name.pop(name, None)
+
     def is_known(self, name: str) -> bool:
         """Whether the end of this process has been told and is not over: it waits, or is given up."""
         known = self._by_name.get(name)

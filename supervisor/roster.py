@@ -47,6 +47,8 @@ class Roster:
         self.by_name: dict[str, Process] = {}
         self.stopped: set[str] = set()
         """Nodes that somebody stopped: they are not let in until somebody starts them."""
+        self.starts: dict[str, int] = {}
+        """How often somebody asked for a node to be started; a launcher that sees it grow starts its process."""
         self._fingerprint = fingerprint
         self._simulation = b""
 

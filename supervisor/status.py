@@ -92,6 +92,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "waiting_for": waiting_for,
         "ball": {"position": [round(value, 4) for value in ball], "solver": core.account.ball_solver},
         "processes": _processes(core, waiting_for),
+        "starts": dict(core.roster.starts),
         "links": report.get("links", []),
         "refusals": report.get("refusals", {}),
         "clients": report.get("clients", []),

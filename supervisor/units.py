@@ -10,7 +10,9 @@ import shlex
 from collections.abc import Sequence
 from typing import Final
 
+from foosim.protocol import identity
 from foosim.protocol.addresses import Address
+from foosim.protocol.certificates import CA_FILE, CERTIFICATE_SUFFIX, KEY_SUFFIX
 from foosim.protocol.command import BAD_INPUT, REFUSED
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Failed
@@ -37,7 +39,7 @@ StartLimitIntervalSec=0
 Type=notify
 ExecStart={command}
 Environment=OPENBLAS_NUM_THREADS=1 PYTHONUNBUFFERED=1
-# Ready is who has found the supervisor, whenever that comes.
+{credentials}# Ready is who has found the supervisor, whenever that comes.
 TimeoutStartSec=infinity
 TimeoutStopSec=10
 # The loop says that it goes on; one that hangs is killed, and started again.
@@ -65,19 +67,41 @@ PrivateDevices=yes
 """
 
 
+# A system's unit runs as a user that may not read the files: systemd reads them, and shows that user copies in %d.
+_CREDENTIALS: Final = """\
+# Only this node's: in a folder that others cannot read, which is gone with the process.
+LoadCredential={ca}:{folder}/{ca}
+LoadCredential={certificate}:{folder}/{certificate}
+LoadCredential={key}:{folder}/{key}
+"""
+_CREDENTIALS_FOLDER: Final = "%d"
+
+
 def node_command(remote: Remote, node: str, address: Address, world: str) -> list[str]:
-    """Return what the unit of a node runs."""
+    """Return what the unit of a node runs, without where its certificate is."""
     return [remote.path("foosim-node"), "--name", node, "--connect", str(address), "--world", world]
 
 
 def unit_text(remote: Remote, node: str, address: Address, world: str, is_users: bool) -> str:
-    """Return the unit of a node; `is_users` is one of a user's own systemd, not of the system's."""
+    """Return the unit of a node; `is_users` is one of a user's own systemd, not of the system's.
+
+    Where the supervisor's address is one for certificates, the node has its own from the host's folder.
+    """
+    command, credentials = _escaped(node_command(remote, node, address, world)), ""
+    if address.protocol == "tls" and is_users:
+        command += f" {_escaped(remote.pki_arguments())}"
+    elif address.protocol == "tls" and remote.host.pki is not None:
+        command += f" --pki {_CREDENTIALS_FOLDER}"
+        folder, who = remote.host.pki.rstrip("/").replace("%", "%%"), identity.node(node)
+        own = {"certificate": who + CERTIFICATE_SUFFIX, "key": who + KEY_SUFFIX}
+        credentials = _CREDENTIALS.format(ca=CA_FILE, folder=folder, **own)
     return _UNIT.format(
         node=node,
         world=world,
         host=remote.name,
         unit=unit_name(node),
-        command=_escaped(node_command(remote, node, address, world)),
+        command=command,
+        credentials=credentials,
         watchdog_s=WATCHDOG_S,
         prevent=f"{BAD_INPUT} {REFUSED}",
         memory=MEMORY_MAX,
@@ -101,6 +125,8 @@ def units_of(deployment: Deployment, host: str, address: Address, is_users: bool
     remote = Remote(host, deployment.hosts[host])
     if address.is_loopback and remote.host.address not in ("localhost", address.host):
         raise BadValue(f"host {host} cannot connect to the supervisor there (--listen)", str(address))
+    if address.protocol == "tls" and remote.host.pki is None:
+        raise Failed(f"host {host} has no certificates: say in hosts.{host}.pki in which folder on it they are")
     nodes = [name for name, place in places(deployment).items() if place == host and name in deployment.nodes]
     if not nodes:
         raise Failed(f"no node is placed on host {host}")

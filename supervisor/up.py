@@ -130,6 +130,8 @@ class Up:
         """Processes that are lost though their processes live: which process, since when."""
         self._stopped: set[str] = set()
         """Nodes that somebody stopped."""
+        self._starts: dict[str, int] = {}
+        """How often somebody asked for a node to be started, as far as it was done."""
         self._unanswered = 0
         """Questions to the supervisor since its last answer."""
         self._told = 0
@@ -164,7 +166,7 @@ class Up:
             return False
         self._launch(VHUB, self._vhub_command(info))
         for name, node in sorted(self.plan.deployment.nodes.items()):
-            command = ["foosim-node", "--name", name, "--connect", info.simulation, *options.pki_arguments()]
+            command = ["foosim-node", "--name", name, "--connect", info.simulation, *self._pki_arguments(name)]
             if node.launch != "manual":
                 self._launch(name, command)
             else:
@@ -173,7 +175,7 @@ class Up:
         if info is None:
             return False
         for name in sorted(self.plan.deployment.players):
-            command = ["foosim-player", "--name", name, "--connect", info.radio, *options.pki_arguments()]
+            command = ["foosim-player", "--name", name, "--connect", info.radio, *self._pki_arguments(name)]
             self._launch(name, command)
         return True
 
@@ -186,9 +188,15 @@ class Up:
             folder, capture = Path(), None if capture is None else Path(CAPTURE)
         command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(listen)]
         command += ["--insecure"] if options.insecure else []
-        command += options.pki_arguments()
+        command += self._pki_arguments(VHUB)
         command += ["--run-folder", str(folder)]
         return [*command, "--no-capture"] if capture is None else [*command, "--capture", str(capture)]
+
+    def _pki_arguments(self, name: str) -> list[str]:
+        """Return where a process finds its certificate: in the folder of this machine, or of the one that it is on."""
+        remote = self._launcher.remotes.get(name)
+        given = self.plan.options.pki_arguments()
+        return remote.pki_arguments() if given and remote is not None else given
 
     def _bring_home(self) -> None:
         """Fetch the capture from the machine on which the vHub wrote it."""
@@ -253,18 +261,22 @@ class Up:
             self.display.show(status, now_s)
         self._has_begun = self._has_begun or status["state"] != "starting"
         self._has_ended = status["state"] in ENDED
-        self._start_stopped({name for name, process in status["processes"].items() if process["stopped"]})
+        self._stopped = {name for name, process in status["processes"].items() if process["stopped"]}
+        self._start_wanted(status["starts"])
         if self._has_begun and not self._has_ended and not self._ending_s:
             self._restart_ended(now_s, knows=True)
         self._end_stalled(status["processes"], now_s)
 
-    def _start_stopped(self, stopped: set[str]) -> None:
-        """Start the nodes that are stopped no more."""
-        for name in self._stopped - stopped:
+    def _start_wanted(self, starts: dict[str, int]) -> None:
+        """Start the nodes that somebody asked for since: one that was stopped, waits for its turn, or was given up."""
+        for name, count in starts.items():
             child = self._launcher.children.get(name)
-            if child is not None and child.exit_code is not None:
+            if child is None or count <= self._starts.get(name, 0) or name in self._stopped:
+                continue
+            self._restarts.forget(name)
+            if child.exit_code is not None:
                 self._launcher.start(name, child.command, child.log)
-        self._stopped = stopped
+        self._starts = starts
 
     def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
         """Say what is new, once it is over."""
@@ -323,7 +335,9 @@ class Up:
     def _restart_later(self, child: Child, now_s: float) -> None:
         at_once = child.name in (SUPERVISOR, VHUB)
         wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
-        after = "is given up" if wait_s is None else f"starts again in {wait_s:g} s" if wait_s else "starts again"
+        after = f"starts again in {wait_s:g} s" if wait_s else "starts again"
+        if wait_s is None:
+            after = "is given up" if at_once else f"is given up; foosim-supervisor start {child.name} tries it again"
         self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
 
     def _start_due(self, now_s: float) -> None:

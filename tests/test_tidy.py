@@ -81,6 +81,7 @@ SHELLS = {
     "supervisor/main.py",
     "supervisor/pki.py",
     "supervisor/pki_command.py",
+    "supervisor/pki_hosts.py",
     "supervisor/plan.py",
     "supervisor/run_folder.py",
     "supervisor/up.py",

@@ -119,6 +119,12 @@ def write_all(file: int, content: bytes) -> None:
         written += os.write(file, content[written:])
 
 
+def check_new(path: Path) -> None:
+    """Raise CaptureError when there is something where a capture is to be."""
+    if os.path.lexists(path):
+        raise CaptureError(f"{path}: exists already; a capture is never overwritten")
+
+
 class CaptureFile:
     """One capture on the disk. Raises CaptureError when it exists already, or cannot be written.
 
@@ -140,7 +146,8 @@ class CaptureFile:
         """The frame of the last closing, written or not."""
         self._file = self._open(journal_tick is not None)
         try:
-            found = None if journal_tick is None else self._scanned(journal_tick)
+            run = described.metadata.get("run", "")
+            found = None if journal_tick is None else self._scanned(journal_tick, run)
             self.mcap = McapWriter(self._write_bytes, PROFILE, None if found is None else found.book)
             if found is None:
                 self._channels = self._declare()
@@ -272,11 +279,10 @@ class CaptureFile:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if go_on:
                 return os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-            if not os.path.lexists(self.path):
-                return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+            check_new(self.path)
+            return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise CaptureError(f"{self.path}: cannot be created, {error.strerror}") from None
-        raise CaptureError(f"{self.path}: exists already; a capture is never overwritten")
 
     def _declare(self) -> dict[str, int]:
         """Declare all topics, also those that stay empty."""
@@ -309,12 +315,14 @@ class CaptureFile:
 
     # --- a file that was left unfinished -----------------------------------------------------------------------------
 
-    def _scanned(self, journal_tick: int) -> Scanned | None:
+    def _scanned(self, journal_tick: int, run: str) -> Scanned | None:
         """Return what the file has, cut at its last whole record; None when it has to be begun anew."""
         with os.fdopen(os.dup(self._file), "rb") as stream:
             found = scan(stream, os.fstat(self._file).st_size, str(self.path))
         if found.finished:
             raise CaptureError(f"{self.path}: is finished; a capture is never overwritten")
+        if found.metadata.get(METADATA, {}).get("run", run) != run:
+            raise CaptureError(f"{self.path}: is that of run {found.metadata[METADATA]['run']}, not of run {run}")
         is_described = VERSIONS in {attachment.name for attachment in found.book.attachments}
         if found.book.chunks and not is_described:
             raise CaptureError(f"{self.path}: no capture of foosim, it lacks {VERSIONS}")

@@ -41,11 +41,11 @@ from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
-from foosim.vhub.capture_file import origin_metadata
+from foosim.vhub.capture_file import check_new, origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
-from foosim.vhub.records import Closing
+from foosim.vhub.records import Closing, first_head
 from foosim.vhub.resume import Captured, first_tick_of, recall, was_captured
 from foosim.vhub.room_watch import RoomWatch
 
@@ -207,6 +207,11 @@ class HubProcess:
             return None
         path = Path(before) if before else options.capture
         path = path or Path("captures") / f"{deployment.world}-{wall.now_stamp()}.mcap"
+        self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
+        if before is None:  # who is killed before the capture is there finds here that what is found is its own
+            check_new(path)
+            assert self._journal is not None
+            self._journal.append(first_head(build, deployment, self.core.capture_file))
         metadata = {
             "run": build.run,
             "started": wall.now_text(),
@@ -216,7 +221,6 @@ class HubProcess:
         }
         described = build.deployment_name, build.deployment, metadata, self._say, first_tick_of(records)
         self._capture = CaptureWriter(path, deployment, *described)
-        self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         return self._capture.begun_with
 
     def _listen(self, deployment: Deployment) -> None:

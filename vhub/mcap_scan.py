@@ -43,6 +43,8 @@ class Scanned:
     """Whether the file has an end: then there is nothing to go on with."""
     is_cut: bool = True
     """Whether nothing but one record that is cut stands behind the whole ones; else bytes there are damaged."""
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    """The entries of each record of metadata, by its name."""
     last: dict[str, bytes] = field(default_factory=dict)
     """The last message of each topic."""
     to_index: dict[int, array[int]] = field(default_factory=dict)
@@ -127,6 +129,7 @@ class _Scan:
         elif opcode == Opcode.METADATA:
             metadata = records.Metadata.read(_stream(content))
             book.metadata.append(records.MetadataIndex(offset=offset, length=length, name=metadata.name))
+            self._found.metadata[metadata.name] = metadata.metadata
         elif opcode == Opcode.CHUNK:
             self._take_chunk(content, offset, length)
         elif opcode == Opcode.MESSAGE_INDEX:

@@ -18,8 +18,9 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Commit, Delivered, Edit, Epoch, Recovered, RobotPacket, Samples, Sent
+from foosim.protocol.messages import Build, Commit, Delivered, Edit, Epoch, Recovered, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
+from foosim.protocol.start import first_chain
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState, Joining
 
@@ -39,6 +40,14 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     """Where the capture is; empty when there is none."""
     chain: bytes = CHAIN_START
     """Over the frames up to that of the last closed tick."""
+
+
+def first_head(build: Build, deployment: Deployment, capture: str) -> bytes:
+    """Return the head of a vHub that has closed nothing yet, and is about to create `capture`."""
+    tick = 0 if build.origin is None else build.origin.tick
+    added = [(entity.name, entity.model) for entity in build.added]
+    state = HubState(deployment, tick).snapshot()
+    return encode(HeadRecord(build.run, state, added, b"", b"", capture, first_chain(build.origin)))
 
 
 class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", forbid_unknown_fields=True):

@@ -129,7 +129,7 @@ class Sessions:
         session = self.by_name.get(hello.name)
         if session is None:
             session = self.by_name[hello.name] = Session(hello.name, hello.boot)
-        if hello.again:
+        if hello.losses:
             downlink = min(hello.received, downlink)
         else:  # another process: the numbers of what the one before has sent are taken
             waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
@@ -146,6 +146,7 @@ class Sessions:
             build.deployment_name,
             build.deployment,
             build.run,
+            hello.losses,
         )
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
 

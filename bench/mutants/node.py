@@ -30,7 +30,7 @@ def _old_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 20)
+@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 1)
 def _new_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch <= self.epoch and bool(before(self, channel, message, payload))
@@ -38,7 +38,7 @@ def _new_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node goes back to an old epoch", "epochs only grow", 28)
+@register("node goes back to an old epoch", "epochs only grow", 10)
 def _epochs_fall(planting: Planting) -> None:
     def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
         if self.epoch > epoch.epoch and self.name in epoch.roster:
@@ -48,7 +48,7 @@ def _epochs_fall(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_on_epoch", on_epoch)
 
 
-@register("node does not compare bases", "a node collects parts with its own basis only", 2)
+@register("node does not compare bases", "a node collects parts with its own basis only", 58)
 def _any_basis(planting: Planting) -> None:
     planting.swap(NodeCore, "_take_part", lambda self, barrier, part: barrier.add(part))
 
@@ -63,12 +63,12 @@ def _mute_node(planting: Planting) -> None:
     planting.swap(NodeCore, "_on_want", lambda self, want, payload, now_ns: None)
 
 
-@register("node does not sample again", "any owner computes the samples again from Commit(k)", 1)
+@register("node does not sample again", "any owner computes the samples again from Commit(k)", 2)
 def _samples_once(planting: Planting) -> None:
     planting.swap(NodeCore, "_sample_again", lambda self, tick: None)
 
 
-@register("zombie does not notice", "back again, a lost node is a newcomer", 1)
+@register("zombie does not notice", "back again, a lost node is a newcomer", 4)
 def _zombie(planting: Planting) -> None:
     planting.swap(NodeCore, "_begin_anew", lambda self, epoch: None)
 
@@ -165,7 +165,7 @@ def _ready_once(planting: Planting) -> None:
     before: Any = planting.swap(Member, "wake", wake)
 
 
-@register("lost node does not say ready again", "an epoch without a node is no answer to its ready", 152)
+@register("lost node does not say ready again", "an epoch without a node is no answer to its ready", 93)
 def _answered_by_another(planting: Planting) -> None:
     def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
         is_present = epoch.epoch == self.epoch

@@ -36,7 +36,7 @@ class _AnyBasis(bytes):
     __hash__ = bytes.__hash__
 
 
-@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 6)
+@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 7)
 def _old_epochs(planting: Planting) -> None:
     def on_part(self: Any, part: Any, payload: bytes, now_ns: int) -> None:
         self.arrivals.take_part(part, self.frame.tick, self.members)
@@ -44,7 +44,7 @@ def _old_epochs(planting: Planting) -> None:
     planting.swap(SupervisorCore, "_on_part", on_part)
 
 
-@register("supervisor does not compare bases", "a part counts if its basis is the supervisor's", 2)
+@register("supervisor does not compare bases", "a part counts if its basis is the supervisor's", 17)
 def _any_basis(planting: Planting) -> None:
     before: Any = planting.swap(
         core, "basis_of", lambda digest, edits, delivered: _AnyBasis(before(digest, edits, delivered))
@@ -210,7 +210,7 @@ def _never_lost(planting: Planting) -> None:
     planting.swap(Roster, "lose", lambda self, process: None)
 
 
-@register("a stopped node comes back", "who was stopped is not let in until it is started", 38)
+@register("a stopped node comes back", "who was stopped is not let in until it is started", 6)
 def _unstopped(planting: Planting) -> None:
     def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
         self._core.roster.stopped.discard(hello.name)

@@ -35,7 +35,7 @@ def _hasty(planting: Planting) -> None:
     before: Any = planting.swap(HubCore, "_close_clients", close_clients)
 
 
-@register("vHub does not ask again", "who has had no progress asks again (vHub)", 1)
+@register("vHub does not ask again", "who has had no progress asks again (vHub)", 2)
 def _patient(planting: Planting) -> None:
     planting.swap(HubCore, "_ask_again", lambda self, now_ns: self._patience.asked(now_ns))
 

@@ -219,3 +219,24 @@ def test_a_welcome_that_nobody_asked_for_changes_nothing() -> None:
     forged = ClientWelcome("ear", "one", "hub", 99, 99, NAME, TEXT, "run-1")
     ear.receive(channels.CLIENT_WELCOME, "ear", encode(forged), air.now_ns)
     assert ear.welcome is before and not [m for m in published(ear) if m.channel.plane is Plane.RADIO]
+
+
+def test_a_welcome_of_a_vhub_that_is_gone_is_not_the_next_one_s() -> None:
+    """One that comes late would let a client wait for downlinks of a vHub that does not know of it."""
+    air = Storm()
+    ear = air.enter("ear", 0)
+    air.die([ear])
+    ear.wake(air.now_ns)
+    air.come_back()
+    for message in published(ear):
+        air.tell(message.channel, message.name, message.payload)
+    (late,) = [message for message in air.said() if message.channel is channels.CLIENT_WELCOME]
+    air.die([])
+    ear.receive(channels.CLIENT_WELCOME, "ear", late.payload, air.now_ns)
+    assert ear.statistics().returns == 1
+    ear.hub_gone(air.now_ns)
+    ear.receive(channels.CLIENT_WELCOME, "ear", late.payload, air.now_ns)
+    assert ear.statistics().returns == 1, "the late welcome is of the one that is gone"
+    air.come_back()
+    air.settle(ear)
+    assert ear.statistics().returns == 2

@@ -8,8 +8,10 @@ import pytest
 
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import History, fold
 
@@ -30,7 +32,8 @@ class Watched(System):
         self.heads: dict[int, bytes] = {}
         """By the number of records before it."""
         settings = Settings(on_journal=self._note)
-        super().__init__(RunSettings("run", "table.yaml", TEXT, Pace("fast"), TICKS), settings)
+        self.settings_of_run = RunSettings("run", "table.yaml", TEXT, Pace("fast"), TICKS)
+        super().__init__(self.settings_of_run, settings)
 
     def _note(self, process: str, record: bytes) -> None:
         if process == "supervisor":
@@ -57,6 +60,9 @@ def watched() -> Watched:
         20: ("move", {"robot": "red.goal", "node": "blue"}),
         30: ("push", {"name": "ball2", "impulse": [0.0, 0.02, 0.0]}),
         40: ("remove", {"name": "ball2"}),
+        50: ("stop", {"node": "red"}),
+        51: ("start", {"node": "red"}),
+        52: ("stop", {"node": "red"}),
     }
     for tick, (verb, arguments) in asked.items():
         system.at_tick(tick, partial(ask, system, verb, arguments))
@@ -71,16 +77,20 @@ def content(history: History) -> tuple[object, ...]:
     frame = history.frame
     edits = {tick: edits for tick, edits in history.edits.items() if edits}
     epoch = None if history.epoch is None else encode(history.epoch)
-    return history.run, frame.tick, frame.digest, frame.layout.names, epoch, edits, history.answers
+    told = history.answers, history.control
+    return history.run, frame.tick, frame.digest, frame.layout.names, epoch, edits, told
 
 
 def test_a_fold_of_all_records_gives_the_last_commit_and_every_answer(watched: Watched) -> None:
     history = fold(DEPLOYMENT, watched.records)
     assert (history.frame.tick, history.frame.digest) == (TICKS, watched.supervisor.frame.digest)
     assert history.epoch is not None
-    assert (history.epoch.epoch, dict(history.epoch.owners)["red.goal"]) == (2, "blue")
+    assert (history.epoch.epoch, set(dict(history.epoch.owners).values())) == (3, {"blue"})
     assert history.answers == {(answer.sender, name): answer for name, answer in watched.answers.items()}
     assert history.run.deployment == TEXT
+    again = SupervisorCore(watched.settings_of_run, library_fingerprint(), 0, "another", history=history)
+    assert again.control() == watched.supervisor.control() == history.control
+    assert (history.control.stopped, history.control.starts) == (["red"], {"red": 1})
 
 
 def test_a_request_is_in_the_journal_before_the_tick_at_which_it_takes_effect(watched: Watched) -> None:

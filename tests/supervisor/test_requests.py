@@ -214,14 +214,15 @@ def test_a_node_is_stopped_and_started_again_and_nothing_changes() -> None:
     run = Run(nodes=3).ask_at(30, "stop", node="n2").ask_at(40, "start", node="n2")
     run.system.at_tick(50, lambda: run.system.kill("n2"))
     run.system.at_tick(60, lambda: run.system.start("n2"))
-    run.go()
-    stopped, started = run.answers
+    run.ask_at(55, "start", node="n2").go()
+    stopped, started, again = run.answers
     assert stopped.accepted and stopped.text == f"n2 stopped at tick {stopped.tick}"
-    assert started.accepted and started.text.startswith("n2 may take part from tick ")
+    assert started.accepted and started.text.startswith("n2 may take part from tick ") and again.accepted
     assert run.digests == undisturbed().digests
     supervisor = run.system.supervisor
     assert supervisor.members == ("n1", "n2", "n3") and supervisor.epoch == 3
     assert set(supervisor.owners.values()) == {"n1", "n2", "n3"}, "its robots came back with it"
+    assert supervisor.roster.starts == {"n2": 2}, "which its launcher sees, also of one that is just not here"
 
 
 def test_a_stopped_node_is_not_let_in_before_it_is_started() -> None:

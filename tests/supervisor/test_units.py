@@ -10,11 +10,13 @@ from pathlib import Path
 import pytest
 
 from foosim.protocol.addresses import Address
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import BadValue, Failed, Refused
-from foosim.supervisor import cli
-from foosim.supervisor.hosts import OutOfReach, check_hosts
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor import cli, pki
+from foosim.supervisor.hosts import NoFolder, OutOfReach, check_hosts
+from foosim.supervisor.pki_hosts import files_for
+from foosim.supervisor.plan import RunOptions, check_certificates, make_plan
 from foosim.supervisor.remote import remotes
 from foosim.supervisor.units import units_of
 
@@ -47,9 +49,43 @@ def test_a_unit_restarts_a_node_that_ends_or_hangs_within_bounds() -> None:
     assert "DynamicUser" not in own and own["WantedBy"] == "default.target" and own["ExecStart"] == command
 
 
+def with_certificates(*sets: str) -> Deployment:
+    """The cluster, whose host `left` has a folder of certificates."""
+    sets = (f"hosts.left.commands={COMMANDS}", "hosts.left.pki=/etc/foosim/pki 100%", *sets)
+    return load_deployment(apply_sets((DEPLOY / "cluster.yaml").read_text(), "cluster.yaml", sets), "cluster.yaml")
+
+
+def test_a_unit_of_the_system_is_lent_the_nodes_certificate_and_a_users_reads_it() -> None:
+    address = Address("192.168.10.1", 7400, "tls")
+    (text,) = units_of(with_certificates(), "left", address, is_users=False).values()
+    command = f"{COMMANDS}/foosim-node --name blue --connect tls/192.168.10.1:7400 --world table"
+    assert lines(text)["ExecStart"] == f"{command} --pki %d"
+    lent = [line for line in text.splitlines() if line.startswith("LoadCredential=")]
+    files = ("ca.pem", "node.blue.pem", "node.blue.key")
+    assert lent == [f"LoadCredential={name}:/etc/foosim/pki 100%%/{name}" for name in files]
+    (own,) = units_of(with_certificates(), "left", address, is_users=True).values()
+    assert lines(own)["ExecStart"] == f"{command} --pki '/etc/foosim/pki 100%%'" and "LoadCredential" not in own
+    with pytest.raises(Failed, match=r"host left has no certificates: say in hosts\.left\.pki"):
+        units_of(CLUSTER, "left", address, is_users=False)
+    plain = units_of(with_certificates(), "left", ADDRESS, is_users=False)
+    assert plain == units_of(CLUSTER, "left", ADDRESS, is_users=False), "a run without certificates has none"
+
+
+def test_what_is_sent_to_a_host_is_its_own_and_no_more() -> None:
+    assert files_for(with_certificates(), "left") == ["ca.pem", "node.blue.key", "node.blue.pem"]
+    assert files_for(with_certificates(), "radio") == ["ca.pem", "vhub.key", "vhub.pem"]
+    passwords = with_certificates("access={radio: password}", "players.player-red.host=left")
+    assert files_for(passwords, "left") == ["ca.pem", "node.blue.key", "node.blue.pem", "client.player-red.password"]
+    compared = ["client.player-blue.password", "client.player-red.password"]
+    assert files_for(passwords, "radio") == ["ca.pem", "vhub.key", "vhub.pem", *compared]
+    with pytest.raises(Failed, match="nothing is placed on host radio"):
+        files_for(with_certificates("vhub.host=left"), "radio")
+
+
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="not installed: systemd-analyze")
 def test_systemd_takes_them(tmp_path: Path) -> None:
-    for name, text in units_of(CLUSTER, "left", ADDRESS, is_users=False).items():
+    secured = Address("192.168.10.1", 7400, "tls")
+    for name, text in units_of(with_certificates(), "left", secured, is_users=False).items():
         (tmp_path / name).write_text(text)
         command = ["systemd-analyze", "verify", "--man=no", str(tmp_path / name)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -87,6 +123,19 @@ def test_install_prints_or_writes_them(
     out, err = install("right", "--output", str(tmp_path / "new"), "--user", "--set", "nodes.red.launch=systemd")
     assert (out, err) == (f"{tmp_path}/new/foosim-red.service\n", "")
     assert "default.target" in (tmp_path / "new" / "foosim-red.service").read_text()
+
+
+def test_who_is_elsewhere_has_certificates_there(tmp_path: Path) -> None:
+    folder = tmp_path / "pki"
+    pki.init(folder)
+    pki.issue(folder, ["supervisor", "client.player-red", "client.player-blue", "operator.admin"])
+    hosts = [f"hosts.{name}.pki=/etc/foosim" for name in ("left", "radio", "right")]
+    plan = make_plan(RunOptions(DEPLOY / "cluster.yaml", sets=tuple(hosts), pki=folder))
+    check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
+    assert check_certificates(plan) == []
+    plan = make_plan(RunOptions(DEPLOY / "cluster.yaml", sets=tuple(hosts[:2]), pki=folder))
+    with pytest.raises(NoFolder, match=r"red on host right .* say in hosts.right.pki .* `foosim-pki send DIR right"):
+        check_hosts(plan.deployment, plan.address, remotes(plan.deployment))
 
 
 def test_hosts_have_to_reach_the_supervisor() -> None:

@@ -228,3 +228,7 @@ def test_a_writer_goes_on_with_what_it_left(chunked: bytes, path: Path, hub_run:
         read_by_others(going)
     with pytest.raises(CaptureError, match="is finished; a capture is never overwritten"):
         CaptureWriter(going, hub_run.deployment, "table.yaml", hub_run.text, {}, None, 0)
+    for_another_run = cut(tmp_path, chunked[: len(chunked) // 2])
+    with pytest.raises(CaptureError, match="is that of run run-1, not of run run-2"):
+        CaptureWriter(for_another_run, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-2"}, None, 0)
+    assert for_another_run.read_bytes() == chunked[: len(chunked) // 2]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
@@ -14,6 +15,7 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor.control import Control
 from foosim.vhub.capture_reader import open_capture
+from tests.wire.conftest import LONG
 from tests.wire.test_run import last_json
 from tests.wire.test_same_bytes import PLAYERS, scribes
 
@@ -137,3 +139,39 @@ def test_a_run_whose_vhub_is_given_up_ends_in_order(house: House) -> None:
         content["reason"] == "lost vhub: its connection closed; it did not come back within 2 s" and content["failed"]
     )
     assert "no journal of this version" in run.log("vhub").read_text()
+
+
+TRAP: Final = """
+import os, signal, sys
+is_near = False
+
+def trap(event, arguments):
+    global is_near
+    if is_near and event != "os.kill" and os.path.lexists("run.mcap"):
+        os.kill(os.getpid(), signal.SIGKILL)
+    is_near = is_near or event == "open" and str(arguments[0]) == "run.mcap"
+
+sys.addaudithook(trap)
+"""
+"""Python reads this at its start: it ends the process at whatever it does first when the capture has been created."""
+
+
+def test_a_vhub_that_is_killed_when_it_has_created_its_capture_goes_on_with_it(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = ["--set", "players={}", "--set", "engine=pure", "--for", "20 ms", "--pace", "fast", "--set", LONG]
+    supervisor = house.start("foosim-supervisor", "run", house.table, *run)
+    connect = ["--connect", house.wait_for("the run file", house.live().info).simulation]
+    hub = ["foosim-vhub", *connect, "--capture", "run.mcap", "--run-folder", str(house.folder / "hub")]
+    (house.folder / "sitecustomize.py").write_text(TRAP)
+    with monkeypatch.context() as trapped:
+        trapped.setenv("PYTHONPATH", str(house.folder))
+        code, _, err = house.run(*hub)
+    capture = house.folder / "run.mcap"
+    assert code == -signal.SIGKILL and capture.exists(), err
+    again = house.start(*hub)
+    nodes = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
+    for process in (supervisor, again, *nodes):
+        code, _, err = house.end(process)
+        assert code == 0, err
+    assert open_capture(capture).about.finished and open_capture(capture).ticks.tolist() == list(range(11))

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
+from foosim.protocol.certificates import operator_credentials
 from foosim.protocol.errors import Failed
 from foosim.protocol.hosts import Host
 from foosim.supervisor import remote as remote_module
@@ -28,6 +29,7 @@ from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE, command_path, processes_with, wait_for
 from tests.wire.sshd import Sshd, run
 from tests.wire.test_run import last_json
+from tests.wire.test_secured_run import certificates
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
@@ -219,11 +221,16 @@ def test_units_are_written_onto_the_host(there: There) -> None:
 
 
 SYSTEMCTL: Final = """#!{python}
-# Stands in for systemd: starts what a unit says, with a notify socket, and keeps what it is told.
-import os, pathlib, shlex, socket, subprocess, sys
+# Stands in for systemd: starts what a unit says, with its credentials and a notify socket, keeps what it is told.
+import os, pathlib, shlex, shutil, socket, subprocess, sys
 *_, verb, unit = sys.argv
 text = (pathlib.Path("{units}") / unit).read_text()
 (line,) = [line for line in text.splitlines() if line.startswith("ExecStart=")]
+os.mkdir("{units}/lent", 0o700)
+for credential in [line for line in text.splitlines() if line.startswith("LoadCredential=")]:
+    name, path = credential.removeprefix("LoadCredential=").split(":")
+    shutil.copy(path, "{units}/lent/" + name)
+line = line.replace("%d", "{units}/lent")
 if os.fork() == 0:
     os.setsid()
     null = os.open(os.devnull, os.O_RDWR)
@@ -244,11 +251,13 @@ if os.fork() == 0:
 
 
 def test_a_node_that_systemd_runs_takes_part(there: There, house: House) -> None:
-    """The unit is the one that `install` writes; the launcher has it started; it tells systemd how it does."""
-    units = there.folder / "units"
+    """The unit is the one that `install` writes, with the node's certificate; the launcher has it started; it tells
+    systemd how it does."""
+    units, folder = there.folder / "units", certificates(there.folder / "certs")
     address = f"127.0.0.1:{free_port()}"
-    sets = [f"hosts={json.dumps({'there': there.host()})}", "nodes.blue.host=there", "nodes.blue.launch=systemd", LONG]
-    place = ["--listen", address, *(word for setting in sets for word in ("--set", setting))]
+    hosts = {"there": there.host(pki=str(folder))}
+    sets = [f"hosts={json.dumps(hosts)}", "nodes.blue.host=there", "nodes.blue.launch=systemd", LONG]
+    place = ["--listen", address, "--pki", str(folder), *(word for setting in sets for word in ("--set", setting))]
     code, out, err = house.run("foosim-supervisor", "install", "there", TABLE, *place, "--output", units)
     assert (code, out, err) == (0, f"{units}/foosim-blue.service\n", "")
     (there.bin / "systemctl").write_text(SYSTEMCTL.format(python=sys.executable, units=units))
@@ -264,7 +273,8 @@ def test_a_node_that_systemd_runs_takes_part(there: There, house: House) -> None
     def told() -> list[str]:
         return (units / "told").read_text().splitlines() if (units / "told").exists() else []
 
-    with Control(f"tcp/{address}") as control:
+    assert sorted(path.name for path in (units / "lent").iterdir()) == ["ca.pem", "node.blue.key", "node.blue.pem"]
+    with Control(f"tls/{address}", operator_credentials(folder)) as control:
         wait_for("blue to be here", lambda: "blue" in control.status()["processes"])
         assert control.status()["processes"]["blue"]["host"] == "there"
         wait_for("two rounds of the watchdog", lambda: told().count("WATCHDOG=1") >= 2)

@@ -1,0 +1,52 @@
+"""What the launcher does with processes that end again and again, and with those that somebody asks for."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from foosim.supervisor.display import Display
+from foosim.supervisor.launcher import Child
+from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.restarts import WAITS_S
+from foosim.supervisor.up import Up
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+
+
+def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    (tmp_path / "node").write_text('#!/bin/sh\necho started >>"$0.log"\nexit 1\n')
+    (tmp_path / "node").chmod(0o755)
+    up._launch("red", [str(tmp_path / "node")])
+    now_s = 0.0
+
+    def ends() -> int:
+        """Let it end, and what follows happen; return how often it was started."""
+        nonlocal now_s
+        child: Child = up._launcher.children["red"]
+        child.process.wait()
+        up._restart_ended(now_s)
+        now_s += max(WAITS_S)
+        up._restart_ended(now_s)
+        up._launcher.children["red"].process.wait()
+        return (tmp_path / "node.log").read_text().count("started")
+
+    assert [ends() for _ in range(7)] == [2, 3, 4, 5, 6, 6, 6]
+    assert said.getvalue().endswith(
+        f"red ended with exit code 1, is given up; foosim-supervisor start red tries it again; its log is "
+        f"{up.folder.log('red')}\n"
+    )
+    up._start_wanted({"red": 1, "blue": 1})
+    assert ends() == 8, "once for the word, and once again after the first wait"
+    up._start_wanted({"red": 1, "blue": 1})
+    assert ends() == 9, "a word is heard once"
+    assert said.getvalue().count("starts again in 0.5 s") == 2
+    up._launcher.close()
