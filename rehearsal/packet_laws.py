@@ -5,17 +5,25 @@ Neighbours: `laws` tells of what is written and said.
 
 from __future__ import annotations
 
+from collections import Counter
+from typing import Final
+
 from foosim.client.core import ClientCore
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Delivered, Deliveries, Done, Down, Go, RobotPacket, Samples
+from foosim.protocol.messages import Delivered, Deliveries, Done, Down, Go, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import System
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT
 from foosim.vhub.records import Closing, TickRecord, world_packets
 from foosim.vhub.state import HubState
+
+Key = tuple[str, str, int, int]
+"""A packet: source, destination, sequence number, copy."""
+OPEN: Final = ("", IN_FLIGHT)
+"""What stands for a cause where a packet was not dropped."""
 
 
 class Broken(AssertionError):
@@ -43,7 +51,13 @@ class PacketLaws:
         self._downlinks: dict[str, dict[int, bytes]] = {}
         self._go_ticks: dict[str, int] = {}
         self._dones: dict[tuple[str, int], bytes] = {}
-        self._fates: dict[tuple[str, str, int, int], str] = {}
+        self._answered: dict[int, dict[str, list[Sent]]] = {}
+        """What clients answered to a tick that is not closed, by tick and client."""
+        self._reached: dict[int, list[Key]] = {}
+        """What robots were told by the deliveries behind a tick, until its fates are known."""
+        self._received: dict[tuple[str, int], list[Key]] = {}
+        """The same of what a client was told at a tick."""
+        self._fates: dict[Key, str] = {}
 
     # --- the vHub's side ---------------------------------------------------------------------------------------------
 
@@ -61,7 +75,11 @@ class PacketLaws:
                 known = self._sequences.get(client, 0)
                 hold(packet.sequence <= known + 1, f"{client}: packet {packet.sequence} is taken after {known}")
                 self._sequences[client] = max(known, packet.sequence)
+        answered = {name: sent for name, sent in self._answered.pop(tick, {}).items() if sent}
+        taken = {name: sent for name, sent in record.admitted if sent}
+        hold(taken == answered, f"record {tick} has {[*taken]}, clients answered {[*answered]}: a crash has lost some")
         deliveries = decode(Deliveries, record.deliveries)
+        self._reached[tick] = [(p.source, p.destination, p.sequence, p.copy) for p in deliveries.packets]
         hold(deliveries.tick == tick + 1, f"record {tick} has deliveries {deliveries.tick}")
         if tick + 1 not in self._written:
             self._written[tick + 1] = record.deliveries
@@ -92,7 +110,11 @@ class PacketLaws:
         self._delivered |= keys
 
     def fates(self, closing: Closing) -> None:
-        """Law 5: each packet has one fate; a robot's has the number of its tick and place."""
+        """Law 5: each packet has one fate; a robot's has the number of its tick and place.
+
+        What has not reached its receiver is in the count of what was dropped: receivers were told all the rest.
+        """
+        self._came(closing)
         for flight in closing.fates:
             key = flight.source, flight.destination, flight.sequence, flight.copy
             hold(key not in self._fates, f"packet {key} has two fates")
@@ -100,6 +122,21 @@ class PacketLaws:
             if flight.source in self._deployment.robots:
                 sent = (flight.sequence >> 16) * self._deployment.tick_ns
                 hold(flight.sent_ns == sent, f"packet {key} of a robot has another tick's number")
+
+    def _came(self, closing: Closing) -> None:
+        """Every packet that counts as delivered was in a message to its receiver, and no other was."""
+        tick = closing.frame.tick
+        robots: list[Key] = []
+        clients: dict[str, list[Key]] = {}
+        for flight in closing.fates:
+            if not flight.cause:
+                to = flight.destination
+                of_it = robots if to in self._deployment.robots else clients.setdefault(to, [])
+                of_it.append((flight.source, to, flight.sequence, flight.copy))
+        hold(robots == self._reached.pop(tick, []), f"deliveries {tick + 1} are not what counts as delivered")
+        told = {name: keys for (name, at), keys in self._received.items() if at == tick and keys}
+        hold(clients == told, f"what clients were told at tick {tick} is not what counts as delivered")
+        self._received = {key: keys for key, keys in self._received.items() if key[1] > tick}
 
     def senses(self, frame: Frame, replica: Replica) -> None:
         """What robots sent at a frame is a function of it, whoever owned them."""
@@ -113,6 +150,9 @@ class PacketLaws:
     def downlink(self, client: str, down: Go | Down, raw: bytes) -> None:
         """Downlinks are numbered one after the other, and each number stands for one thing."""
         known = self._downlinks.setdefault(client, {})
+        if down.number not in known:
+            keys = [(packet.source, client, packet.sequence, packet.copy) for packet in down.packets]
+            self._received.setdefault((client, down.tick), []).extend(keys)
         hold(down.number <= len(known) + 1, f"downlink {down.number} of {client} after {len(known)}")
         hold(known.setdefault(down.number, raw) == raw, f"downlink {down.number} of {client} says two things")
         if isinstance(down, Go):
@@ -124,6 +164,8 @@ class PacketLaws:
     def answers(self, done: Done, raw: bytes) -> None:
         """A lockstep client's answer to a tick is one."""
         hold(self._dones.setdefault((done.name, done.tick), raw) == raw, f"{done.name} has two Dones of {done.tick}")
+        if done.tick > self.closed:
+            self._answered.setdefault(done.tick, {})[done.name] = done.packets
 
     # --- account -----------------------------------------------------------------------------------------------------
 
@@ -147,6 +189,9 @@ class PacketLaws:
         for cause in self._fates.values():
             counted[DELIVERED if not cause else IN_FLIGHT if cause == IN_FLIGHT else DROPPED] += 1
         packets = state.packets
+        by_link = Counter((source, to) for (source, to, _, _), cause in self._fates.items() if cause not in OPEN)
+        dropped = {pair: link.state.dropped for pair, link in state.links.items() if link.state.dropped}
+        hold(dict(by_link) == dropped, f"receivers lack {by_link}, links count {dropped} as dropped")
         told = {DELIVERED: packets.delivered, DROPPED: packets.dropped, IN_FLIGHT: packets.in_flight}
         hold(counted == told, f"fates {counted}, the account says {told}")
         for name, process in system.processes.items():

@@ -19,6 +19,7 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.names import CHANNEL_ECHO
 from foosim.protocol.units import Pace
+from foosim.rehearsal.bounds import too_large
 from foosim.rehearsal.bus import CALM, Traced, Weather
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.faults import (
@@ -48,6 +49,8 @@ HEALED_PACE: Final = "0.02x"
 """100 ms a tick: slow enough that all are back before the end."""
 PROGRESS_NS: Final = 10_000_000_000
 """When all is healed the next tick is committed within this virtual time."""
+BOUNDS_EVERY: Final = 50
+"""How many ticks apart everything is looked at that processes keep: a look takes as long as some ticks."""
 IDLE_NS: Final = 60_000_000_000
 """Before, with all that goes on, within this."""
 WORLDS: Final = 4
@@ -250,8 +253,11 @@ class Flight:
         if traced.what == "journal" and traced.process == channels.VHUB and self.system.hub.state is not None:
             self.laws.packets.account(self.system.hub.state)
 
-    def _committed(self, _: Frame) -> None:
+    def _committed(self, frame: Frame) -> None:
         self._last_commit_ns = self.system.bus.now_ns
+        if frame.tick % BOUNDS_EVERY == 0:
+            large = [text for process in self.system.processes.values() for text in too_large(process.core)]
+            hold(not large, f"at tick {frame.tick} what is kept grows: {', '.join(large)}")
 
     def _heal(self) -> None:
         """Fine weather from now on: who is down comes up, who is slow is quick, who stood still goes on."""

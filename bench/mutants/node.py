@@ -12,6 +12,7 @@ from bench.mutants.planting import Mutant, Planting, Register
 from foosim.client.core import ClientCore
 from foosim.node import step
 from foosim.node.core import NodeCore
+from foosim.node.inputs import Inputs
 from foosim.node.sensors import encoder
 from foosim.node.step import Stepper
 from foosim.protocol import channels
@@ -193,6 +194,11 @@ def _numbers_from_one(planting: Planting) -> None:
         return before(self, packets, stamp_ns)
 
     before: Any = planting.swap(ClientCore, "_numbered", numbered)
+
+
+@register("inputs are kept for ever", "what a process keeps is bounded (node)", 1)
+def _kept_inputs(planting: Planting) -> None:
+    planting.swap(Inputs, "forget", lambda self, tick: None)
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

@@ -256,4 +256,11 @@ def _lost_commit(planting: Planting) -> None:
     before: Any = planting.swap(SupervisorCore, "_on_want", on_want)
 
 
+@register("a loss is told twice", "a commit tells of what is over by it, once", 1)
+def _told_twice(planting: Planting) -> None:
+    before: Any = planting.swap(
+        Recovery, "committed", lambda self, before_ns, now_ns: before(self, before_ns, now_ns) and self.recovered[-2:]
+    )
+
+
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

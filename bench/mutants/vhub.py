@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from msgspec.structs import replace
+
 from bench.mutants.planting import Mutant, Planting, Register
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Deliveries
 from foosim.vhub import core, records, state
+from foosim.vhub.commits import Commits
 from foosim.vhub.core import HubCore
 from foosim.vhub.door import Door
 from foosim.vhub.sessions import Sessions
@@ -156,6 +159,37 @@ def _unwritten(planting: Planting) -> None:
             closing, commit, samples, {}, state, deliveries
         ),
     )
+
+
+@register("a packet that arrived is not told", "what a client is told is what counts as delivered", 1)
+def _untold(planting: Planting) -> None:
+    def arrive(self: Any, tick: int, fates: Any) -> Any:
+        released = before(self, tick, fates)
+        for flights in released.values():
+            del flights[2:]
+        return released
+
+    before: Any = planting.swap(HubState, "_arrive_at_clients", arrive)
+
+
+@register("a delivery is left out", "deliveries are what counts as delivered", 1)
+def _left_out(planting: Planting) -> None:
+    before: Any = planting.swap(
+        HubState, "_arrive_at_robots", lambda self, tick, frame, fates: before(self, tick, frame, fates)[:3]
+    )
+
+
+@register("Dones lose packets", "nothing that a client answered is lost", 1)
+def _cut_dones(planting: Planting) -> None:
+    def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
+        before(self, replace(done, packets=[]) if self._core.repeated else done, payload, now_ns)
+
+    before: Any = planting.swap(Door, "done", done)
+
+
+@register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)
+def _kept_commits(planting: Planting) -> None:
+    planting.swap(Commits, "forget", lambda self, tick: None)
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

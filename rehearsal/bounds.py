@@ -1,0 +1,67 @@
+"""What a core keeps is bounded: a walk over everything that it holds, which names what has grown too large.
+
+Nothing that a core keeps may grow with the ticks of a run. So a container may have as many things as there are ticks
+that others still ask for, some times over, unless the table here says by what it is bounded instead. A container that
+is new is watched without being named anywhere. Neighbours: `laws` asks this now and then.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import msgspec
+
+from foosim.protocol import limits
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout
+from foosim.supervisor.requests import ANSWERS_KEPT
+
+KEPT_MAX: Final = 4 * limits.KEPT_TICKS
+BOUNDS: Final[Mapping[str, int]] = {
+    "Requests._answers": ANSWERS_KEPT,
+    "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
+    "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
+    "Lags.cells": 1 << 10,
+    "HubState.links": limits.CLIENTS_MAX,
+    "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
+}
+"""By class and attribute: containers of something else than ticks."""
+CONSTANT: Final = (Deployment, Layout, Frame, msgspec.Struct)
+"""What does not grow."""
+
+
+def too_large(core: object) -> list[str]:
+    """Return what a core holds that is larger than it may be, each as `Class.attribute has n of m`."""
+    return [
+        f"{where} has {size} of {BOUNDS.get(where, KEPT_MAX)}"
+        for where, size in sizes(core)
+        if size > BOUNDS.get(where, KEPT_MAX)
+    ]
+
+
+def sizes(core: object) -> Iterator[tuple[str, int]]:
+    """Yield the size of every container that a core holds, however deep, by class and attribute."""
+    seen: set[int] = set()
+    todo: list[tuple[str, Any]] = [("", core)]
+    while todo:
+        where, value = todo.pop()
+        if id(value) in seen or isinstance(value, CONSTANT):
+            continue
+        seen.add(id(value))
+        if isinstance(value, dict | list | set | deque):
+            yield where, len(value)
+            todo += [(where, item) for item in (value.values() if isinstance(value, dict) else value)]
+        elif type(value).__module__.startswith("foosim."):
+            name = type(value).__name__
+            todo += [(f"{name}.{attribute}", found) for attribute, found in _attributes(value)]
+
+
+def _attributes(value: object) -> Iterator[tuple[str, Any]]:
+    yield from getattr(value, "__dict__", {}).items()
+    for kind in type(value).__mro__:
+        for name in getattr(kind, "__slots__", ()):
+            if hasattr(value, name):
+                yield name, getattr(value, name)

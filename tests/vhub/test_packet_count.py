@@ -1,0 +1,56 @@
+"""The count of packets of `python -m bench packets`, in small: all are explained, and a bug is told by what is not."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import pytest
+
+from bench.packets import Count, Load, run
+from foosim.protocol.frame import Frame
+from foosim.vhub.packet import Flight
+from foosim.vhub.state import HubState
+
+TICKS: Final = 180
+LOAD: Final = Load(packets=8, deaths_every=60)
+
+
+def count() -> Count:
+    return run(TICKS, LOAD)
+
+
+def test_every_packet_is_explained() -> None:
+    found = count()
+    assert found.unexplained == 0
+    assert found.dropped.keys() == {"random_loss", "rx_down"}
+    assert found.refused.keys() == {"duplicate", "malformed", "no_route"}
+    assert found.crashes == 3 and found.lost_in_crash > 0 and found.in_flight > 0 and found.delivered > 3_000
+    assert found.asked == sum(
+        (found.delivered, *found.dropped.values(), *found.refused.values(), found.in_flight, found.lost_in_crash)
+    )
+
+
+def test_a_packet_that_is_lost_without_a_fate_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    arrive = HubState._arrive_at_robots
+
+    def leak(self: HubState, tick: int, frame: Frame, fates: list[Flight]) -> Any:
+        found = arrive(self, tick, frame, fates)
+        if tick == 50:
+            fates.pop()
+        return found
+
+    monkeypatch.setattr(HubState, "_arrive_at_robots", leak)
+    assert count().unexplained > 0
+
+
+def test_a_repeat_that_is_taken_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    admit = HubState._admit
+
+    def forget(self: HubState, source: str, sent: Any) -> bool:
+        if self.closed == 70 and source in self.members:
+            self.members[source].sequence = 0
+        return admit(self, source, sent)
+
+    monkeypatch.setattr("foosim.vhub.sessions.Session.take", lambda self, packets: self.inbox.extend(packets) or 0)
+    monkeypatch.setattr(HubState, "_admit", forget)
+    assert count().unexplained > 0
