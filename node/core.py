@@ -205,9 +205,8 @@ class NodeCore:
 
     def statistics(self) -> NodeStatistics:
         tick = self.frame.tick if self.frame is not None else 0
-        return NodeStatistics(
-            tick, self.epoch, self._solved_ticks, self._refused, self._repeated, self._diverged, len(self._held)
-        )
+        counts = self._solved_ticks, self._refused, self._repeated, self._diverged, len(self._held)
+        return NodeStatistics(tick, self.epoch, *counts)
 
     @property
     def lacking(self) -> tuple[Channel, int] | None:
@@ -419,7 +418,8 @@ class NodeCore:
         self.roster = tuple(sorted(epoch.roster))
         self.owners = dict(epoch.owners)
         self.member.entered()
-        self._inputs.forget_orders()
+        if self._inputs.begin(epoch):
+            self._history = {tick: frame for tick, frame in self._history.items() if tick <= epoch.branch_tick}
         self._parts.clear()
         self._sent_parts.clear()
         self.work = None
@@ -442,14 +442,14 @@ class NodeCore:
         self.actions.append(Say("warning", f"epoch {epoch.epoch} is without this node, which asks to take part again"))
         self.epoch = epoch.epoch
         self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
-        self._inputs.forget_orders()
+        self._inputs.begin(epoch)
         for kept in (self._history, self._parts, self._sent_parts, self._held):
             kept.clear()
         self.member.begin_anew()
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         """The frame that the epoch starts from, when mine is not there or not the same; or one to sample."""
-        if commit.tick in self._unsampled:
+        if commit.tick in self._unsampled and not self._inputs.is_void(commit):
             self._take_old_frame(commit)
             return
         epoch = self._awaited_epoch

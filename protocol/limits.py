@@ -60,6 +60,8 @@ DOWNLINKS_KEPT_MAX: Final = 16_384
 """How many numbered downlinks are kept for one client."""
 UPLINKS_KEPT_MAX: Final = 65_536
 """How many packets a client keeps that the vHub has not recorded yet."""
+EDITED_TICKS_KEPT: Final = 256
+"""Ticks whose edits the supervisor knows after they are committed: a branch orders them again."""
 CHECKPOINT_TICKS: Final = 500
 """How often the vHub's state goes to its journal: a fold begins at the last one."""
 LAG_ANCHOR_NS: Final = 100_000_000
