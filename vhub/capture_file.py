@@ -24,9 +24,10 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch, Origin
 from foosim.vhub.mcap_file import McapWriter
-from foosim.vhub.mcap_scan import Scanned, scan
+from foosim.vhub.mcap_scan import Scanned, Void, scan
 from foosim.vhub.packet import IN_FLIGHT
 from foosim.vhub.records import Closing
+from foosim.vhub.resume import Captured
 from foosim.vhub.rows import (
     EPOCHS,
     FORMAT,
@@ -124,10 +125,17 @@ class CaptureFile:
 
     With `journal_tick`, a file that is there is one that this run left unfinished: it is gone on with, and `torn_bytes`
     of it were cut off. A journal has all ticks from that one on: bytes that are damaged, not just cut, are only given
-    up when it does. A file that ends before its description is begun anew; one that has its end is refused.
+    up when it does. With `journal_end` so is what is further than the journal, chunk by chunk. A file that ends before
+    its description is begun anew; one that has its end is refused.
     """
 
-    def __init__(self, path: Path, described: Described, journal_tick: int | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        described: Described,
+        journal_tick: int | None = None,
+        journal_end: Captured | None = None,
+    ) -> None:
         self.path = path
         self.done = Progress()
         self.torn_bytes = 0
@@ -140,7 +148,7 @@ class CaptureFile:
         """The frame of the last closing, written or not."""
         self._file = self._open(journal_tick is not None)
         try:
-            found = None if journal_tick is None else self._scanned(journal_tick)
+            found = None if journal_tick is None else self._scanned(journal_tick, journal_end)
             self.mcap = McapWriter(self._write_bytes, PROFILE, None if found is None else found.book)
             if found is None:
                 self._channels = self._declare()
@@ -309,10 +317,11 @@ class CaptureFile:
 
     # --- a file that was left unfinished -----------------------------------------------------------------------------
 
-    def _scanned(self, journal_tick: int) -> Scanned | None:
+    def _scanned(self, journal_tick: int, journal_end: Captured | None) -> Scanned | None:
         """Return what the file has, cut at its last whole record; None when it has to be begun anew."""
+        void = None if journal_end is None else _behind(journal_end, self._plan.tick_ns)
         with os.fdopen(os.dup(self._file), "rb") as stream:
-            found = scan(stream, os.fstat(self._file).st_size, str(self.path))
+            found = scan(stream, os.fstat(self._file).st_size, str(self.path), void)
         if found.finished:
             raise CaptureError(f"{self.path}: is finished; a capture is never overwritten")
         is_described = VERSIONS in {attachment.name for attachment in found.book.attachments}
@@ -321,14 +330,26 @@ class CaptureFile:
         self.done = _progress(found)
         end = found.book.offset if is_described else 0
         if not found.is_cut and journal_tick > self.done.tick + 1:
+            why = "damaged" if not found.is_void else "further than its journal, whose end is lost"
             raise CaptureError(
-                f"{self.path}: byte {end}: damaged; {found.torn_bytes} bytes from there on would be lost, "
+                f"{self.path}: byte {end}: {why}; {found.torn_bytes} bytes from there on would be lost, "
                 f"no journal has tick {self.done.tick + 1}"
             )
         self.torn_bytes = found.torn_bytes
         os.ftruncate(self._file, end)
         os.lseek(self._file, end, os.SEEK_SET)
         return found if is_described else None
+
+
+def _behind(end: Captured, tick_ns: int) -> Void:
+    """Return what a capture has behind the end of a journal."""
+    fields = {TICK: ("tick", end.tick), EPOCHS: ("epoch", end.epoch)}
+
+    def is_void(topic: str, data: bytes) -> bool:
+        name, last = fields[topic]
+        return _number(data, name) > last
+
+    return Void(tuple(fields), max(0, end.tick) * tick_ns, is_void)
 
 
 def _progress(found: Scanned) -> Progress:
@@ -342,13 +363,21 @@ def _progress(found: Scanned) -> Progress:
 
 
 def _last_row(found: Scanned, topic: str) -> dict[str, object]:
+    return _row(found.last.get(topic, b"{}"))
+
+
+def _row(data: bytes) -> dict[str, object]:
     try:
-        row = decode_json(found.last.get(topic, b"{}"))
+        row = decode_json(data)
     except Malformed:
         return {}
     return row if isinstance(row, dict) else {}
 
 
 def _last_number(found: Scanned, topic: str, field: str) -> int:
-    number = _last_row(found, topic).get(field, -1)
+    return _number(found.last.get(topic, b"{}"), field)
+
+
+def _number(data: bytes, field: str) -> int:
+    number = _row(data).get(field, -1)
     return number if isinstance(number, int) else -1

@@ -46,7 +46,7 @@ from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing
-from foosim.vhub.resume import Captured, first_tick_of, recall, was_captured
+from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_captured
 from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
@@ -214,8 +214,8 @@ class HubProcess:
             "fingerprint": library_fingerprint().hex(),
             **origin_metadata(build.origin),
         }
-        described = build.deployment_name, build.deployment, metadata, self._say, first_tick_of(records)
-        self._capture = CaptureWriter(path, deployment, *described)
+        described = build.deployment_name, build.deployment, metadata, self._say
+        self._capture = CaptureWriter(path, deployment, *described, first_tick_of(records), end_of(deployment, records))
         self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         return self._capture.begun_with
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from array import array
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import BinaryIO
@@ -42,7 +43,9 @@ class Scanned:
     finished: bool = False
     """Whether the file has an end: then there is nothing to go on with."""
     is_cut: bool = True
-    """Whether nothing but one record that is cut stands behind the whole ones; else bytes there are damaged."""
+    """Whether nothing but one record that is cut stands behind the whole ones; else bytes there are damaged or void."""
+    is_void: bool = False
+    """Whether a whole chunk stands there with a message that does not hold."""
     last: dict[str, bytes] = field(default_factory=dict)
     """The last message of each topic."""
     to_index: dict[int, array[int]] = field(default_factory=dict)
@@ -54,18 +57,28 @@ class Scanned:
         return self.size - self.book.offset
 
 
-def scan(stream: BinaryIO, size: int, name: str) -> Scanned:
-    """Read a file's records up to the first that is cut or damaged, or its end.
+@dataclass(frozen=True, slots=True)
+class Void:
+    """What does not hold of a file: messages of these topics, from a log time on, that a test names by their data."""
+
+    topics: tuple[str, ...]
+    from_ns: int
+    is_void: Callable[[str, bytes], bool]
+
+
+def scan(stream: BinaryIO, size: int, name: str, void: Void | None = None) -> Scanned:
+    """Read a file's records up to the first that is cut or damaged, the first chunk with something void, or its end.
 
     Raises CaptureError when it does not start as an MCAP file does, with as much as it has.
     """
-    return _Scan(stream, size, name).run()
+    return _Scan(stream, size, name, void).run()
 
 
 class _Scan:
-    def __init__(self, stream: BinaryIO, size: int, name: str) -> None:
+    def __init__(self, stream: BinaryIO, size: int, name: str, void: Void | None) -> None:
         self._stream = stream
         self._name = name
+        self._void = void
         self._found = Scanned(Book(), size)
         self._book = self._found.book
         self._topics: dict[int, str] = {}
@@ -106,6 +119,9 @@ class _Scan:
         except (EndOfFile, struct.error, ValueError, KeyError, IndexError, CaptureError, zstandard.ZstdError):
             self._found.is_cut = False
             return False
+        if self._found.is_void:
+            self._found.is_cut = False
+            return False
         self._book.offset += RECORD.size + length
         return True
 
@@ -135,6 +151,10 @@ class _Scan:
     def _take_chunk(self, content: bytes, offset: int, length: int) -> None:
         chunk = unpack_chunk(content, self._name)
         first_ns, last_ns, size, _, name_length = CHUNK_FIELDS.unpack_from(content)
+        void = self._void
+        self._found.is_void = void is not None and last_ns >= void.from_ns and self._holds(chunk, void)
+        if self._found.is_void:
+            return
         name = content[CHUNK_FIELDS.size : CHUNK_FIELDS.size + name_length].decode()
         self._chunk, self._indexed = chunk, 0
         book = self._book
@@ -152,6 +172,15 @@ class _Scan:
                 message_index_length=0,
             )
         )
+
+    def _holds(self, chunk: bytes, void: Void) -> bool:
+        """Whether a chunk holds something void."""
+        for opcode, start, stop in chunk_records(chunk):
+            if opcode == Opcode.MESSAGE:
+                topic = self._topics[MESSAGE_FIELDS.unpack_from(chunk, start)[0]]
+                if topic in void.topics and void.is_void(topic, chunk[start + MESSAGE_FIELDS.size : stop]):
+                    return True
+        return False
 
     def _take_index(self, content: bytes, offset: int, length: int) -> None:
         """Count a channel's messages of the last chunk, and keep the last of them."""

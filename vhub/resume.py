@@ -27,7 +27,7 @@ from foosim.vhub.state import HubState, received
 
 @dataclass(frozen=True, slots=True)
 class Captured:
-    """How far a capture is: its last tick and its last epoch; -1 and 0 when it has none yet."""
+    """How far a capture, or a journal, is: its last tick and its last epoch; -1 and 0 when it has none yet."""
 
     tick: int = -1
     epoch: int = 0
@@ -171,6 +171,23 @@ def first_tick_of(records: Sequence[bytes]) -> int | None:
     """Return the first tick of which a journal has a record, or would have; None when there is no journal."""
     ticks = (record.tick for raw in records if isinstance(record := decode_any(HubRecord, raw), TickRecord))
     return next(ticks, limits.COUNTER_MAX) if records else None
+
+
+def end_of(deployment: Deployment, records: Sequence[bytes]) -> Captured | None:
+    """Return the last tick and epoch of a journal; None when there is no journal. Raises Malformed for what is none."""
+    tick, epoch = -1, 0
+    for raw in records:
+        record = decode_any(HubRecord, raw)
+        if isinstance(record, TickRecord):
+            tick = record.tick
+        elif isinstance(record, Epoch):
+            epoch = record.epoch
+        elif isinstance(record, HeadRecord) and record.epoch:
+            epoch = decode(Epoch, record.epoch).epoch
+    if records and tick < 0:
+        head = decode_any(HeadRecord, records[0])
+        tick = HubState.restore(deployment, head.state).closed
+    return Captured(tick, epoch) if records else None
 
 
 def was_captured(records: Sequence[bytes]) -> str | None:
