@@ -205,6 +205,7 @@ class Client:
         self._link = link
         self._subscriptions: set[tuple[str, str]] = set()
         self._newest = Newest({})
+        self._branch = link.core.branch
         self._period: int | None = None
         self._commands: dict[str, bytes] = {}
         self._outgoing: deque[Outgoing] = deque()
@@ -239,8 +240,9 @@ class Client:
 
         `rate_hz` is a whole number of ticks; None is the rate that the deployment declares. The client joins when the
         loop begins. What the loop's body sends leaves when the loop comes round or is left; a client that does not go
-        on holds the run, up to the deployment's deadline. Raises BadValue for a rate, NotJoined, ConnectionFailed,
-        and PacketError when a tick's packets are too many for one answer.
+        on holds the run, up to the deployment's deadline. Where a machine was lost with the run's last ticks, the run
+        goes on from before them: lower ticks come again, and the log says so. Raises BadValue for a rate, NotJoined,
+        ConnectionFailed, and PacketError when a tick's packets are too many for one answer.
         """
         period = self._period_ticks(rate_hz)
         if self._period is not None and self._period != period:
@@ -380,6 +382,9 @@ class Client:
 
     def _take(self, received: Iterable[Received]) -> None:
         received = list(received)
+        if self._core.branch != self._branch:
+            self._branch = self._core.branch
+            self._newest.set_back(self._core.branch_ns)
         self._newest.take(received)
         self.packets = [self._packet(packet) for packet in received]
 

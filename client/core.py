@@ -3,7 +3,8 @@
 Hello until it is answered, Join until the vHub is heard. In lockstep `go` is the Go that waits for an answer, and
 `done` answers it: stop and wait, so that a Go that comes again gets the same bytes again. A free-running client takes
 `arrivals` and sends when it likes; what it sent is kept until the vHub has recorded it. Downlinks are numbered: repeats
-are dropped, gaps counted. When the vHub is gone (`hub_gone`) all starts again with hello, and goes on where it was.
+are dropped, gaps counted. When the vHub is gone (`hub_gone`) all starts again with hello, and goes on where it was; or
+where the run does, if that has lost its last ticks and goes on as a branch from before them.
 Neighbours: `player` and `client` drive it; `vhub.sessions` is the other side.
 """
 
@@ -13,6 +14,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
+
+from msgspec import structs
 
 from foosim.client.errors import PacketError, UnknownName
 from foosim.protocol import channels, limits
@@ -75,6 +78,8 @@ class ClientStatistics:
     """Packets that were not sent, since too many wait to be recorded."""
     returns: int = 0
     """How often it went on after the vHub was gone."""
+    lost: int = 0
+    """Packets that the vHub had recorded in ticks that a branch has left behind."""
 
 
 class ClientCore:
@@ -93,7 +98,11 @@ class ClientCore:
         self.arrivals: deque[Received] = deque()
         """What has reached a free-running client and was not taken yet, in order."""
         self.tick = -1
-        """The newest tick that the vHub has named."""
+        """The newest tick that the vHub has named; less than before when a branch begins."""
+        self.branch = 0
+        """The branch in which it takes part: when that is another one, nothing holds that is newer than `branch_ns`."""
+        self.branch_ns = 0
+        """The time of the tick behind which that began, where it was in an earlier one."""
         self.ended = False
         self.is_away = False
         """Whether the vHub is gone, and has not let the client in again."""
@@ -107,6 +116,8 @@ class ClientCore:
         self._is_heard = False
         """Whether anything was heard since the Join was said."""
         self._lost_ns = NEVER_NS
+        self._gone = 0
+        """How often the vHub was gone. What one of before said to a hello of before is no answer."""
         self._unrecorded: deque[Sent] = deque()
         self._resend_ns = NEVER_NS
         self._period = 0
@@ -116,8 +127,7 @@ class ClientCore:
         self._done = b""
         self._done_number = -1
         self._downlinks = self._repeated = self._missing = self._malformed = self._overflowed = 0
-        self._received = self._sent = self._answered = self._unsent = self._returns = 0
-        self._losses = 0
+        self._received = self._sent = self._answered = self._unsent = self._returns = self._lost = 0
         self._readers: dict[type[Any], Callable[[Any], None]] = {
             ClientWelcome: self._on_welcome,
             ClientRefusal: self._on_refusal,
@@ -173,7 +183,7 @@ class ClientCore:
         if self.deployment is None or self.is_away or self.ended:
             return
         self.is_away = True
-        self._losses += 1
+        self._gone += 1
         self._lost_ns = now_ns + self.deployment.deadlines.vhub_back_ns
         self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
         self._resend_ns = NEVER_NS
@@ -196,6 +206,7 @@ class ClientCore:
             self._answered,
             self._unsent,
             self._returns,
+            self._lost,
         )
 
     # --- what the client does --------------------------------------------------------------------------------------
@@ -224,7 +235,7 @@ class ClientCore:
         assert self.go is not None and self.deployment is not None, "nothing to answer"
         # A packet's stamp is its tick's time: with a wall clock's, two equal runs would not give equal bytes.
         sent = self._numbered(packets, self.go.tick * self.deployment.tick_ns)
-        payload = encode(Done(self.name, self.boot, self.go.tick, sent))
+        payload = encode(Done(self.name, self.boot, self.go.tick, sent, self.branch))
         if len(payload) > channels.UP.bytes_max:
             raise PacketError(f"{len(payload)} bytes in one answer, at most {channels.UP.bytes_max} are allowed")
         self._count_sent(sent)
@@ -255,13 +266,13 @@ class ClientCore:
             self._resend_ns = NEVER_NS
             return
         for part in _split(sent, channels.UP.bytes_max):
-            self._publish(encode(Up(self.name, self.boot, part)))
+            self._publish(encode(Up(self.name, self.boot, part, self.branch)))
 
     # --- messages --------------------------------------------------------------------------------------------------
 
     def _on_welcome(self, welcome: ClientWelcome) -> None:
         # One that answers an earlier hello is of a vHub that is gone, too.
-        is_old = welcome.losses != self._losses or (self.welcome is not None and not self.is_away)
+        is_old = welcome.returns != self._gone or (self.welcome is not None and not self.is_away)
         if not self._is_for_me(welcome) or self.refusal or is_old:
             self._repeated += 1
             return
@@ -277,6 +288,7 @@ class ClientCore:
         self.deployment = deployment
         self._sequence = welcome.sequence
         self._downlink = welcome.downlink
+        self.branch = welcome.branch
 
     def _return(self, welcome: ClientWelcome, before: ClientWelcome) -> None:
         """Go on with a vHub that is back: join as before, and send what it has not recorded."""
@@ -292,8 +304,37 @@ class ClientCore:
             self._publish(self._join)
             self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
         self._recorded(welcome.sequence)
+        if welcome.branch != self.branch:
+            self._set_back(welcome)
         self._resend(whole=True)
         self.actions.append(Say("info", "the vHub is back"))
+
+    def _set_back(self, welcome: ClientWelcome) -> None:
+        """Go on in a branch, from its tick: forget what came later, and number again what is not recorded."""
+        assert self.deployment is not None
+        kept = self._unrecorded
+        last = kept[0].sequence - 1 if kept else self._sequence
+        lost, ticks = max(0, last - welcome.sequence), max(0, self.tick - welcome.tick)
+        self._lost += lost
+        self._unrecorded = deque(
+            structs.replace(sent, sequence=number) for number, sent in enumerate(kept, welcome.sequence + 1)
+        )
+        self._sequence = welcome.sequence + len(kept)
+        self._downlink = welcome.downlink
+        self._missing -= len(self._gaps)
+        self._gaps.clear()
+        self.branch, self.tick = welcome.branch, welcome.tick
+        self.branch_ns = max(0, self.tick) * self.deployment.tick_ns
+        self.go, self._done, self._done_number = None, b"", -1
+        self.arrivals = deque(packet for packet in self.arrivals if self._has_arrived(packet))
+        what = f"{ticks} ticks of this client's and {lost} packets that were recorded in them are lost"
+        self.actions.append(Say("warning", f"the run goes on as a branch from tick {self.tick}: {what}"))
+
+    def _has_arrived(self, packet: Received) -> bool:
+        """Whether a packet arrives up to the present tick; what a client sends does at the next tick, not before."""
+        assert self.deployment is not None
+        is_sent = packet.source in self.deployment.robots or packet.sent_ns < self.branch_ns
+        return is_sent and packet.due_ns <= self.branch_ns
 
     def _on_refusal(self, refusal: ClientRefusal) -> None:
         if not self._is_for_me(refusal) or (self.welcome is not None and not self.is_away) or self.refusal:
@@ -311,11 +352,18 @@ class ClientCore:
         return message.boot == self.boot
 
     def _on_heard(self, heard: Heard) -> None:
-        self._is_heard = True
-        self._recorded(heard.acknowledged)
+        if self._is_present(heard):
+            self._recorded(heard.acknowledged)
+
+    def _is_present(self, message: Go | Down | Heard) -> bool:
+        """Whether a message is of the present branch; note that the vHub is heard."""
+        self._is_heard = self._is_heard or message.branch == self.branch
+        self._repeated += message.branch != self.branch
+        return message.branch == self.branch
 
     def _on_go(self, go: Go) -> None:
-        self._is_heard = True
+        if not self._is_present(go):
+            return
         if go.number == self._done_number:
             self._repeated += 1
             self._publish(self._done)
@@ -333,7 +381,8 @@ class ClientCore:
         self._received += len(go.packets)
 
     def _on_down(self, down: Down) -> None:
-        self._is_heard = True
+        if not self._is_present(down):
+            return
         self._recorded(down.acknowledged)
         if not self._is_new(down):
             return
@@ -409,14 +458,14 @@ class ClientCore:
     def _resend(self, whole: bool) -> None:
         """Send again what is not recorded: all of it, or the first message's worth."""
         for part in _split(self._unrecorded, channels.UP.bytes_max):
-            self._publish(encode(Up(self.name, self.boot, part)))
+            self._publish(encode(Up(self.name, self.boot, part, self.branch)))
             if not whole:
                 break
         self._resend_ns = self._now_ns + limits.WANT_EVERY_NS_MAX if self._unrecorded else NEVER_NS
 
     def _say_hello(self) -> None:
         received = min(self._gaps, default=self._downlink + 1) - 1
-        hello = ClientHello(self.name, self.boot, limits.PROTOCOL_VERSION, self._world, received, self._losses)
+        hello = ClientHello(self.name, self.boot, limits.PROTOCOL_VERSION, self._world, received, self._gone)
         self.actions.append(Publish(channels.CLIENT_HELLO, self.name, encode(hello)))
 
     def _count_sent(self, sent: Sequence[Sent]) -> None:

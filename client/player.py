@@ -101,9 +101,16 @@ class Newest:
                 continue
             self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
 
+    def set_back(self, at_ns: int) -> None:
+        """Forget the samples that were sent after a time, in simulated ns."""
+        self.samples = {pair: sample for pair, sample in self.samples.items() if sample.sent_ns <= at_ns}
+
 
 class PlayerLoop:
-    """Runs the player that the deployment declares under the core's name. `step` after every message and wake."""
+    """Runs the player that the deployment declares under the core's name. `step` after every message and wake.
+
+    Where the run goes on as a branch the player is made anew: what it remembers is of ticks that are void.
+    """
 
     def __init__(self, core: ClientCore, load: Callable[[str], PlayerFactory] = load_player) -> None:
         self.core = core
@@ -111,6 +118,7 @@ class PlayerLoop:
         self._load = load
         self._declaration: Declaration | None = None
         self._player: Player | None = None
+        self._branch = 0
         self._beat_ns = NEVER_NS
         self._period_ns = 0
 
@@ -124,6 +132,10 @@ class PlayerLoop:
             return
         if self._player is None:
             self._begin(core.deployment, now_ns)
+        elif core.branch != self._branch:
+            self._player = self._make(core.deployment)
+            self.newest.set_back(core.branch_ns)
+        self._branch = core.branch
         if core.go is not None:
             self.newest.take(core.go.packets)
             core.done(self._act(core.go.tick))
@@ -143,13 +155,7 @@ class PlayerLoop:
         if name not in deployment.players:
             raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)
         declared = self._declaration = deployment.players[name]
-        factory = self._load(declared.class_)
-        try:
-            self._player = factory(deployment, declared.parameters)
-        except Refused as error:
-            raise PlayerError(f"player {name}: {error}") from error
-        except Exception as error:
-            raise PlayerError(f"player {name}: {declared.class_} cannot be made: {_describe(error)}") from error
+        self._player = self._make(deployment)
         wanted = [(robot, channel) for robot, heard in sorted(declared.robots.items()) for channel in heard]
         self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in wanted})
         if declared.lockstep:
@@ -158,6 +164,20 @@ class PlayerLoop:
             self.core.join(0, wanted)
             self._period_ns = int(NS_PER_S / declared.rate_hz)
             self._beat_ns = now_ns + self._period_ns
+
+    def _make(self, deployment: Deployment) -> Player:
+        """Make the player that is declared."""
+        declared = self._declaration
+        assert declared is not None
+        try:
+            return self._load(declared.class_)(deployment, declared.parameters)
+        except PlayerError:
+            raise
+        except Refused as error:
+            raise PlayerError(f"player {self.core.name}: {error}") from error
+        except Exception as error:
+            what = f"{declared.class_} cannot be made: {_describe(error)}"
+            raise PlayerError(f"player {self.core.name}: {what}") from error
 
     def _act(self, tick: int) -> list[Outgoing]:
         """Ask the player, and check and pack what it commands, in the robots' name order."""

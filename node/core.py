@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from foosim.node.held import Held
 from foosim.node.inputs import Inputs, check_near
 from foosim.node.step import Stepper, Work, moved_counters
 from foosim.protocol import channels, limits
@@ -97,7 +98,7 @@ class NodeCore:
         self._sent_parts: dict[int, bytes] = {}
         self._unsampled: set[int] = set()
         """Ticks at which samples are wanted of frames that are not here."""
-        self._held: list[tuple[Channel, str, bytes]] = []
+        self._held = Held()
         self._counters: list[int] = []
         self._barrier: Barrier | None = None
         self._basis = b""
@@ -205,9 +206,8 @@ class NodeCore:
 
     def statistics(self) -> NodeStatistics:
         tick = self.frame.tick if self.frame is not None else 0
-        return NodeStatistics(
-            tick, self.epoch, self._solved_ticks, self._refused, self._repeated, self._diverged, len(self._held)
-        )
+        counts = self._solved_ticks, self._refused, self._repeated, self._diverged, len(self._held)
+        return NodeStatistics(tick, self.epoch, *counts)
 
     @property
     def lacking(self) -> tuple[Channel, int] | None:
@@ -321,8 +321,8 @@ class NodeCore:
         """Whether a message is of another epoch: an older one is dropped, a newer one held until its epoch comes."""
         if message.epoch == self.epoch and self._awaited_epoch is None:
             return False
-        if message.epoch >= self.epoch and len(self._held) < limits.INBOX_MESSAGES_MAX:
-            self._held.append((channel, message.node if isinstance(message, Part) else channels.SUPERVISOR, payload))
+        if message.epoch >= self.epoch:
+            self._held.add(channel, message.node if isinstance(message, Part) else channels.SUPERVISOR, payload)
         else:
             self._repeated += 1
         return True
@@ -419,7 +419,8 @@ class NodeCore:
         self.roster = tuple(sorted(epoch.roster))
         self.owners = dict(epoch.owners)
         self.member.entered()
-        self._inputs.forget_orders()
+        if self._inputs.begin(epoch):
+            self._history = {tick: frame for tick, frame in self._history.items() if tick <= epoch.branch_tick}
         self._parts.clear()
         self._sent_parts.clear()
         self.work = None
@@ -442,14 +443,15 @@ class NodeCore:
         self.actions.append(Say("warning", f"epoch {epoch.epoch} is without this node, which asks to take part again"))
         self.epoch = epoch.epoch
         self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
-        self._inputs.forget_orders()
-        for kept in (self._history, self._parts, self._sent_parts, self._held):
+        self._inputs.begin(epoch)
+        self._held.take()
+        for kept in (self._history, self._parts, self._sent_parts):
             kept.clear()
         self.member.begin_anew()
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
         """The frame that the epoch starts from, when mine is not there or not the same; or one to sample."""
-        if commit.tick in self._unsampled:
+        if commit.tick in self._unsampled and not self._inputs.is_void(commit):
             self._take_old_frame(commit)
             return
         epoch = self._awaited_epoch
@@ -479,8 +481,7 @@ class NodeCore:
         self._history = {tick: kept for tick, kept in self._history.items() if tick < frame.tick}
         self._enter(frame, now_ns)
         self._term = self._make_term(frame.layout)
-        held, self._held = self._held, []
-        for channel, name, payload in held:
+        for channel, name, payload in self._held.take():
             self.receive(channel, name, payload, now_ns)
 
     def _make_term(self, layout: Layout) -> _Term:

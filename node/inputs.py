@@ -1,6 +1,7 @@
 """What a node has been told for its ticks: orders and deliveries, each by tick.
 
-Both may be about several ticks at once. Neighbours: `core` computes when it has both.
+Both may be about several ticks at once. Deliveries are final within a branch: those of another one do not count.
+Neighbours: `core` computes when it has both.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from foosim.node.edits import check_edits
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import Deliveries, Edit, Order
+from foosim.protocol.messages import Commit, Deliveries, Edit, Epoch, Order
 
 
 class Inputs:
@@ -18,6 +19,20 @@ class Inputs:
     def __init__(self) -> None:
         self._orders: dict[int, list[Edit]] = {}
         self._deliveries: dict[int, tuple[bytes, Deliveries]] = {}
+        self._branch = self._branch_tick = 0
+
+    def begin(self, epoch: Epoch) -> bool:
+        """A new epoch issues orders again. Deliveries stay true, unless it is of a newer branch: then return True."""
+        self._orders.clear()
+        if epoch.branch <= self._branch:
+            return False
+        self._deliveries.clear()
+        self._branch, self._branch_tick = epoch.branch, epoch.branch_tick
+        return True
+
+    def is_void(self, commit: Commit) -> bool:
+        """Whether a commit is one that the last branch has left behind."""
+        return commit.epoch < self._branch and commit.tick > self._branch_tick
 
     def take_order(self, order: Order, own_tick: int) -> bool:
         """Take an order; False for a repeat. Raises `Malformed` for edits that none can carry out."""
@@ -31,13 +46,14 @@ class Inputs:
         return True
 
     def take_deliveries(self, deliveries: Deliveries, payload: bytes, own_tick: int) -> bool:
-        """Take deliveries as they came; False for a repeat."""
-        if deliveries.tick in self._deliveries or deliveries.tick < own_tick - limits.KEPT_TICKS:
+        """Take deliveries as they came; False for a repeat, and for those of another branch."""
+        is_known = deliveries.tick in self._deliveries or deliveries.tick < own_tick - limits.KEPT_TICKS
+        if is_known or deliveries.branch != self._branch:
             return False
         check_near(deliveries.last, own_tick)
         self._deliveries[deliveries.tick] = payload, deliveries
         for tick in range(deliveries.tick + 1, deliveries.last + 1):
-            empty = Deliveries(tick, [])
+            empty = Deliveries(tick, [], branch=self._branch)
             self._deliveries.setdefault(tick, (encode(empty), empty))
         return True
 
@@ -58,10 +74,6 @@ class Inputs:
         """Nobody computes this tick again."""
         self._orders.pop(tick, None)
         self._deliveries.pop(tick, None)
-
-    def forget_orders(self) -> None:
-        """A new epoch issues them again; deliveries stay true."""
-        self._orders.clear()
 
 
 def check_near(tick: int, own_tick: int) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, get_args
 
-from foosim.protocol import asset_messages, limits, messages
+from foosim.protocol import asset_messages, hub_messages, limits, messages
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import Malformed
 
@@ -78,7 +78,8 @@ REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the nam
 READY: Final = _simulation(
     "ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch", bytes_max=_SMALL
 )
-STANDING: Final = _simulation("standing", messages.Standing, "vhub", "supervisor", "with each ready")
+STANDING: Final = _simulation("standing", hub_messages.Standing, "vhub", "supervisor", "with each ready")
+PROCEED: Final = _simulation("proceed", hub_messages.Proceed, "supervisor", "the named one", "an answer")
 PREPARE: Final = _simulation("prepare", messages.Prepare, "supervisor", "node", "a layout", named=False)
 EPOCH: Final = _simulation("epoch", messages.Epoch, "supervisor", "node, vhub", "an epoch", named=False)
 ORDER: Final = _simulation("order", messages.Order, "supervisor", "node", "tick", named=False)
@@ -111,6 +112,7 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     REFUSAL,
     READY,
     STANDING,
+    PROCEED,
     PREPARE,
     EPOCH,
     ORDER,
@@ -155,7 +157,9 @@ def read(channel: Channel, name: str, payload: bytes) -> Any:
 NODE_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
     RECALL, PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
 )))  # fmt: skip
-VHUB_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
+VHUB_READS: Final = (*((channel, True) for channel in (
+    BUILD, PIECE, REFUSAL, PROCEED, COMMIT
+)), *((channel, False) for channel in (
     RECALL, EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final = tuple((channel, False) for channel in (

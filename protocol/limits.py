@@ -60,6 +60,8 @@ CLIENT_BYTES_PER_TICK_MAX: Final = 768 * 1024
 """The same of one client."""
 RECOVERIES_PER_COMMIT_MAX: Final = 1_024
 """How many losses and returns a commit tells of; what is beyond it is told by the next one."""
+HELD_MESSAGES_MAX: Final = 1024
+"""What a node holds of an epoch that it does not know yet: parts of some ticks of as many nodes as there may be."""
 KEPT_TICKS: Final = 16
 """How many ticks of what it sent each process keeps for those that ask again."""
 RELEASE_AHEAD: Final = 4
@@ -72,6 +74,8 @@ DOWNLINKS_KEPT_MAX: Final = 16_384
 """How many numbered downlinks are kept for one client."""
 UPLINKS_KEPT_MAX: Final = 65_536
 """How many packets a client keeps that the vHub has not recorded yet."""
+EDITED_TICKS_KEPT: Final = 256
+"""Ticks whose edits the supervisor knows after they are committed: a branch orders them again."""
 CHECKPOINT_TICKS: Final = 500
 """How often the vHub's state goes to its journal: a fold begins at the last one."""
 LAG_ANCHOR_NS: Final = 100_000_000

@@ -84,12 +84,13 @@ class Delivered(Item, frozen=True):
 class Deliveries(Message, frozen=True):
     """The packets that reach robots at `tick`, in (due, source, sequence, copy) order. Final when published.
 
-    At the `following` ticks none do, and that is final, too.
+    At the `following` ticks none do, and that is final, too. They are those of the branch with this number.
     """
 
     tick: Counter
     packets: Annotated[list[Delivered], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     following: Annotated[int, Meta(ge=0, le=limits.KEPT_TICKS)] = 0
+    branch: Counter = 0
 
     @property
     def last(self) -> int:
@@ -287,17 +288,6 @@ class Ready(Message, frozen=True):
     fingerprint: Digest
 
 
-class Standing(Message, frozen=True):
-    """How far the vHub has come, for a supervisor that takes over: the highest epoch that it knows, its last commit as
-    it came (empty before the first), the chain over the frames up to it, and its layout beside the deployment's."""
-
-    name: Name
-    epoch: Counter
-    commit: Numbers
-    chain: Digest
-    added: Added
-
-
 class Prepare(Message, frozen=True):
     """Build an engine for the layout with these added entities, and say when it is ready."""
 
@@ -307,7 +297,8 @@ class Prepare(Message, frozen=True):
 class Epoch(Message, frozen=True):
     """Who does what from tick `tick` on: `owners` is (robot, node) for every robot.
 
-    `arithmetic` is the digest of the nodes' fixed small run; empty where nodes of several kinds are let in.
+    `arithmetic` is the digest of the nodes' fixed small run; empty where nodes of several kinds are let in. The last
+    branch has the number `branch` (0: there is none); whatever was behind frame `branch_tick` before it is void.
     """
 
     epoch: Counter
@@ -317,6 +308,8 @@ class Epoch(Message, frozen=True):
     owners: Annotated[list[tuple[Name, Name]], Meta(max_length=limits.ENTITIES_MAX)]
     added: Added
     arithmetic: Annotated[bytes, Meta(max_length=32)]
+    branch: Counter = 0
+    branch_tick: Counter = 0
 
 
 class Tempo(Message, frozen=True):
@@ -374,7 +367,7 @@ class Subscription(Item, frozen=True):
 class ClientHello(Message, frozen=True, tag="clienthello"):
     """A client asks to be let in. `received` is the last downlink number it has.
 
-    `losses` is how often it has lost the vHub that had let it in: after the first it goes on with its own numbers.
+    It goes on with its own numbers when it had been let in and has lost the vHub: `returns` is how often.
     """
 
     name: Name
@@ -382,15 +375,14 @@ class ClientHello(Message, frozen=True, tag="clienthello"):
     version: Counter
     world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     received: Counter
-    losses: Counter = 0
+    returns: Counter = 0
 
 
 class ClientWelcome(Message, frozen=True):
-    """The vHub accepts a client: numbers go on from `sequence`, the next downlink is `downlink` + 1.
-
-    Everything up to `sequence` is recorded, nothing behind it is: who comes back sends that again. `losses` are those
-    of the hello that this answers.
-    """
+    """The vHub accepts a client, as an answer to its hello with the same `returns`: numbers go on from `sequence`, the
+    next downlink is `downlink` + 1. Everything up to `sequence` is recorded, nothing behind it is: who comes back sends
+    that again. `tick` is the last that is closed; who was here before the branch with this number knows more, and none
+    of that holds."""
 
     name: Name
     boot: Name
@@ -400,7 +392,9 @@ class ClientWelcome(Message, frozen=True):
     deployment_name: Text
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     run: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
-    losses: Counter = 0
+    branch: Counter = 0
+    tick: Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)] = -1
+    returns: Counter = 0
 
 
 class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
@@ -434,11 +428,15 @@ class Join(Message, frozen=True):
 
 
 class Up(Message, frozen=True):
-    """Packets of a free-running client, numbered one after the other; the vHub takes none behind a gap."""
+    """Packets of a free-running client, numbered one after the other; the vHub takes none behind a gap.
+
+    This, and what is said in answer, is part of the branch with the number that it names.
+    """
 
     name: Name
     boot: Name
     packets: Packets
+    branch: Counter = 0
 
 
 class Done(Message, frozen=True):
@@ -448,6 +446,7 @@ class Done(Message, frozen=True):
     boot: Name
     tick: Counter
     packets: Packets
+    branch: Counter = 0
 
 
 class Received(Item, frozen=True):
@@ -469,6 +468,7 @@ class Go(Message, frozen=True):
     tick: Counter
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+    branch: Counter = 0
 
 
 class Down(Message, frozen=True):
@@ -479,6 +479,7 @@ class Down(Message, frozen=True):
     acknowledged: Counter
     packets: Annotated[list[Received], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
     ended: bool
+    branch: Counter = 0
 
 
 class Heard(Message, frozen=True):
@@ -488,3 +489,4 @@ class Heard(Message, frozen=True):
     """
 
     acknowledged: Counter
+    branch: Counter = 0

@@ -15,6 +15,7 @@ from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.rehearsal.hub_journal import ENDINGS
+from foosim.rehearsal.machines import lose_hub
 from foosim.rehearsal.system import System
 
 TICKS: Final = 208
@@ -283,6 +284,13 @@ def _hub(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "vhub", what, lambda system: system.kill_hub(ending, back_ms * MS))
 
 
+def _machine(dice: Dice, names: Sequence[str]) -> Fault:
+    """The vHub's machine loses its power, its journal what had not reached the disk: the run goes on as a branch."""
+    lost, back_ms = dice.between(20, 300), dice.one_of((1, 40, 400, 2_000))
+    what = f"the vHub's machine is lost for {back_ms} ms, its journal without the last {lost} records"
+    return Fault(_tick(dice), "machine", what, lambda system: lose_hub(system, lost, back_ms * MS))
+
+
 FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "kill": _kill,
     "pause": _pause,
@@ -299,9 +307,10 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "clock": _clock,
     "late": _echo_of_old,
     "tempo": _tempo,
+    "machine": _machine,
 }
 KINDS: Final = list(FAULT_OF)
-CHANGES_THE_WORLD: Final = frozenset({"add", "push"})
+CHANGES_THE_WORLD: Final = frozenset({"add", "push", "machine"})
 """Kinds after which the world is another one. After all others it is the one that would have been."""
 ONCE: Final = ("flip",)
 """Kinds of which one a seed is enough: if all nodes had other frames, none would be right."""

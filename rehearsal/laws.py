@@ -9,6 +9,7 @@ Neighbours: `swarm` flies seeds under it, `replica` computes again, `packet_laws
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -34,11 +35,14 @@ from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.packet_laws import PacketLaws, hold
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import System
-from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
+from foosim.supervisor.records import CommitRecord, HeadRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
 from foosim.vhub.records import Closing, HubRecord, TickRecord
 from foosim.vhub.records import fold as fold_hub
+
+FRAMES_KEPT: Final = 400
+"""More ticks than are lost with a machine."""
 
 
 class Laws:
@@ -53,7 +57,11 @@ class Laws:
         self._table = deployment.table
         self._replica = replica
         self._deployment = deployment
-        self._chain = CHAIN_START
+        self._chains = {0: CHAIN_START}
+        """By tick, over all frames up to it."""
+        self._frames = {0: initial_frame(deployment)}
+        """Those of the last ticks that are captured."""
+        self._branch = 0
         self._digests = {0: initial_frame(deployment).digest}
         self._rosters: dict[int, list[str]] = {}
         self._epochs: set[bytes] = set()
@@ -72,7 +80,9 @@ class Laws:
         self._untold: list[Recovered] = []
         """Losses and returns that are written, and of which no commit has told."""
         self._told: dict[int, list[Recovered]] = {}
-        """What each commit has told that no closing has, by tick."""
+        """What each commit has told, by tick."""
+        self._captured_told: set[int] = set()
+        """The ticks of which the capture has it."""
         self._journals: dict[str, list[bytes]] = {channels.SUPERVISOR: [], channels.VHUB: []}
         self._readers: Mapping[tuple[str, str], Callable[[Traced], None]] = {
             ("journal", channels.SUPERVISOR): self._supervisor_writes,
@@ -106,6 +116,9 @@ class Laws:
             self._commits_one(record.commit, decode(Commit, record.commit))
         elif isinstance(record, Epoch):
             self._begins(record, traced.payload)
+        elif isinstance(record, HeadRecord) and record.branch[0] > self._branch:
+            self._branches(*record.branch)
+            self._tells_again([entry.message() for entry in record.recovered if entry.outage_ns < 0])
         elif isinstance(record, OrderedRecord):
             self._ordered.setdefault(record.tick, []).extend(record.edits)
         elif isinstance(record, RecoveredRecord):
@@ -132,7 +145,7 @@ class Laws:
             hold(commit.digest == self._digests[0], "frame 0 is not that of the deployment")
             return
         self._digests[tick] = commit.digest
-        self._chain = chain_next(self._chain, commit.digest)
+        self._chains[tick] = chain_next(self._chains[tick - 1], commit.digest)
         parts = self._parts.get((epoch, tick), {})
         hold(sorted(parts) == self._rosters[epoch], f"commit {tick}: parts of {sorted(parts)} in epoch {epoch}")
         hold(edits_content(commit.edits) == self._orders.get(tick - 1), f"commit {tick} with edits that nobody ordered")
@@ -178,6 +191,37 @@ class Laws:
         self._rosters[epoch.epoch] = sorted(epoch.roster)
         self._epochs.add(raw)
 
+    def _branches(self, number: int, tick: int) -> None:
+        """A branch begins where the vHub stands; all behind is void, but for what was asked for at its tick."""
+        hold(number > self.epoch, f"branch {number} in epoch {self.epoch}")
+        hold(
+            tick == self.packets.closed, f"branch {number} from tick {tick}, the vHub has closed {self.packets.closed}"
+        )
+        self._branch = number
+        for known in (self._commits, self._digests, self._chains):
+            for behind in [each for each in known if each > tick]:
+                known.pop(behind)
+        self._orders = {each: edits for each, edits in self._orders.items() if each < tick}
+        self._parts.clear()
+        self.packets.branch(number)
+
+    def _tells_again(self, untold: list[Recovered]) -> None:
+        """What commits told that are void is told again, with that a branch begins."""
+        void = [entry for tick in sorted(self._told) if tick > self.committed for entry in self._told.pop(tick)]
+        again = [*(replace(entry, outage_ns=-1) for entry in void), *self._untold]
+        hold(untold[:-1] == again, f"the branch tells again of {untold[:-1]}, void are {again}")
+        self._captured_told = {tick for tick in self._captured_told if tick <= self.committed}
+        self._untold = untold
+
+    def lose(self, records: int, captured: int) -> None:
+        """The vHub's machine is lost with so many records; up to tick `captured` the capture holds what it held."""
+        journal = self._journals[channels.VHUB]
+        del journal[len(journal) - records :]
+        self.packets.lose(journal, captured)
+        if captured < self._replica.frame.tick:
+            self._replica.set_back(self._frames[max(0, captured)])
+            self.ticks = captured
+
     def _hub_writes(self, traced: Traced) -> None:
         self._journals[channels.VHUB].append(traced.payload)
         record = decode_any(HubRecord, traced.payload)
@@ -192,7 +236,7 @@ class Laws:
         hold(part.node in self._rosters.get(part.epoch, ()), f"{part.node} has no part in epoch {part.epoch}")
         hold(part.epoch >= self._said_epoch.get(part.node, 0), f"{part.node} goes back to epoch {part.epoch}")
         self._said_epoch[part.node] = part.epoch
-        if part.tick <= self.committed:
+        if part.tick <= self.committed or part.epoch < self._branch:
             return
         said = self._parts.setdefault((part.epoch, part.tick), {}).setdefault(part.node, (traced.payload, part))
         hold(said[0] == traced.payload, f"{part.node} has two parts {part.tick} in epoch {part.epoch}")
@@ -240,7 +284,8 @@ class Laws:
         """Compute the tick again from what led to it: the frame must be the same to the last bit."""
         frame = closing.frame
         self.packets.fates(closing)
-        told = self._told.pop(frame.tick, [])
+        told = self._told.get(frame.tick, [])
+        self._captured_told.add(frame.tick)
         hold(closing.recovered == told, f"tick {frame.tick} is captured with {closing.recovered}, commits tell {told}")
         if frame.tick != self._replica.frame.tick + 1:
             return  # frame 0, or the last one of a run that ended before all was closed
@@ -250,6 +295,8 @@ class Laws:
         self.packets.senses(again, self._replica)
         self._in_bounds(again)
         self.ticks = frame.tick
+        self._frames[frame.tick] = again
+        self._frames.pop(frame.tick - FRAMES_KEPT, None)
 
     def _in_bounds(self, frame: Frame) -> None:
         """What is not in quarantine is in the world and no faster than the model promises."""
@@ -266,17 +313,19 @@ class Laws:
     def end(self, system: System, nodes: int) -> None:
         """When all has healed: everybody is back, everything is answered, and the journals give what is there."""
         supervisor = system.supervisor
-        hold(supervisor.chain == self._chain, "the chain is not that of the committed frames")
+        hold(supervisor.chain == self._chains[self.committed], "the chain is not that of the committed frames")
         members = [f"n{number}" for number in range(1, nodes + 1)]
         hold(list(supervisor.members) == members, f"healed, only {', '.join(supervisor.members)} take part")
         strayed = {robot: owner for robot, owner in supervisor.owners.items() if owner != self._chosen[robot]}
         hold(not strayed, f"healed, {strayed} are not where they belong")
         asked = [identity for identity in system.asked if identity not in system.answers]
         hold(not asked, f"{asked} are not answered")
-        hold(not self._told, f"what ticks {[*self._told]} tell is not in the capture")
+        untold = self._told.keys() - self._captured_told
+        hold(not untold, f"what ticks {sorted(untold)} tell is not in the capture")
         history = fold_supervisor(self._deployment, self._journals[channels.SUPERVISOR])
         hold(
-            history.chain == self._chain and history.frame.digest == supervisor.frame.digest, "another chain is folded"
+            history.chain == self._chains[self.committed] and history.frame.digest == supervisor.frame.digest,
+            "another chain is folded",
         )
         hold(history.epoch is not None and history.epoch.epoch == supervisor.epoch, "another epoch is folded")
         hold(history.owners == supervisor.owners and not history.edits, "other owners or edits are folded")

@@ -6,22 +6,28 @@ Neighbours: `laws` tells of what is written and said.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Final
 
+from msgspec.structs import replace
+
 from foosim.client.core import ClientCore
-from foosim.protocol.codec import decode, encode
+from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Delivered, Deliveries, Done, Down, Go, RobotPacket, Samples, Sent
+from foosim.protocol.messages import Commit, Delivered, Deliveries, Done, Down, Go, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import System
+from foosim.vhub.naming import in_branch
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT
-from foosim.vhub.records import Closing, TickRecord, world_packets
+from foosim.vhub.records import Closing, HubRecord, TickRecord, fold, world_packets
 from foosim.vhub.state import HubState
 
 Key = tuple[str, str, int, int]
 """A packet: source, destination, sequence number, copy."""
+LOST_TICKS_MAX: Final = 1000
+"""More than a machine that is lost takes with it: what led to fates that come again is kept for so long."""
 OPEN: Final = ("", IN_FLIGHT)
 """What stands for a cause where a packet was not dropped."""
 
@@ -45,19 +51,22 @@ class PacketLaws:
         self._deployment = deployment
         self._sampling = Sampling(deployment)
         self._written: dict[int, bytes] = {0: self.said[0]}
-        self._delivered: set[tuple[str, int, int]] = set()
+        self._delivered: dict[tuple[str, int, int], int] = {}
+        """The tick at which each packet reached a robot."""
+        self._branch = 0
         self._samples: dict[int, list[Samples]] = {}
         self._sequences: dict[str, int] = {}
         self._downlinks: dict[str, dict[int, bytes]] = {}
         self._go_ticks: dict[str, int] = {}
-        self._dones: dict[tuple[str, int], bytes] = {}
+        self._dones: dict[tuple[str, int, int], bytes] = {}
         self._answered: dict[int, dict[str, list[Sent]]] = {}
         """What clients answered to a tick that is not closed, by tick and client."""
         self._reached: dict[int, list[Key]] = {}
-        """What robots were told by the deliveries behind a tick, until its fates are known."""
-        self._received: dict[tuple[str, int], list[Key]] = {}
-        """The same of what a client was told at a tick."""
-        self._fates: dict[Key, str] = {}
+        """What robots were told by the deliveries behind a tick."""
+        self._received: dict[int, dict[str, list[Key]]] = {}
+        """What clients were told at a tick."""
+        self._fates: dict[Key, tuple[int, str]] = {}
+        """By packet: the tick at which its fate was final, and the cause."""
 
     # --- the vHub's side ---------------------------------------------------------------------------------------------
 
@@ -84,7 +93,7 @@ class PacketLaws:
         if tick + 1 not in self._written:
             self._written[tick + 1] = record.deliveries
             for following in range(tick + 2, deliveries.last + 1):
-                self._written[following] = encode(Deliveries(following, []))
+                self._written[following] = encode(Deliveries(following, [], branch=deliveries.branch))
         hold(
             not deliveries.packets or self._written[tick + 1] == record.deliveries, f"deliveries {tick + 1} were final"
         )
@@ -92,7 +101,7 @@ class PacketLaws:
     def delivers(self, deliveries: Deliveries, raw: bytes) -> None:
         """Law 3: deliveries are written before they are said, and then they never change. Law 4: each packet once."""
         for tick in range(deliveries.tick, deliveries.last + 1):
-            payload = raw if tick == deliveries.tick else encode(Deliveries(tick, []))
+            payload = raw if tick == deliveries.tick else encode(Deliveries(tick, [], branch=deliveries.branch))
             written = self._written.get(tick)
             hold(written is not None, f"deliveries {tick} are said before they are written")
             hold(written == payload, f"deliveries {tick} are said otherwise than they are written")
@@ -106,8 +115,10 @@ class PacketLaws:
         late = tick * self._deployment.tick_ns
         hold(all(packet.due_ns <= late for packet in packets), f"deliveries {tick} come before they are due")
         keys = {(packet.source, packet.sequence, packet.copy) for packet in packets}
-        hold(len(keys) == len(packets) and not keys & self._delivered, f"deliveries {tick}: a packet comes twice")
-        self._delivered |= keys
+        hold(
+            len(keys) == len(packets) and not keys & self._delivered.keys(), f"deliveries {tick}: a packet comes twice"
+        )
+        self._delivered.update(dict.fromkeys(keys, tick))
 
     def fates(self, closing: Closing) -> None:
         """Law 5: each packet has one fate; a robot's has the number of its tick and place.
@@ -118,7 +129,7 @@ class PacketLaws:
         for flight in closing.fates:
             key = flight.source, flight.destination, flight.sequence, flight.copy
             hold(key not in self._fates, f"packet {key} has two fates")
-            self._fates[key] = flight.cause
+            self._fates[key] = closing.frame.tick, flight.cause
             if flight.source in self._deployment.robots:
                 sent = (flight.sequence >> 16) * self._deployment.tick_ns
                 hold(flight.sent_ns == sent, f"packet {key} of a robot has another tick's number")
@@ -133,10 +144,11 @@ class PacketLaws:
                 to = flight.destination
                 of_it = robots if to in self._deployment.robots else clients.setdefault(to, [])
                 of_it.append((flight.source, to, flight.sequence, flight.copy))
-        hold(robots == self._reached.pop(tick, []), f"deliveries {tick + 1} are not what counts as delivered")
-        told = {name: keys for (name, at), keys in self._received.items() if at == tick and keys}
+        hold(robots == self._reached.get(tick, []), f"deliveries {tick + 1} are not what counts as delivered")
+        told = {name: keys for name, keys in self._received.get(tick, {}).items() if keys}
         hold(clients == told, f"what clients were told at tick {tick} is not what counts as delivered")
-        self._received = {key: keys for key, keys in self._received.items() if key[1] > tick}
+        self._reached.pop(tick - LOST_TICKS_MAX, None)
+        self._received.pop(tick - LOST_TICKS_MAX, None)
 
     def senses(self, frame: Frame, replica: Replica) -> None:
         """What robots sent at a frame is a function of it, whoever owned them."""
@@ -152,7 +164,7 @@ class PacketLaws:
         known = self._downlinks.setdefault(client, {})
         if down.number not in known:
             keys = [(packet.source, client, packet.sequence, packet.copy) for packet in down.packets]
-            self._received.setdefault((client, down.tick), []).extend(keys)
+            self._received.setdefault(down.tick, {}).setdefault(client, []).extend(keys)
         hold(down.number <= len(known) + 1, f"downlink {down.number} of {client} after {len(known)}")
         hold(known.setdefault(down.number, raw) == raw, f"downlink {down.number} of {client} says two things")
         if isinstance(down, Go):
@@ -163,9 +175,49 @@ class PacketLaws:
 
     def answers(self, done: Done, raw: bytes) -> None:
         """A lockstep client's answer to a tick is one."""
-        hold(self._dones.setdefault((done.name, done.tick), raw) == raw, f"{done.name} has two Dones of {done.tick}")
+        hold(
+            self._dones.setdefault((done.name, done.branch, done.tick), raw) == raw,
+            f"{done.name} has two Dones of {done.tick}",
+        )
         if done.tick > self.closed:
             self._answered.setdefault(done.tick, {})[done.name] = done.packets
+
+    # --- a machine is lost -------------------------------------------------------------------------------------------
+
+    def lose(self, journal: Sequence[bytes], captured: int) -> None:
+        """Only these records of the vHub are left, and the capture up to a tick: what it wrote and said is less."""
+        self.closed, self._sequences, self._samples, self._reached = -1, {}, {}, {}
+        self._written = {0: encode(Deliveries(0, []))}
+        for raw in journal:
+            record = decode_any(HubRecord, raw)
+            if isinstance(record, TickRecord):
+                self._answered[record.tick] = dict(record.admitted)
+                self.closes(record, decode(Commit, record.commit).digest)
+        self._answered.clear()
+        self._received = {tick: told for tick, told in self._received.items() if tick <= self.closed}
+        for state, _ in fold(self._deployment, journal):
+            last = state
+        for client, known in self._downlinks.items():
+            number = last.members[client].downlink if client in last.members else 0
+            self._downlinks[client] = {each: raw for each, raw in known.items() if each <= number}
+        self._go_ticks.clear()
+        self._samples = {tick: samples for tick, samples in self._samples.items() if tick > captured}
+        self._fates = {key: told for key, told in self._fates.items() if told[0] <= captured}
+        self._name(self._branch)
+
+    def branch(self, number: int) -> None:
+        """What is said from now on names this branch; what was said and is not written any more is void."""
+        self._branch = number
+        self.said = {tick: raw for tick, raw in self.said.items() if tick in self._written}
+        self._delivered = {key: tick for key, tick in self._delivered.items() if tick in self._written}
+        self._name(number)
+
+    def _name(self, branch: int) -> None:
+        for known in (self.said, self._written):
+            known.update({tick: in_branch(Deliveries, raw, branch) for tick, raw in known.items()})
+        for downlinks in self._downlinks.values():
+            named = {number: decode_any(Go | Down, raw) for number, raw in downlinks.items()}
+            downlinks.update({number: encode(replace(down, branch=branch)) for number, down in named.items()})
 
     # --- account -----------------------------------------------------------------------------------------------------
 
@@ -186,10 +238,10 @@ class PacketLaws:
         self.account(state)
         hold(state.packets.refused == 0, f"lockstep clients repeat nothing, {state.refusals} were refused")
         counted = {DELIVERED: 0, DROPPED: 0, IN_FLIGHT: 0}
-        for cause in self._fates.values():
+        for _, cause in self._fates.values():
             counted[DELIVERED if not cause else IN_FLIGHT if cause == IN_FLIGHT else DROPPED] += 1
         packets = state.packets
-        by_link = Counter((source, to) for (source, to, _, _), cause in self._fates.items() if cause not in OPEN)
+        by_link = Counter((source, to) for (source, to, _, _), (_, cause) in self._fates.items() if cause not in OPEN)
         dropped = {pair: link.state.dropped for pair, link in state.links.items() if link.state.dropped}
         hold(dict(by_link) == dropped, f"receivers lack {by_link}, links count {dropped} as dropped")
         told = {DELIVERED: packets.delivered, DROPPED: packets.dropped, IN_FLIGHT: packets.in_flight}

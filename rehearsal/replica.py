@@ -34,7 +34,6 @@ from foosim.protocol.messages import (
 from foosim.protocol.start import Start, first_frame
 from foosim.rehearsal.bus import Bus
 
-EPOCH = 1
 SOURCE = "capture"
 
 
@@ -64,15 +63,27 @@ class Replica:
             build = Build(node, "boot", "first", SOURCE, name, text, "fast", self._added(self.frame.layout), origin)
             self._say(channels.BUILD, node, encode(build))
         self._settle()
-        owners = sorted(deployment.owners().items())
-        frame, added = self.frame, self._added(self.frame.layout)
-        epoch = Epoch(EPOCH, frame.tick, frame.digest, sorted(deployment.nodes), owners, added, b"")
-        self._say(channels.EPOCH, SOURCE, encode(epoch))
-        if start is not None:
-            commit = Commit(EPOCH, frame.tick, frame.digest, start.values, start.outboxes, [], False)
-            for node in self._nodes:
-                self._say(channels.COMMIT, node, encode(commit))
+        self._epoch = self._branch = 0
+        self._begin(self.frame)
+
+    def _begin(self, frame: Frame) -> None:
+        """Go on from a frame, in an epoch of its own."""
+        self.frame = frame
+        self._epoch += 1
+        owners, added = sorted(self._deployment.owners().items()), self._added(frame.layout)
+        who = sorted(self._nodes), owners, added, b"", self._branch, frame.tick
+        self._say(channels.EPOCH, SOURCE, encode(Epoch(self._epoch, frame.tick, frame.digest, *who)))
+        commit = Commit(
+            self._epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, [], last=False
+        )
+        for node in self._nodes:
+            self._say(channels.COMMIT, node, encode(commit))
         self._settle()
+
+    def set_back(self, frame: Frame) -> None:
+        """Go on from another frame than the last one, of an earlier tick."""
+        self._branch = self._epoch + 1
+        self._begin(frame)
 
     @property
     def arithmetic(self) -> bytes:
@@ -87,8 +98,8 @@ class Replica:
         if layout is not self.frame.layout:
             self._say(channels.PREPARE, SOURCE, encode(Prepare(self._added(layout))))
             self._settle()
-        self._say(channels.ORDER, SOURCE, encode(Order(EPOCH, tick, list(edits))))
-        self._say(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered))))
+        self._say(channels.ORDER, SOURCE, encode(Order(self._epoch, tick, list(edits))))
+        self._say(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered), branch=self._branch)))
         self._settle()
         core, _ = next(iter(self._nodes.values()))
         assert core.frame is not None and core.frame.tick == tick + 1, "every node has its inputs"

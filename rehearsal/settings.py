@@ -68,5 +68,8 @@ class Settings:
     on_commit: Callable[[Frame], None] | None = None
     on_closing: Callable[[Closing], None] | None = None
     on_epoch: Callable[[Epoch], None] | None = None
+    on_loss: Callable[[int, int], None] | None = None
+    """Told of records that the vHub's journal has lost with a machine: how many, and up to which tick it is captured.
+    """
     on_say: Callable[[str, str, str], None] | None = None
     on_journal: Callable[[str, bytes], None] | None = None

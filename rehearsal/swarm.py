@@ -135,7 +135,9 @@ class Prober:
         self._core = core
         self._joined = False
         self._sent = 0
-        self._back: set[bytes] = set()
+        self._back: dict[bytes, int] = {}
+        """The echoes that have come, with the tick at which they did."""
+        self._branch = 0
 
     def step(self, now_ns: int) -> None:
         """Join, and answer each Go with a question."""
@@ -147,11 +149,14 @@ class Prober:
             rate_hz = core.deployment.clients[PROBER].rate_hz
             assert rate_hz is not None
             core.join(core.deployment.ticks(rate_hz), [(robot, CHANNEL_ECHO) for robot in self.ROBOTS])
+        if core.branch != self._branch:
+            self._branch, last = core.branch, core.branch_ns // core.deployment.tick_ns
+            self._back = {payload: tick for payload, tick in self._back.items() if tick <= last}
         if core.go is not None:
             for packet in core.go.packets:
                 if packet.payload in self._back:
                     raise Broken(f"echo {packet.payload.decode()} comes back twice")
-                self._back.add(packet.payload)
+                self._back[packet.payload] = core.go.tick
             robot = self.ROBOTS[self._sent % len(self.ROBOTS)]
             self._sent += 1
             core.done([Outgoing(robot, CHANNEL_ECHO, f"{robot} {self._sent}".encode())])
@@ -187,6 +192,7 @@ class Flown:
     losses: int = 0
     joins: int = 0
     restarts: int = 0
+    branches: int = 0
     seen: int = 0
     """Things that were written or said, each of them checked."""
     virtual_s: float = 0.0
@@ -224,6 +230,7 @@ class Flight:
             observer=self._see,
             observes=("journal", "publish"),
             on_closing=self.laws.close,
+            on_loss=self.laws.lose,
             on_commit=self._committed,
         )
         self.system = System(RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), plan.ticks), chosen)
@@ -303,6 +310,7 @@ def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks
     flown.epochs, flown.virtual_s = flight.laws.epoch, system.bus.now_ns / 1e9
     flown.losses = sum(entry.what == "node" for entry in told)
     flown.joins = sum(entry.what == "join" for entry in told)
+    flown.branches = sum(entry.reason.startswith("branch") for entry in told)
     flown.restarts = sum(entry.what == channels.SUPERVISOR for entry in told)
     if system.hub.state is not None:
         packets = system.hub.state.packets

@@ -79,7 +79,7 @@ class System:
         self._simulation = b""
         """The fingerprint of the engine, once a node has built one."""
         self._run = settings
-        self._journal: list[bytes] = []
+        self.journal: list[bytes] = []
         """The supervisor's, where it may be started again."""
         fingerprint = library_fingerprint()
         self.supervisor = rehearsal.supervisor(settings, fingerprint, self._clock(channels.SUPERVISOR).at(0))
@@ -118,7 +118,8 @@ class System:
     def _enter_hub(self, fingerprint: bytes) -> None:
         """Let a vHub in, which goes on from the journal of the one before."""
         self._boots += 1
-        hub = self.hub = self.settings.hub(f"boot-{self._boots}", fingerprint, self._now_of(channels.VHUB))
+        start = f"boot-{self._boots}", fingerprint, self._now_of(channels.VHUB)
+        hub = self.hub = self.settings.hub(*start, clock=self.hub_journal.machine)
 
         def turn(now_ns: int) -> None:
             build = hub.member.build
@@ -317,7 +318,7 @@ class System:
             if process.core is self.hub:
                 self.hub_journal.append(action.record)
             if settings.keeps_journals and process.core is self.supervisor:
-                self._journal.append(action.record)
+                self.journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
         elif isinstance(action, Keep):
@@ -341,7 +342,7 @@ class System:
         """Tell of the frames that were committed; what a supervisor that ended had not written never was."""
         frames = self._frames.copy()
         self._frames.clear()
-        written = fold(self.supervisor.deployment, self._journal).frame.tick if was_cut else frames[-1].tick
+        written = fold(self.supervisor.deployment, self.journal).frame.tick if was_cut else frames[-1].tick
         for frame in frames:
             if frame.tick <= written:
                 self._last_commit_ns = self.bus.now_ns
@@ -390,7 +391,7 @@ class System:
         assert name not in self.processes, f"{name} is running"
         if name == channels.SUPERVISOR:
             self._boots += 1
-            history = fold(self.supervisor.deployment, self._journal)
+            history = fold(self.supervisor.deployment, self.journal)
             boot = f"boot-{self._boots}"
             now_ns = self._now_of(name)
             self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)

@@ -33,7 +33,8 @@ class Account:
 
 @dataclass(slots=True)
 class Recovered:
-    """One loss or return. `outage_ns` is the wall time without a commit, -1 while there is none behind it."""
+    """One loss or return. `outage_ns` is the wall time without a commit, -1 while there is none behind it, and `told`
+    the tick of the commit that tells of it."""
 
     what: str
     name: str
@@ -41,14 +42,22 @@ class Recovered:
     tick: int
     epoch: int
     outage_ns: int = -1
+    told: int = -1
 
     def message(self) -> messages.Recovered:
         """Return it as a commit tells of it, when it is over."""
         return messages.Recovered(self.what, self.name, self.reason, self.tick, self.epoch, self.outage_ns)
 
 
-def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int) -> list[Recovered]:
-    """A frame is committed at `now_ns`, the one before it was at `before_ns`: what was out goes on.
+def tell_again(recovered: Sequence[Recovered], tick: int) -> None:
+    """Open what was told by commits behind a tick: they are void."""
+    for entry in recovered:
+        if entry.told > tick:
+            entry.outage_ns = entry.told = -1
+
+
+def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int, tick: int) -> list[Recovered]:
+    """Frame `tick` is committed at `now_ns`, the one before it was at `before_ns`: what was out goes on.
 
     Return what is over by that, the oldest first; no more of it than a commit can tell of, the rest by the next one.
     """
@@ -57,5 +66,5 @@ def close_outages(recovered: Sequence[Recovered], before_ns: int, now_ns: int) -
         first -= 1
     over = list(recovered[first : first + limits.RECOVERIES_PER_COMMIT_MAX])
     for entry in over:
-        entry.outage_ns = max(0, now_ns - before_ns)
+        entry.outage_ns, entry.told = max(0, now_ns - before_ns), tick
     return over

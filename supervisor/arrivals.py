@@ -22,6 +22,14 @@ class Arrivals:
         self.deliveries: dict[int, bytes] = {}
         self.delivered = 0
         """The last tick whose deliveries are here."""
+        self.branch = 0
+        """The branch whose deliveries count."""
+
+    def stand_at(self, tick: int, branch: int) -> None:
+        """Forget all that has come: the last commit is another one now."""
+        self.parts.clear()
+        self.deliveries.clear()
+        self.delivered, self.branch = tick - 1, branch
 
     def take_part(self, part: Part, committed: int, members: Collection[str]) -> bool:
         """Take a part of the present epoch; False for a repeat. Raises Malformed for a stranger's."""
@@ -36,15 +44,19 @@ class Arrivals:
         return True
 
     def take_deliveries(self, deliveries: Deliveries, payload: bytes, committed: int) -> bool:
-        """Take deliveries as they came; False for a repeat. Raises Malformed for a tick too far off."""
-        if deliveries.tick in self.deliveries or deliveries.tick < committed:
+        """Take deliveries as they came; False for a repeat, and for those of another branch.
+
+        Raises Malformed for a tick too far off.
+        """
+        is_known = deliveries.tick in self.deliveries or deliveries.tick < committed
+        if is_known or deliveries.branch != self.branch:
             return False
         if deliveries.last > committed + limits.KEPT_TICKS:
             raise Malformed(f"deliveries of tick {deliveries.last}, the last commit is {committed}")
         self.deliveries[deliveries.tick] = payload
         self.delivered = max(self.delivered, deliveries.last)
         for tick in range(deliveries.tick + 1, deliveries.last + 1):
-            self.deliveries.setdefault(tick, encode(Deliveries(tick, [])))
+            self.deliveries.setdefault(tick, encode(Deliveries(tick, [], branch=self.branch)))
         return True
 
     def missing(self, tick: int, members: Collection[str]) -> list[str]:

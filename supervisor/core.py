@@ -19,6 +19,7 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, basis_of, chain_next, layout_after
+from foosim.protocol.hub_messages import Standing
 from foosim.protocol.layout import Layout, added_entities
 from foosim.protocol.messages import (
     AddedEntity,
@@ -35,7 +36,6 @@ from foosim.protocol.messages import (
     Prepare,
     Ready,
     Request,
-    Standing,
     Tempo,
     Want,
 )
@@ -46,6 +46,7 @@ from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account, Recovered
 from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.balance import Balancer
+from foosim.supervisor.branches import Branches
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
@@ -89,7 +90,7 @@ class SupervisorCore:
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.requests = Requests(self)
-        self.recovery, self.absence = Recovery(self), Absence(self)
+        self.recovery, self.absence, self.branches = Recovery(self), Absence(self), Branches(self)
         self.balancer = Balancer(self.deployment.owners()) if settings.balance else None
         self.handshake = Handshake(self)
         self.frame: Frame = first_frame(self.deployment, settings.start)
@@ -371,7 +372,7 @@ class SupervisorCore:
         self.frame = frame
         self.account.count(*solved)
         self.chain = chain_next(self.chain, frame.digest)
-        recovered = self.recovery.committed(self.committed_ns, now_ns)
+        recovered = self.recovery.committed(self.committed_ns, now_ns, frame.tick)
         self.absence.committed(self.committed_ns, now_ns)
         self.committed_ns = now_ns
         self._patience.progress(self.deployment.tick_ns, now_ns)
@@ -430,7 +431,7 @@ class SupervisorCore:
         self._slots = Slots(self.frame.layout, owners)
         frame, added = self.frame, self.added_to(self.frame.layout)
         who = list(self.members), sorted(owners.items()), added, self.roster.arithmetic
-        epoch = Epoch(self.epoch, frame.tick, frame.digest, *who)
+        epoch = Epoch(self.epoch, frame.tick, frame.digest, *who, self.branches.number, self.branches.tick)
         payload = encode(epoch)
         self.actions.append(Journal(payload))
         self.actions.append(Publish(channels.EPOCH, channels.SUPERVISOR, payload))
@@ -482,8 +483,7 @@ class SupervisorCore:
             self.watch.delivered(tick, now_ns)
 
     def _on_standing(self, standing: Standing, payload: bytes, now_ns: int) -> None:
-        if self.take_over is None or not self.take_over.standing(standing):
-            self._repeated += 1
+        self._repeated += not self.branches.take(standing, now_ns)
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
         if want.kind == channels.ORDER.name and want.tick in self.orders and want.epoch == self.epoch:

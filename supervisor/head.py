@@ -13,7 +13,6 @@ from foosim.protocol.codec import encode
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import added_entities
 from foosim.protocol.units import parse_pace
-from foosim.supervisor.account import close_outages
 from foosim.supervisor.records import Control, HeadRecord, History
 
 if TYPE_CHECKING:
@@ -47,6 +46,9 @@ def head_of(core: SupervisorCore) -> bytes:
         core.started_ns,
         core.committed_ns,
         core.end,
+        (core.branches.number, core.branches.tick),
+        core.requests.issued.forgotten,
+        sorted(core.requests.issued.by_tick.items()),
     )
     return encode(head)
 
@@ -55,7 +57,7 @@ def stand_on(core: SupervisorCore, history: History) -> None:
     """Put a core that has not begun where a journal ends, before an epoch."""
     core.frame, core.chain = history.frame, history.chain
     core.released = core.frame.tick
-    core.arrivals.delivered = core.frame.tick - 1
+    core.arrivals.stand_at(core.frame.tick, history.branch[0])
     core.commits = dict(history.commits)
     if history.epoch is not None:
         core.epoch, core.owners = history.epoch.epoch, dict(history.epoch.owners)
@@ -67,14 +69,16 @@ def stand_on(core: SupervisorCore, history: History) -> None:
     pacer.lags = history.lags
     core.roster.stopped, core.roster.starts = set(control.stopped), dict(control.starts)
     core.recovery.recovered, core.recovery.returns = history.recovered, dict(control.returns)
-    core.requests.resume(history.edits, history.answers)
+    core.branches.number, core.branches.tick = history.branch
+    core.requests.resume(history.edits, history.answers, history.issued)
 
 
 def stand_at(core: SupervisorCore, frame: Frame, chain: bytes, commit: bytes) -> None:
-    """Put it at a frame that is committed and not in the journal, which begins anew with it."""
+    """Put it at a frame that is committed and not the last one in the journal, which begins anew with it."""
     core.frame, core.chain = frame, chain
-    core.released, core.arrivals.delivered = frame.tick, frame.tick - 1
+    core.released = frame.tick
+    core.arrivals.stand_at(frame.tick, core.branches.number)
+    core.orders.clear()
+    core.requests.set_back(frame.tick)
     core.commits = {frame.tick: commit}
-    # What was open is over by a commit that the journal lost, and that told how long it took: it is not told again.
-    close_outages(core.recovery.recovered, core.committed_ns, core.committed_ns)
     core.actions.append(Journal(head_of(core)))

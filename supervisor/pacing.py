@@ -113,6 +113,12 @@ class Pacer:
         self.granted = max(self.granted, next_tick) + count if self.paused else next_tick + count
         self.paused = True
 
+    def set_back(self, ticks: int, tick: int, now_ns: int) -> None:
+        """The run goes on from an earlier tick, so many before: now, and while paused no further than it was to go."""
+        if self.paused:
+            self.granted = max(tick, self.granted - ticks)
+        self.start(now_ns, tick)
+
     def set_pace(self, pace: Pace, next_tick: int, now_ns: int) -> None:
         """Change the pace from `next_tick` on."""
         self.pace = pace

@@ -23,6 +23,7 @@ from foosim.protocol.layout import BALL, Layout, build_layout
 from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, End, Epoch
 from foosim.protocol.start import Start, first_chain, first_frame
 from foosim.supervisor.account import Account, Recovered, close_outages
+from foosim.supervisor.issued import Issued
 from foosim.supervisor.pacing import Lags
 
 
@@ -112,6 +113,11 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     started_ns: int
     committed_ns: int
     end: End | None
+    branch: tuple[int, int] = (0, 0)
+    """Number of the last branch, and its tick: also of one whose first epoch has not begun."""
+    forgotten: int = -1
+    issued: list[tuple[int, list[Edit]]] = []
+    """What was ordered at the last ticks that have edits, and the last tick whose edits are not known any more."""
 
 
 Change = RequestRecord | OrderedRecord | Control | CommitRecord | RecoveredRecord | Epoch | End
@@ -143,6 +149,8 @@ class History:
     started_ns: int = 0
     committed_ns: int = 0
     end: End | None = None
+    branch: tuple[int, int] = (0, 0)
+    issued: Issued = field(default_factory=Issued)
 
 
 Solved = tuple[list[str], str]
@@ -189,6 +197,8 @@ def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
         frame = first_frame(deployment, first.start)
         chain = first_chain(None if first.start is None else first.start.origin)
         return History(first, frame, frame.layout, deployment.owners(), control, account, chain=chain)
+    issued = Issued()
+    issued.forgotten, issued.by_tick = first.forgotten, {tick: list(edits) for tick, edits in first.issued}
     return History(
         first.run,
         first_frame(deployment, first.run.start),
@@ -206,6 +216,8 @@ def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
         started_ns=first.started_ns,
         committed_ns=first.committed_ns,
         end=first.end,
+        branch=first.branch,
+        issued=issued,
     )
 
 
@@ -218,19 +230,25 @@ def _apply(history: History, record: Change) -> None:
         before = dict(history.owners if history.epoch is None else history.epoch.owners)
         history.account.moves += sum(before[robot] != owner for robot, owner in owners.items())
         history.epoch, history.owners = record, owners
+        history.branch = record.branch, record.branch_tick
     elif isinstance(record, RequestRecord):
         history.answers[record.answer.sender, record.answer.id] = record.answer
         history.control, history.owners = record.control, record.owners
-        if record.edits:
-            history.edits.setdefault(record.tick, []).extend(record.edits)
+        _order(history, record)
     elif isinstance(record, OrderedRecord):
-        history.edits.setdefault(record.tick, []).extend(record.edits)
+        _order(history, record)
     elif isinstance(record, RecoveredRecord):
         history.recovered.append(record.entry)
     elif isinstance(record, Control):
         history.control = record
     else:
         history.end = record
+
+
+def _order(history: History, record: RequestRecord | OrderedRecord) -> None:
+    if record.edits:
+        history.edits.setdefault(record.tick, []).extend(record.edits)
+        history.issued.add(record.tick, record.edits)
 
 
 def _commit(history: History, record: CommitRecord) -> None:
@@ -247,7 +265,7 @@ def _commit(history: History, record: CommitRecord) -> None:
     history.account.count(record.solved, record.ball_solver)
     if record.lag_ns >= 0:
         history.lags.add(record.lag_ns)
-    over = close_outages(history.recovered, history.committed_ns, record.now_ns)
+    over = close_outages(history.recovered, history.committed_ns, record.now_ns, commit.tick)
     for entry, told in zip(over, commit.recovered, strict=False):
         entry.outage_ns = told.outage_ns  # the vHub's is longer than that between two commits
     history.committed_ns = record.now_ns

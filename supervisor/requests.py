@@ -22,6 +22,7 @@ from foosim.protocol.layout import BALL, Layout
 from foosim.protocol.messages import Add, Answer, Edit, Push, Remove, Request
 from foosim.protocol.names import NAME_RULE, is_name, nearest_name
 from foosim.protocol.units import parse_pace
+from foosim.supervisor.issued import Issued
 from foosim.supervisor.records import OrderedRecord, RequestRecord
 from foosim.supervisor.status import status
 
@@ -57,6 +58,7 @@ class Requests:
         """By sender and id."""
         self._pending: list[_Waiting] = []
         self._edits: dict[int, list[Edit]] = {}
+        self.issued = Issued()
         self._verbs: dict[str, Callable[[Request, dict[str, Any], int], Answer | None]] = {
             "status": self._status,
             "pause": self._pause,
@@ -139,6 +141,7 @@ class Requests:
         answer = Answer(request.sender, request.id, True, tick, text, b"{}")
         self._write(answer, edits or [], owners or self._core.owners)
         if edits:
+            self.issued.add(tick, edits)
             self._edits.setdefault(tick, []).extend(edits)
         return self._keep(answer)
 
@@ -155,6 +158,7 @@ class Requests:
         if not edits:
             return
         core.actions.append(Journal(encode(OrderedRecord(tick, edits))))
+        self.issued.add(tick, edits)
         if tick < core.released:
             core.orders[tick] = [*core.orders[tick], *edits]
         else:
@@ -164,9 +168,16 @@ class Requests:
         """Return what requests add to ticks that are not released yet."""
         return [edit for tick in sorted(self._edits) for edit in self._edits[tick]]
 
-    def resume(self, edits: dict[int, list[Edit]], answers: dict[tuple[str, str], Answer]) -> None:
+    def resume(self, edits: dict[int, list[Edit]], answers: dict[tuple[str, str], Answer], issued: Issued) -> None:
         """Take what a journal says of requests."""
-        self._edits, self._answers = edits, answers
+        self._edits, self._answers, self.issued = edits, answers, issued
+
+    def set_back(self, tick: int) -> None:
+        """The last commit is that of another tick now: what was issued from there on is to come (again)."""
+        self._edits = self.issued.behind(tick)
+        if self._pending:
+            first = self._pending[0]
+            first.layout = layout_after(self._next_layout(), [first.edit])
 
     def journalled(self) -> tuple[dict[int, list[Edit]], list[Answer]]:
         """Return what of the requests a further journal file has to say again: edits to come by tick, answers."""

@@ -13,12 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
-from foosim.protocol.codec import decode
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import frame_from_bytes
-from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Commit, Standing
-from foosim.supervisor.head import stand_at, stand_on
+from foosim.protocol.hub_messages import Standing
+from foosim.supervisor.head import stand_on
 from foosim.supervisor.records import History
 
 if TYPE_CHECKING:
@@ -47,21 +43,19 @@ class TakeOver:
         stand_on(core, history)
         core.say("warning", f"started again: the journal ends at tick {core.frame.tick}, epoch {core.epoch}")
 
-    def standing(self, standing: Standing) -> bool:
-        """The vHub tells how far it has come: go on from its last commit when the journal has lost that."""
+    def standing(self, standing: Standing, now_ns: int) -> bool:
+        """The vHub tells how far it has come: go on from its last commit when the journal has lost that, or when the
+        vHub has lost what came behind. False for a repeat."""
         core = self._core
-        if self._standing is not None:
+        if self._standing is not None and self._standing.boot == standing.boot:
             return False
-        if standing.commit:
-            commit = decode(Commit, standing.commit)
-            if commit.tick > core.frame.tick:
-                layout = build_layout(core.deployment, [(entity.name, entity.model) for entity in standing.added])
-                frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
-                if frame.digest != commit.digest:
-                    raise Malformed(f"commit {commit.tick} of the vHub has another digest than its frame")
-                core.say("warning", f"goes on from the vHub's commit {commit.tick}, the journal lost what led to it")
-                stand_at(core, frame, standing.chain, standing.commit)
+        if core.branches.is_behind(standing):
+            core.branches.begin(standing, now_ns)
+        elif core.branches.is_further(standing):
+            core.branches.stand(standing)
+            core.say("warning", f"goes on from the vHub's commit {core.frame.tick}, the journal lost what led to it")
         core.epoch = max(core.epoch, standing.epoch)
+        core.prepare(core.frame.layout)
         self._standing = standing
         return True
 
@@ -92,4 +86,6 @@ class TakeOver:
         core.members = tuple(here)
         core.recovery.begin(here, missing, now_ns)
         core.say_last_commit(now_ns)
+        assert self._standing is not None
+        core.branches.proceed(self._standing)
         core.say("info", f"goes on from tick {core.frame.tick} with {', '.join(here) or 'no node yet'}")

@@ -37,7 +37,7 @@ def may_hear(identity: str, key: str) -> bool:
             return key in to_all | to_it or key.startswith((f"{S}/part/", f"{S}/want/"))
         case "vhub":
             to_all = {f"{S}/{what}" for what in ("recall", "epoch", "tempo", "end")}
-            to_it = {f"{S}/{what}/vhub" for what in ("build", "piece", "refusal", "commit")}
+            to_it = {f"{S}/{what}/vhub" for what in ("build", "piece", "refusal", "proceed", "commit")}
             return key in to_all | to_it or key.startswith((f"{S}/samples/", f"{S}/want/"))
         case "operator":
             return key.startswith(f"{S}/answer/{name}.")

@@ -25,9 +25,10 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch, Origin
 from foosim.vhub.mcap_file import McapWriter
-from foosim.vhub.mcap_scan import UNSYNCED_BYTES, Scanned, scan
+from foosim.vhub.mcap_scan import NOTHING, UNSYNCED_BYTES, Scanned, Void, scan
 from foosim.vhub.packet import IN_FLIGHT
 from foosim.vhub.records import Closing
+from foosim.vhub.resume import Captured
 from foosim.vhub.rows import (
     EPOCHS,
     FORMAT,
@@ -131,12 +132,19 @@ class CaptureFile:
 
     With `journal_tick`, a file that is there is one that this run left unfinished: it is gone on with, and `torn_bytes`
     of it were cut off. A journal has all ticks from that one on: bytes that are damaged, not just cut, are only given
-    up when it does. A file that ends before its description is begun anew; one that has its end is refused. `at_once`:
-    a run waits, and what was synced long ago is not looked through.
+    up when it does. With `journal_end` so is what is further than the journal, chunk by chunk. A file that ends before
+    its description is begun anew; one that has its end is refused. `at_once`: a run waits, and what was synced long ago
+    is not looked through.
     """
 
     def __init__(
-        self, path: Path, described: Described, journal_tick: int | None = None, *, at_once: bool = False
+        self,
+        path: Path,
+        described: Described,
+        journal_tick: int | None = None,
+        journal_end: Captured | None = None,
+        *,
+        at_once: bool = False,
     ) -> None:
         self.path = path
         self.done = Progress()
@@ -151,7 +159,7 @@ class CaptureFile:
         self._file = self._open(journal_tick is not None)
         try:
             run = described.metadata.get("run", "")
-            found = None if journal_tick is None else self._scanned(journal_tick, run, at_once)
+            found = None if journal_tick is None else self._scanned(journal_tick, journal_end, run, at_once)
             self.mcap = McapWriter(self._write_bytes, PROFILE, None if found is None else found.book)
             if found is None:
                 self._channels = self._declare()
@@ -319,15 +327,16 @@ class CaptureFile:
 
     # --- a file that was left unfinished -----------------------------------------------------------------------------
 
-    def _scanned(self, journal_tick: int, run: str, at_once: bool) -> Scanned | None:
+    def _scanned(self, journal_tick: int, journal_end: Captured | None, run: str, at_once: bool) -> Scanned | None:
         """Return what the file has, cut at its last whole record; None when it has to be begun anew."""
+        void = None if journal_end is None else _behind(journal_end, self._plan.tick_ns)
         with os.fdopen(os.dup(self._file), "rb") as stream:
             size = os.fstat(self._file).st_size
             if at_once and size > UNSYNCED_BYTES:
                 with mmap(self._file, size - UNSYNCED_BYTES, access=ACCESS_READ) as old, memoryview(old) as trusted:
-                    found = scan(stream, size, str(self.path), trusted)
+                    found = scan(stream, size, str(self.path), trusted, void)
             else:
-                found = scan(stream, size, str(self.path))
+                found = scan(stream, size, str(self.path), NOTHING, void)
         if found.finished:
             raise CaptureError(f"{self.path}: is finished; a capture is never overwritten")
         if found.metadata.get(METADATA, {}).get("run", run) != run:
@@ -338,14 +347,26 @@ class CaptureFile:
         self.done = _progress(found)
         end = found.book.offset if is_described else 0
         if not found.is_cut and journal_tick > self.done.tick + 1:
+            why = "damaged" if not found.is_void else "further than its journal, whose end is lost"
             raise CaptureError(
-                f"{self.path}: byte {end}: damaged; {found.torn_bytes} bytes from there on would be lost, "
+                f"{self.path}: byte {end}: {why}; {found.torn_bytes} bytes from there on would be lost, "
                 f"no journal has tick {self.done.tick + 1}"
             )
         self.torn_bytes = found.torn_bytes
         os.ftruncate(self._file, end)
         os.lseek(self._file, end, os.SEEK_SET)
         return found if is_described else None
+
+
+def _behind(end: Captured, tick_ns: int) -> Void:
+    """Return what a capture has behind the end of a journal."""
+    fields = {TICK: ("tick", end.tick), EPOCHS: ("epoch", end.epoch)}
+
+    def is_void(topic: str, data: bytes) -> bool:
+        name, last = fields[topic]
+        return _number(data, name) > last
+
+    return Void(tuple(fields), max(0, end.tick) * tick_ns, is_void)
 
 
 def _progress(found: Scanned) -> Progress:
@@ -359,13 +380,21 @@ def _progress(found: Scanned) -> Progress:
 
 
 def _last_row(found: Scanned, topic: str) -> dict[str, object]:
+    return _row(found.last.get(topic, b"{}"))
+
+
+def _row(data: bytes) -> dict[str, object]:
     try:
-        row = decode_json(found.last.get(topic, b"{}"))
+        row = decode_json(data)
     except Malformed:
         return {}
     return row if isinstance(row, dict) else {}
 
 
 def _last_number(found: Scanned, topic: str, field: str) -> int:
-    number = _last_row(found, topic).get(field, -1)
+    return _number(found.last.get(topic, b"{}"), field)
+
+
+def _number(data: bytes, field: str) -> int:
+    number = _row(data).get(field, -1)
     return number if isinstance(number, int) else -1

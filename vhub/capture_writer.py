@@ -67,7 +67,8 @@ class CaptureWriter:
 
     Raises CaptureError when the file exists already (it is never overwritten) or cannot be written. With `journal_tick`
     a file that this run left unfinished is gone on with (`CaptureFile`): `keep` everything that the journal has, from
-    that tick on; what the file has already is not written again. `say` takes what people should know, as (level, text).
+    that tick on; what the file has already is not written again, and what it has behind `journal_end`, the last tick
+    and epoch of that journal, is cut off. `say` takes what people should know, as (level, text).
     `keep`, `log` and `finish` are for one thread.
     """
 
@@ -80,6 +81,7 @@ class CaptureWriter:
         metadata: Mapping[str, str],
         say: Callable[[str, str], None] | None = None,
         journal_tick: int | None = None,
+        journal_end: Captured | None = None,
     ) -> None:
         self.path = path
         self._say = say or (lambda level, text: None)
@@ -98,7 +100,7 @@ class CaptureWriter:
         self._changed = threading.Condition()
         """Guards the queue, the error and the ends; notified when any of them changes in a way that is waited for."""
         described = Described(deployment, deployment_name, deployment_text, metadata)
-        self._file = CaptureFile(path, described, journal_tick, at_once=True)
+        self._file = CaptureFile(path, described, journal_tick, journal_end, at_once=True)
         self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
         """How far the file was that is gone on with."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)

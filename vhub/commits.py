@@ -8,12 +8,11 @@ frames.
 from __future__ import annotations
 
 from foosim.protocol import limits
-from foosim.protocol.channels import VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, chain_next, frame_from_bytes, layout_after
 from foosim.protocol.layout import Layout, added_entities
-from foosim.protocol.messages import Commit, Standing
+from foosim.protocol.messages import AddedEntity, Commit
 
 Committed = tuple[bytes, Commit, Frame]
 """A commit as it came, read, and its frame."""
@@ -64,12 +63,12 @@ class Commits:
     def __contains__(self, tick: int) -> bool:
         return tick in self._frames
 
-    def standing(self, deployment: Deployment, epoch: int) -> Standing:
-        """Return how far the world has come here."""
+    def last(self, deployment: Deployment) -> tuple[bytes, bytes, list[AddedEntity]]:
+        """Return the newest commit (empty before the first), the chain up to it, and its layout's added entities."""
         assert self.layout is not None
         last = self._frames.get(self.next_tick - 1)
-        added = added_entities(deployment, self.layout)
-        return Standing(VHUB, epoch, b"" if last is None else last[0], self._chains[self.next_tick - 1], added)
+        chain, added = self._chains[self.next_tick - 1], added_entities(deployment, self.layout)
+        return b"" if last is None else last[0], chain, added
 
     def forget(self, tick: int) -> None:
         """Nobody asks for this tick any more."""

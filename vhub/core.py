@@ -21,6 +21,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame
+from foosim.protocol.hub_messages import Proceed
 from foosim.protocol.layout import added_entities
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
@@ -50,6 +51,7 @@ from foosim.protocol.start import first_chain
 from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
+from foosim.vhub.footing import Footing
 from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closing
 from foosim.vhub.packet import Flight
 from foosim.vhub.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
@@ -77,12 +79,13 @@ class _World:
 class HubCore:
     """The vHub's state machine. `actions` is what the shell performs next."""
 
-    def __init__(self, boot: str, fingerprint: bytes, now_ns: int, world: str = "") -> None:
+    def __init__(self, boot: str, fingerprint: bytes, now_ns: int, world: str = "", clock: str = "") -> None:
+        """`clock` names the clock of `now_ns`: that of a machine, since it was started."""
         self.actions: list[HubAction] = []
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
-        self.door = Door(self)
+        self.door, self.footing = Door(self), Footing(self, clock)
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
@@ -91,12 +94,12 @@ class HubCore:
         self.lost = self.failure = self.capture = self.capture_file = self.radio_address = ""
         self.recording: dict[str, Any] = {}
         self.busy = 0.0
-        self._epoch = self._epoch_tick = 0
+        self.epoch = self._epoch_tick = 0
         self._epoch_payload = b""
         self._owners: dict[str, str] = {}
         self.waits = Waits()
         self._keeping = Keeping()
-        self._commits = Commits()
+        self.commits = Commits()
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
@@ -113,6 +116,7 @@ class HubCore:
             Piece: self._on_build,
             Tempo: self._on_tempo,
             End: self._on_end,
+            Proceed: self.footing.proceed,
             ClientHello: self.door.hello,
             Join: self.door.join,
             Up: self.door.up,
@@ -140,11 +144,11 @@ class HubCore:
 
     def advance(self, now_ns: int) -> None:
         """Close ticks as far as the inputs allow."""
-        while self.state is not None and self._epoch > 0 and not self.finished:
+        while self.state is not None and self.epoch > 0 and not self.finished:
             if self.ended is not None and self.state.closed + 1 >= self.ended.tick:
                 self._finish(now_ns)
                 return
-            if self._world is None and not self._close_world(now_ns):
+            if self.footing.waits or (self._world is None and not self._close_world(now_ns)):
                 return
             if not self._close_clients(now_ns):
                 return
@@ -157,9 +161,9 @@ class HubCore:
             for late in self.sessions.overdue(self._world.waited, self.releases.paused, now_ns):
                 self.lose(late.name, f"no Done of tick {late.go_tick} within its deadline")
         self.door.wake(now_ns)
-        if self.state is not None and self._epoch > 0:
+        if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
-        if self._patience.is_over(now_ns) and self._epoch > 0 and not self.finished:
+        if self._patience.is_over(now_ns) and self.epoch > 0 and not self.finished:
             self._ask_again(now_ns)
         self._release(now_ns)
         if self.ended is not None and not self.finished and now_ns >= self._end_ns:
@@ -168,7 +172,7 @@ class HubCore:
     def deadline_ns(self) -> int:
         """When `wake` has something to do next."""
         deadline = self.member.deadline_ns
-        if self._epoch > 0 and not self.finished:
+        if self.epoch > 0 and not self.finished:
             deadline = min(deadline, self._patience.at_ns, limits.COUNTER_MAX if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
@@ -192,22 +196,24 @@ class HubCore:
         """
         if self.state is None:
             return channels.COMMIT, 1
-        if self._world is None and self.state.closed + 1 in self._commits:
+        if self._world is None and self.state.closed + 1 in self.commits:
             return channels.SAMPLES, 1
-        return channels.COMMIT, max(1, self.state.final - self._commits.next_tick)
+        return channels.COMMIT, max(1, self.state.final - self.commits.next_tick)
 
     @property
     def waiting_for(self) -> str:
         """What the closing of the current tick lacks, for people and for the supervisor."""
         if self.state is None:
             return "start"
-        if self._epoch == 0:
+        if self.footing.waits:
+            return "to proceed"
+        if self.epoch == 0:
             missing = self.sessions.missing(self.state.deployment, self.state)
             return JOIN_OF + ", ".join(missing) if missing else "epoch"
         if self._world is not None:
             return DONE_OF + ", ".join(self._world.waited) if self._world.waited else ""
         tick = self.state.closed + 1
-        committed = self._commits.get(tick)
+        committed = self.commits.get(tick)
         if committed is None:
             return "commit"
         _, commit, frame = committed
@@ -229,7 +235,7 @@ class HubCore:
         state = self.state
         assert state is not None
         tick = state.closed + 1
-        committed = self._commits.get(tick)
+        committed = self.commits.get(tick)
         if committed is None:
             return False
         raw, commit, frame = committed
@@ -271,7 +277,7 @@ class HubCore:
         if not state.was_final:
             self._sent[tick + 1] = payload
             for following in range(tick + 2, state.final + 1):
-                self._sent[following] = encode(Deliveries(following, []))
+                self._sent[following] = encode(Deliveries(following, [], branch=state.branch))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
         for flight in world.closing.fates:
             if not flight.cause and flight.destination not in state.members:
@@ -284,7 +290,7 @@ class HubCore:
         self._world = None
         if (tick + 1) % limits.CHECKPOINT_TICKS == 0:
             self.actions.append(Journal(self.head()))
-        self._commits.forget(tick - limits.KEPT_TICKS)
+        self.commits.forget(tick - limits.KEPT_TICKS)
         self._patience.progress(state.tick_ns, now_ns)
         return True
 
@@ -294,17 +300,18 @@ class HubCore:
         factor = self.releases.factor
         text = self.waits.close(now_ns, int(self.state.tick_ns / factor / 2) if factor else limits.COUNTER_MAX)
         if text:
-            told = Heartbeat(channels.VHUB, self.state.closed + 1, self._epoch, text, self.lost, self.busy, b"")
+            told = Heartbeat(channels.VHUB, self.state.closed + 1, self.epoch, text, self.lost, self.busy, b"")
             self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(told)))
 
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""
         assert self.state is not None and self.member.build is not None
-        commit, _, frame = self._commits.get(self.state.closed) or (b"", None, None)
-        layout = self._commits.layout if frame is None else frame.layout
+        commit, _, frame = self.commits.get(self.state.closed) or (b"", None, None)
+        layout = self.commits.layout if frame is None else frame.layout
         assert layout is not None
         added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
-        where = commit, self._epoch_payload, self.capture_file, self._commits.chain_at(self.state.closed)
+        chain = self.commits.chain_at(self.state.closed)
+        where = commit, self._epoch_payload, self.capture_file, chain, self.footing.clock
         return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added, *where))
 
     def _release(self, now_ns: int) -> None:
@@ -315,7 +322,8 @@ class HubCore:
             for flight in release.flights:
                 flight.released_wall_ns = now_ns
             member = self.state.members[release.client]
-            down = Down(release.number, release.tick, member.sequence, received(release.flights), False)
+            packets, branch = received(release.flights), self.state.branch
+            down = Down(release.number, release.tick, member.sequence, packets, False, branch)
             self.sessions.say_down(release.client, down, now_ns)
         self.actions += self._keeping.take(self.releases.waiting_tick)
 
@@ -339,10 +347,10 @@ class HubCore:
         assert deployment is not None and build is not None and self.state is None, "begin once, after the build"
         self.releases = Releases(deployment.tick_ns)
         self.sessions.downlinks.kept_ns = deployment.deadlines.client_back_ns
-        self.member.standing = self._standing
+        self.member.standing = self.footing.standing
         if past is None:
             self.state = HubState(deployment, self.member.first_tick)
-            self._commits.start(self.member.layout, self.member.first_tick, first_chain(build.origin))
+            self.commits.start(self.member.layout, self.member.first_tick, first_chain(build.origin))
         else:
             self._go_on(past, now_ns)
         self.actions.append(Journal(self.head()))
@@ -352,61 +360,58 @@ class HubCore:
         """Be the vHub that was there before: say its last deliveries again, and ask for what comes after."""
         assert self.deployment is not None
         state = self.state = past.state
-        self._commits.start(past.layout, state.closed + 1, past.chain, past.committed)
+        self.commits.start(past.layout, state.closed + 1, past.chain, past.committed)
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
         self.door.go_on(past.inputs, now_ns)
         self.actions += past.words()
         if past.epoch is not None:
             self._take_epoch(past.epoch)
+            self.footing.stand(past.clock, past.published)
         self._patience.progress(self.deployment.tick_ns, now_ns)
 
     def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
         self.repeated += not self.member.recall(recall)
 
-    def _standing(self) -> Publish:
-        """Say how far the world has come here: a supervisor that was started again may have lost more."""
-        assert self.deployment is not None
-        return Publish(channels.STANDING, channels.VHUB, encode(self._commits.standing(self.deployment, self._epoch)))
-
     def ready_if_complete(self) -> None:
         """The hub is ready when all declared lockstep clients have joined, or had joined the one before it."""
-        layout = self._commits.layout
+        layout = self.commits.layout
         if layout is None or self.deployment is None or self.state is None or self.member.is_ready:
             return
-        if self._epoch > 0 or not self.sessions.missing(self.deployment, self.state):
+        if self.epoch > 0 or not self.sessions.missing(self.deployment, self.state):
             self.member.ready(layout)
 
     def _take_epoch(self, epoch: Epoch) -> None:
-        self._epoch, self._epoch_tick = epoch.epoch, epoch.tick
+        self.epoch, self._epoch_tick = epoch.epoch, epoch.tick
         self._epoch_payload = encode(epoch)
         self._owners = dict(epoch.owners)
 
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if self.state is None:
             return
-        if epoch.epoch <= self._epoch:
+        if epoch.epoch <= self.epoch:
             self.repeated += 1
-            self.member.repeated(epoch.epoch == self._epoch)
+            self.member.repeated(epoch.epoch == self.epoch and not self.footing.waits)
             return
         self.member.check_epoch(epoch)
-        first = self._epoch == 0
+        first = self.epoch == 0
         if first and epoch.tick > self.state.closed + 1:
             self.failure = f"the run is at tick {epoch.tick}: the journal of the vHub that brought it there is not here"
             return
+        branches = self.state.turn_to(epoch)
         self._take_epoch(epoch)
         self.actions += [Journal(self._epoch_payload), KeepEpoch(epoch)]
-        self.member.entered()
+        if branches:
+            self.footing.branch_off(self._sent)
+        self.footing.entered()
         if first:
             tick = self.state.closed + 1
-            self._sent[tick] = encode(Deliveries(tick, []))
+            self._sent[tick] = encode(Deliveries(tick, [], branch=epoch.branch))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[tick]))
             self._patience.progress(self.state.tick_ns, now_ns)
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
-        # A commit up to the epoch's start is as good under its old epoch: what is committed never changes.
-        fenced = commit.epoch < self._epoch and commit.tick > self._epoch_tick
-        taken = [] if fenced else self._commits.take(commit, payload)
+        taken = [] if self.footing.fences(commit, self._epoch_tick) else self.commits.take(commit, payload)
         self.repeated += not taken
         if self.releases is not None:
             for tick in taken:
@@ -424,7 +429,7 @@ class HubCore:
             self.waits.node = samples.node
 
     def _on_want(self, want: Want, payload: bytes, now_ns: int) -> None:
-        if want.kind == channels.DELIVERIES.name and want.tick in self._sent:
+        if want.kind == channels.DELIVERIES.name and want.tick in self._sent and not self.footing.waits:
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[want.tick]))
 
     def take_done(self, client: str) -> None:
@@ -444,9 +449,9 @@ class HubCore:
     def _ask_again(self, now_ns: int) -> None:
         assert self.state is not None
         tick = self.state.closed + 1
-        kind = channels.SAMPLES.name if tick in self._commits else channels.COMMIT.name
-        if self._world is None:
-            want = Want(channels.VHUB, kind, tick, self._epoch, [])
+        kind = channels.SAMPLES.name if tick in self.commits else channels.COMMIT.name
+        if self._world is None and not self.footing.waits:
+            want = Want(channels.VHUB, kind, tick, self.epoch, [])
             self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
         self._patience.asked(now_ns)
 
@@ -459,7 +464,7 @@ class HubCore:
 
     def _heartbeat(self) -> Heartbeat:
         tick = 0 if self.state is None else self.state.closed + 1
-        return Heartbeat(channels.VHUB, tick, self._epoch, self.waiting_for, self.lost, self.busy, report(self))
+        return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, report(self))
 
     # --- the end -----------------------------------------------------------------------------------------------------
 
@@ -471,19 +476,19 @@ class HubCore:
     def _finish(self, now_ns: int) -> None:
         """Record the last frame and what is still in flight, tell the clients; the shell says farewell."""
         assert self.state is not None and self.ended is not None
-        last = self._commits.get(self.ended.tick)
+        last = self.commits.get(self.ended.tick)
         if last is None and self.state.closed + 1 >= self.ended.tick and now_ns < self._end_ns:
             return
         self.finished = True
         self._release(now_ns)
-        committed = last or self._commits.get(self.state.closed + 1) or self._commits.get(self.state.closed)
+        committed = last or self.commits.get(self.state.closed + 1) or self.commits.get(self.state.closed)
         if committed is not None:
             half = None if self._world is None else self._world.closing  # a tick that is half closed has fates
             self.actions.append(Keep(last_closing(self.state, committed, half, now_ns)))
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1
-            self.sessions.say_down(name, Down(number, self.ended.tick, 0, [], True), now_ns)
+            self.sessions.say_down(name, Down(number, self.ended.tick, 0, [], True, self.state.branch), now_ns)
 
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""

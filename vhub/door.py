@@ -13,7 +13,7 @@ from foosim.protocol import limits
 from foosim.protocol.actions import Journal
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import ClientHello, Done, Join, Up
+from foosim.protocol.messages import ClientHello, Done, Go, Join, Up
 from foosim.vhub.packet import Flight
 from foosim.vhub.records import InputsRecord
 from foosim.vhub.sessions import Session, may_lockstep
@@ -77,7 +77,7 @@ class Door:
             return
         for flight in flights:
             flight.released_wall_ns = now_ns
-        core.sessions.say_go(session, member.downlink, tick, received(flights), member.sequence)
+        core.sessions.say_go(session, Go(member.downlink, tick, member.sequence, received(flights), core.state.branch))
         deadlines = core.deployment.deadlines
         allowed_ns = deadlines.lockstep_realtime_ns if core.releases.factor else deadlines.lockstep_fast_ns
         session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * core.deployment.tick_ns))
@@ -85,8 +85,10 @@ class Door:
     # --- messages ----------------------------------------------------------------------------------------------------
 
     def hello(self, hello: ClientHello, payload: bytes, now_ns: int) -> None:
-        """Let a client in, or say why not."""
+        """Let a client in, or say why not; before it is known where the run goes on nobody is told how far it is."""
         core = self._core
+        if core.footing.waits:
+            return
         if core.state is not None and core.deployment is not None and core.member.build is not None:
             core.sessions.hello(hello, core.member.build, core.deployment, core.state, self._said(hello.name))
 
@@ -112,6 +114,9 @@ class Door:
         session = self._session(up)
         if session is None or core.state is None:
             return
+        if up.branch != core.state.branch:
+            core.repeated += 1
+            return
         if not core.sessions.admits(session, len(up.packets), len(payload)):
             core.state.refuse_at_door("inbox_full", len(up.packets))
             return
@@ -126,7 +131,8 @@ class Door:
         session = self._session(done)
         if session is None:
             return
-        if not core.waits_for(done.name) or done.tick != session.go_tick:
+        is_of_another = core.state is None or done.branch != core.state.branch
+        if is_of_another or not core.waits_for(done.name) or done.tick != session.go_tick:
             core.repeated += 1
             return
         core.take_done(done.name)

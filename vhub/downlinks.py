@@ -10,6 +10,8 @@ from collections import deque
 from collections.abc import Iterable
 
 from foosim.protocol import limits
+from foosim.protocol.messages import Down
+from foosim.vhub.naming import in_branch
 
 _Kept = tuple[int, int, bytes]
 """Until when it is kept, its number, its bytes."""
@@ -34,6 +36,12 @@ class Downlinks:
         for client, said in downlinks.items():
             for number, payload in said:
                 self.keep(client, number, payload, now_ns)
+
+    def turn_to(self, branch: int) -> None:
+        """Name another branch in all of them: those of one that is void are not among them."""
+        for client, kept in self._by_client.items():
+            again = ((until_ns, number, in_branch(Down, payload, branch)) for until_ns, number, payload in kept)
+            self._by_client[client] = deque(again, limits.DOWNLINKS_KEPT_MAX)
 
     def behind(self, client: str, received: int) -> Iterable[bytes]:
         """Return what a client that has got `received` has not."""

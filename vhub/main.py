@@ -38,7 +38,7 @@ from foosim.protocol.messages import Build, End
 from foosim.protocol.notify import Notify
 from foosim.protocol.orphan import Orphan
 from foosim.protocol.probe import ProgressOption
-from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
+from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.vhub.capture_file import check_new, origin_metadata
@@ -46,7 +46,7 @@ from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing, first_head
-from foosim.vhub.resume import Captured, first_tick_of, recall, was_captured
+from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_captured
 from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
@@ -76,7 +76,7 @@ class HubProcess:
         credentials: Credentials | None = None,
     ) -> None:
         """`open_radio` listens for the clients of a deployment, which comes with the handshake."""
-        self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns())
+        self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns(), clock=clock_name())
         self._options = options
         self._open_radio = open_radio
         self._admission = Admission(credentials, SUPERVISOR, simulation.locator, time.monotonic_ns())
@@ -219,8 +219,8 @@ class HubProcess:
             "fingerprint": library_fingerprint().hex(),
             **origin_metadata(build.origin),
         }
-        described = build.deployment_name, build.deployment, metadata, self._say, first_tick_of(records)
-        self._capture = CaptureWriter(path, deployment, *described)
+        described = build.deployment_name, build.deployment, metadata, self._say
+        self._capture = CaptureWriter(path, deployment, *described, first_tick_of(records), end_of(deployment, records))
         return self._capture.begun_with
 
     def _listen(self, deployment: Deployment) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import struct
 from array import array
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -54,7 +55,9 @@ class Scanned:
     finished: bool = False
     """Whether the file has an end: then there is nothing to go on with."""
     is_cut: bool = True
-    """Whether nothing but one record that is cut stands behind the whole ones; else bytes there are damaged."""
+    """Whether nothing but one record that is cut stands behind the whole ones; else bytes there are damaged or void."""
+    is_void: bool = False
+    """Whether a whole chunk stands there with a message that does not hold."""
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     """The entries of each record of metadata, by its name."""
     last: dict[str, bytes] = field(default_factory=dict)
@@ -68,25 +71,37 @@ class Scanned:
         return self.size - self.book.offset
 
 
-def scan(stream: BinaryIO, size: int, name: str, trusted: memoryview = NOTHING) -> Scanned:
-    """Read a file's records up to the first that is cut or damaged, or its end.
+@dataclass(frozen=True, slots=True)
+class Void:
+    """What does not hold of a file: messages of these topics, from a log time on, that a test names by their data."""
+
+    topics: tuple[str, ...]
+    from_ns: int
+    is_void: Callable[[str, bytes], bool]
+
+
+def scan(
+    stream: BinaryIO, size: int, name: str, trusted: memoryview = NOTHING, void: Void | None = None
+) -> Scanned:
+    """Read a file's records up to the first that is cut or damaged, the first chunk with something void, or its end.
 
     `trusted` is the file's beginning of which only the heads of records are looked at, unless they are damaged. Raises
     CaptureError when it does not start as an MCAP file does, with as much as it has.
     """
     if trusted:
         with suppress(*_DAMAGED):
-            found = _Scan(stream, size, name).run(trusted)
+            found = _Scan(stream, size, name, void).run(trusted)
             if found.book.offset >= len(trusted):
                 return found
         stream.seek(0)
-    return _Scan(stream, size, name).run()
+    return _Scan(stream, size, name, void).run()
 
 
 class _Scan:
-    def __init__(self, stream: BinaryIO, size: int, name: str) -> None:
+    def __init__(self, stream: BinaryIO, size: int, name: str, void: Void | None) -> None:
         self._stream = stream
         self._name = name
+        self._void = void
         self._found = Scanned(Book(), size)
         self._book = self._found.book
         self._topics: dict[int, str] = {}
@@ -118,8 +133,11 @@ class _Scan:
             if at + length > stop or not 1 <= opcode < Opcode.DATA_END:
                 break
             if opcode == Opcode.CHUNK:
+                head = bytes(content[at : at + CHUNK_HEAD_BYTES_MAX])
+                if self._may_be_void(head):
+                    break
                 self._indexed = 0
-                self._note_chunk(bytes(content[at : at + CHUNK_HEAD_BYTES_MAX]), length)
+                self._note_chunk(head, length)
             elif opcode == Opcode.MESSAGE_INDEX:
                 self._pass_index(content, at, length)
             else:
@@ -168,6 +186,9 @@ class _Scan:
         except _DAMAGED:
             self._found.is_cut = False
             return False
+        if self._found.is_void:
+            self._found.is_cut = False
+            return False
         self._book.offset += RECORD.size + length
         return True
 
@@ -197,8 +218,10 @@ class _Scan:
 
     def _take_chunk(self, content: bytes) -> None:
         chunk = unpack_chunk(content, self._name)
-        self._note_chunk(content, len(content))
-        self._chunk, self._indexed = chunk, 0
+        self._found.is_void = self._may_be_void(content) and self._is_void(chunk)
+        if not self._found.is_void:
+            self._note_chunk(content, len(content))
+            self._chunk, self._indexed = chunk, 0
 
     def _note_chunk(self, content: bytes, length: int) -> None:
         """Enter a chunk of so many bytes into the book; `content` is its beginning at least."""
@@ -219,6 +242,21 @@ class _Scan:
                 message_index_length=0,
             )
         )
+
+    def _may_be_void(self, content: bytes) -> bool:
+        """Whether a chunk, of which this is the beginning at least, is from times at which something is void."""
+        return self._void is not None and CHUNK_FIELDS.unpack_from(content)[1] >= self._void.from_ns
+
+    def _is_void(self, chunk: bytes) -> bool:
+        """Whether a chunk holds something void."""
+        void = self._void
+        assert void is not None
+        for opcode, start, stop in chunk_records(chunk):
+            if opcode == Opcode.MESSAGE:
+                topic = self._topics[MESSAGE_FIELDS.unpack_from(chunk, start)[0]]
+                if topic in void.topics and void.is_void(topic, chunk[start + MESSAGE_FIELDS.size : stop]):
+                    return True
+        return False
 
     def _take_index(self, content: bytes, offset: int, length: int) -> None:
         """Count a channel's messages of the last chunk, and keep the last of them."""

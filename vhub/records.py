@@ -40,6 +40,8 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     """Where the capture is; empty when there is none."""
     chain: bytes = CHAIN_START
     """Over the frames up to that of the last closed tick."""
+    clock: str = ""
+    """The clock of the machine, since it was started: a journal that goes on by another one may have lost its end."""
 
 
 def first_head(build: Build, deployment: Deployment, capture: str) -> bytes:
@@ -172,6 +174,7 @@ class Fold:
         self.commit = head.commit
         self.epoch = head.epoch
         self.chain = head.chain
+        self.clock = head.clock
         self.inputs: InputsRecord | None = None
         """Who joins and leaves at the tick behind the last closed one, where that was written."""
 
@@ -184,6 +187,9 @@ class Fold:
                 self.inputs = record
             elif isinstance(record, Epoch):
                 self.epoch = raw
+                self.state.turn_to(record)
+            else:
+                self.clock = record.clock
 
     def _close(self, record: TickRecord) -> Folded:
         state = self.state

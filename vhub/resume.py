@@ -10,23 +10,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from foosim.protocol import channels, limits
-from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol import limits
+from foosim.protocol.actions import Action, Say
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.protocol.layout import Layout
-from foosim.protocol.messages import Commit, Deliveries, Down, Epoch, Want
+from foosim.protocol.messages import Commit, Deliveries, Down, Epoch
 from foosim.vhub.commits import Committed
 from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.naming import in_branch
 from foosim.vhub.records import Fold, Folded, HeadRecord, HubRecord, InputsRecord, TickRecord
 from foosim.vhub.state import HubState, received
 
 
 @dataclass(frozen=True, slots=True)
 class Captured:
-    """How far a capture is: its last tick and its last epoch; -1 and 0 when it has none yet."""
+    """How far a capture, or a journal, is: its last tick and its last epoch; -1 and 0 when it has none yet."""
 
     tick: int = -1
     epoch: int = 0
@@ -41,6 +42,8 @@ class Past:
     committed: Committed | None = None
     """The commit of the last closed tick; None before the first."""
     chain: bytes = CHAIN_START
+    clock: str = ""
+    """The one that the journal names."""
     epoch: Epoch | None = None
     inputs: InputsRecord | None = None
     sent: dict[int, bytes] = field(default_factory=dict)
@@ -55,18 +58,10 @@ class Past:
     """What the capture lacks, in order."""
 
     def words(self) -> list[Action | Keep | KeepEpoch]:
-        """Return what there is to do and to say before anything else: complete the capture, say the last deliveries
-        again, ask for all that may have come since."""
+        """Return what there is to do and to say before anything else: complete the capture."""
         words: list[Action | Keep | KeepEpoch] = [*self.kept]
-        if self.epoch is None:
-            return words
-        epoch, state = self.epoch.epoch, self.state
-        words.append(Say("info", f"goes on behind tick {state.closed} in epoch {epoch}"))
-        words.append(Publish(channels.DELIVERIES, channels.VHUB, self.published))
-        for tick in range(state.closed + 1, state.final + 2):
-            for kind in (channels.COMMIT, channels.SAMPLES):
-                want = Want(channels.VHUB, kind.name, tick, epoch, [])
-                words.append(Publish(channels.WANT, channels.VHUB, encode(want)))
+        if self.epoch is not None:
+            words.append(Say("info", f"goes on behind tick {self.state.closed} in epoch {self.epoch.epoch}"))
         return words
 
 
@@ -103,12 +98,25 @@ def recall(
             raise Malformed(f"the capture has tick {captured.tick}, its journal ends at {fold.state.closed}")
         untold = [record for record in found if isinstance(record, Epoch) and record.epoch > captured.epoch]
         past.kept[:0] = [KeepEpoch(epoch) for epoch in untold]
-    past.layout, past.inputs, past.chain = fold.layout, fold.inputs, fold.chain
+    past.layout, past.inputs, past.chain, past.clock = fold.layout, fold.inputs, fold.chain, fold.clock
+    _name_branch(past)
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
     frame = _frame(fold)
     if frame is not None:
         past.committed = fold.commit, decode(Commit, fold.commit), frame
     return past
+
+
+def _name_branch(past: Past) -> None:
+    """What was said before the last branch is said in it from then on."""
+    branch = past.state.branch
+    if not branch:
+        return
+    past.sent = {tick: in_branch(Deliveries, payload, branch) for tick, payload in past.sent.items()}
+    if past.published:
+        past.published = in_branch(Deliveries, past.published, branch)
+    for client, said in past.downlinks.items():
+        past.downlinks[client] = [(number, in_branch(Down, payload, branch)) for number, payload in said]
 
 
 def _start(found: Sequence[object], captured: Captured | None, kept_ticks: int) -> int:
@@ -136,14 +144,14 @@ def _deliveries_of(state: HubState) -> tuple[int, bytes]:
     """Return the deliveries that are behind a state, as they were published where they were."""
     tick = state.closed + 1
     following = 0 if state.was_final else state.final - tick
-    return tick, encode(Deliveries(tick, state.deliveries[tick], following))
+    return tick, encode(Deliveries(tick, state.deliveries[tick], following, state.branch))
 
 
 def _remember(past: Past, tick: int, payload: bytes) -> None:
     """Note the deliveries of a tick, and that those behind it are final where they are."""
     past.sent[tick] = past.sent.get(tick, payload)
     for following in range(tick + 1, past.state.final + 1):
-        past.sent.setdefault(following, encode(Deliveries(following, [])))
+        past.sent.setdefault(following, encode(Deliveries(following, [], branch=past.state.branch)))
     past.sent.pop(tick - limits.KEPT_TICKS, None)
     if not past.state.was_final:
         past.published = payload
@@ -155,7 +163,7 @@ def _number(past: Past, folded: Folded) -> None:
     for name, flights in sorted(folded.released.items()):
         member = members[name]
         if not member.is_due(tick):
-            down = Down(member.downlink, tick, member.sequence, received(flights), False)
+            down = Down(member.downlink, tick, member.sequence, received(flights), False, folded.state.branch)
             past.downlinks.setdefault(name, []).append((member.downlink, encode(down)))
 
 
@@ -163,6 +171,23 @@ def first_tick_of(records: Sequence[bytes]) -> int | None:
     """Return the first tick of which a journal has a record, or would have; None when there is no journal."""
     ticks = (record.tick for raw in records if isinstance(record := decode_any(HubRecord, raw), TickRecord))
     return next(ticks, limits.COUNTER_MAX) if records else None
+
+
+def end_of(deployment: Deployment, records: Sequence[bytes]) -> Captured | None:
+    """Return the last tick and epoch of a journal; None when there is no journal. Raises Malformed for what is none."""
+    tick, epoch = -1, 0
+    for raw in records:
+        record = decode_any(HubRecord, raw)
+        if isinstance(record, TickRecord):
+            tick = record.tick
+        elif isinstance(record, Epoch):
+            epoch = record.epoch
+        elif isinstance(record, HeadRecord) and record.epoch:
+            epoch = decode(Epoch, record.epoch).epoch
+    if records and tick < 0:
+        head = decode_any(HeadRecord, records[0])
+        tick = HubState.restore(deployment, head.state).closed
+    return Captured(tick, epoch) if records else None
 
 
 def was_captured(records: Sequence[bytes]) -> str | None:

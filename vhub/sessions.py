@@ -24,7 +24,6 @@ from foosim.protocol.messages import (
     Go,
     Heard,
     Join,
-    Received,
     Sent,
 )
 from foosim.protocol.names import nearest_name
@@ -129,7 +128,7 @@ class Sessions:
         session = self.by_name.get(hello.name)
         if session is None:
             session = self.by_name[hello.name] = Session(hello.name, hello.boot)
-        if hello.losses:
+        if hello.returns:
             downlink = min(hello.received, downlink)
         else:  # another process: the numbers of what the one before has sent are taken
             waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
@@ -146,7 +145,9 @@ class Sessions:
             build.deployment_name,
             build.deployment,
             build.run,
-            hello.losses,
+            state.branch,
+            state.closed,
+            hello.returns,
         )
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
 
@@ -230,10 +231,10 @@ class Sessions:
         self._waiting_bytes = sum(session.inbox_bytes for session in self.by_name.values())
         return taken
 
-    def say_go(self, session: Session, number: int, tick: int, packets: Sequence[Received], acknowledged: int) -> None:
+    def say_go(self, session: Session, go: Go) -> None:
         """Give a lockstep client its tick; to one that is away it is said when it is back."""
-        session.go = encode(Go(number, tick, acknowledged, list(packets)))
-        session.go_tick = tick
+        session.go = encode(go)
+        session.go_tick = go.tick
         session.done = None
         if session.is_present:
             self._actions.append(Publish(channels.DOWN, session.name, session.go))
@@ -264,7 +265,7 @@ class Sessions:
                 continue
             if now_ns >= session.heard_ns + limits.HEARTBEAT_NS:
                 session.heard, session.heard_ns = member.sequence, now_ns
-                self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence))))
+                self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence, state.branch))))
 
     def overdue(self, waited: Sequence[str], paused: bool, now_ns: int) -> list[Session]:
         """Return those whose deadline has passed; while the run is paused none passes."""

@@ -19,7 +19,7 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Delivered, Deliveries, Received, RobotPacket, Sent
+from foosim.protocol.messages import Delivered, Deliveries, Epoch, Received, RobotPacket, Sent
 from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.jitter import gamma_quantiles_ns
 from foosim.vhub.links import Link, LinkState
@@ -73,6 +73,7 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     links: list[tuple[str, str, int, int, int, int, int]]
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
+    branch: tuple[int, int]
     flights: list[_Flight]
 
 
@@ -107,6 +108,8 @@ class HubState:
         """What reaches robots at the last closed tick and at the next one."""
         self.final = first_tick
         """The last tick whose deliveries are final. Behind the next one they are without packets."""
+        self.branch = self.branch_tick = 0
+        """Number of the last branch, and the tick behind which it began; what is said from then on names it."""
         self.was_final = False
         """Whether the deliveries of the next tick were final before the last closing."""
         self.at_door: dict[str, int] = {}
@@ -122,6 +125,18 @@ class HubState:
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
         self._receivers: dict[tuple[str, str], tuple[str, ...]] = {}
+
+    def turn_to(self, epoch: Epoch) -> bool:
+        """Go on in the branch that an epoch is of; False when it is the present one.
+
+        Raises Malformed when that began before the last closed tick: what is closed here never changes.
+        """
+        if epoch.branch <= self.branch:
+            return False
+        if epoch.branch_tick < self.closed:
+            raise Malformed(f"branch {epoch.branch} from tick {epoch.branch_tick}, tick {self.closed} is closed")
+        self.branch, self.branch_tick = epoch.branch, epoch.branch_tick
+        return True
 
     # --- joining -----------------------------------------------------------------------------------------------------
 
@@ -188,10 +203,10 @@ class HubState:
         self.was_final = tick < self.final
         if self.was_final:
             assert not deliveries, f"deliveries {tick + 1} were final without packets"
-            return Deliveries(tick + 1, [])
+            return Deliveries(tick + 1, [], branch=self.branch)
         following = self._following(tick)
         self.final = tick + 1 + following
-        return Deliveries(tick + 1, deliveries, following)
+        return Deliveries(tick + 1, deliveries, following, self.branch)
 
     @property
     def hears_clients(self) -> bool:
@@ -358,6 +373,7 @@ class HubState:
                 ],
                 "deliveries": sorted(self.deliveries.items()),
                 "final": [self.final, self.was_final],
+                "branch": [self.branch, self.branch_tick],
                 "flights": [_pack(flight) for flight in self.in_flight()],
             }
         )
@@ -377,6 +393,7 @@ class HubState:
             state.links[source, destination] = link
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final
+        state.branch, state.branch_tick = content.branch
         if not {state.closed, state.closed + 1} <= state.deliveries.keys():
             raise Malformed(f"a state after tick {state.closed} without the deliveries of that tick and the next")
         for packed in content.flights:

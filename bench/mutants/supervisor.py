@@ -180,7 +180,7 @@ def _volatile(planting: Planting) -> None:
     planting.swap(take_over.TakeOver, "standing", _standing_without_epoch)
 
 
-def _standing_without_epoch(self: Any, standing: Any) -> bool:
+def _standing_without_epoch(self: Any, standing: Any, now_ns: int) -> bool:
     self._standing = self._standing or standing
     return True
 

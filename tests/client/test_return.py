@@ -12,6 +12,7 @@ from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.channels import Plane
 from foosim.protocol.codec import decode, decode_any, encode
+from foosim.protocol.hub_messages import Proceed
 from foosim.protocol.messages import Build, ClientWelcome, Deliveries
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import HubRecord, TickRecord
@@ -45,6 +46,7 @@ class Storm(Air):
         self.hub = HubCore("boot-2", bytes(32), self.now_ns)
         self.tell(channels.BUILD, "vhub", encode(Build("vhub", "boot-2", "first", run, NAME, TEXT, "fast", [])))
         self.hub.begin(recall(DEPLOYMENT, run, self.records, None, limits.DOWNLINK_KEPT_NS), self.now_ns)
+        self.tell(channels.PROCEED, "vhub", encode(Proceed("vhub", "boot-2", 0)))
         self.tick = self.closed()
 
     def settle(self, *clients: ClientCore) -> None:

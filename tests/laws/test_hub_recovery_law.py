@@ -174,7 +174,7 @@ def test_an_epoch_that_is_older_than_the_newest_in_the_journal_is_refused() -> N
     seen = fly([move, (60, kill_hub()), (100, forge), (130, kill_hub()), (160, forge)])
     assert_the_same(seen, undisturbed())
     assert cores[0] is not cores[1] and epochs == [2, 2]
-    assert all(core._epoch == 2 and set(core._owners.values()) == {"n1", "n2"} for core in cores)
+    assert all(core.epoch == 2 and set(core._owners.values()) == {"n1", "n2"} for core in cores)
 
 
 KILLS: Final = st.lists(

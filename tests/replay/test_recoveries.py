@@ -17,7 +17,7 @@ from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.replay_command import app
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify_capture
-from foosim.supervisor.account import Recovered, close_outages
+from foosim.supervisor.account import Recovered, close_outages, tell_again
 from foosim.supervisor.records import CommitRecord, Record, RecoveredRecord
 from foosim.vhub.capture_reader import open_capture
 
@@ -47,9 +47,9 @@ def lose_what_was_committed(system: System) -> None:
 
 def cut_behind_the_loss(system: System) -> None:
     system.kill(SUPERVISOR)
-    kinds = [type(decode_any(Record, raw)) for raw in system._journal]
+    kinds = [type(decode_any(Record, raw)) for raw in system.journal]
     noted = kinds.index(RecoveredRecord)
-    del system._journal[kinds.index(CommitRecord, noted) :]
+    del system.journal[kinds.index(CommitRecord, noted) :]
     system.start(SUPERVISOR)
 
 
@@ -104,7 +104,10 @@ def test_what_a_commit_cannot_tell_the_next_ones_do(more: int) -> None:
     """Nodes may come and go for as long as the world stands still."""
     count = limits.RECOVERIES_PER_COMMIT_MAX + more
     recovered = [Recovered("node", "n1", "", tick, 1) for tick in range(count)]
-    first, second = close_outages(recovered, 10, 30), close_outages(recovered, 30, 35)
+    first, second = close_outages(recovered, 10, 30, 7), close_outages(recovered, 30, 35, 8)
     assert first + second == recovered and len(first) == limits.RECOVERIES_PER_COMMIT_MAX
     assert [entry.outage_ns for entry in recovered] == [20] * len(first) + [5] * more
-    assert close_outages(recovered, 35, 40) == []
+    assert close_outages(recovered, 35, 40, 9) == []
+    tell_again(recovered, 7)
+    assert [entry.outage_ns for entry in recovered] == [20] * len(first) + [-1] * more, "the second commit is void"
+    assert close_outages(recovered, 40, 41, 8) == second

@@ -1,11 +1,16 @@
-"""A run in the background, whose launcher is killed with everything: another one goes on with it."""
+"""A run in the background, whose launcher is killed with everything: another one goes on with it, also when both
+journals have lost their ends, as with a machine that loses its power."""
 
 from __future__ import annotations
 
 import os
+import re
 import signal
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from foosim.protocol import channels
+from foosim.protocol.journal import journal_files, read_records
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.verify import verify_capture
 from foosim.supervisor.run_folder import open_run
@@ -17,6 +22,14 @@ if TYPE_CHECKING:
     from tests.wire.conftest import House
 
 BARE = ("--set", LONG, "--set", "players={}", "--set", "engine=pure")
+
+
+def tear(folder: Path, stem: str, count: int) -> None:
+    """Cut the last records off a journal, as a machine does that loses its power."""
+    path = journal_files(folder, stem)[-1]
+    records = read_records(path)
+    ends = [records.valid_bytes for _ in records]
+    os.truncate(path, ends[-count])
 
 
 def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
@@ -31,13 +44,16 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     folder = open_run("far")
     house.wait_for("all to be gone with it", lambda: folder.is_left() and not house.processes_with("--run far"))
     assert folder.result() is None
+    tear(folder.journals, channels.VHUB, 60)
+    tear(folder.journals, channels.SUPERVISOR, 9)
     up = house.start("foosim-supervisor", "up", "--resume", "far", "--json")
     house.ticking(before + 100)
     assert house.run("foosim-supervisor", "down")[0] == 0
     code, out, err = house.end(up)
     assert code == 0, err
     content = last_json(out)
-    assert "supervisor" in [entry["what"] for entry in content["recoveries"]]
+    told = {entry["what"]: entry["reason"] for entry in content["recoveries"]}
+    assert "supervisor" in told and re.fullmatch(r"branch from tick \d+: \d\d ticks are lost", told["vhub"])
     same = rehearse(house.table.read_text(), "table.yaml", content["ticks"], None, BARE[3::2]).json
     assert content["digest"] == same["digest"]
     assert open_capture(house.folder / "far.mcap").about.finished
