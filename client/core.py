@@ -180,10 +180,12 @@ class ClientCore:
 
     def hub_gone(self, now_ns: int) -> None:
         """The vHub's presence has ended: say hello until it is back. What is sent meanwhile is kept."""
-        if self.deployment is None or self.is_away or self.ended:
+        if self.deployment is None or self.ended:
+            return
+        self._gone += 1
+        if self.is_away:
             return
         self.is_away = True
-        self._gone += 1
         self._lost_ns = now_ns + self.deployment.deadlines.vhub_back_ns
         self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
         self._resend_ns = NEVER_NS
@@ -195,19 +197,9 @@ class ClientCore:
             self._again_ns = now_ns
 
     def statistics(self) -> ClientStatistics:
-        return ClientStatistics(
-            self._downlinks,
-            self._repeated,
-            self._missing,
-            self._malformed,
-            self._overflowed,
-            self._received,
-            self._sent,
-            self._answered,
-            self._unsent,
-            self._returns,
-            self._lost,
-        )
+        downlinks = self._downlinks, self._repeated, self._missing, self._malformed, self._overflowed
+        packets = self._received, self._sent, self._answered, self._unsent
+        return ClientStatistics(*downlinks, *packets, self._returns, self._lost)
 
     # --- what the client does --------------------------------------------------------------------------------------
 
@@ -314,7 +306,7 @@ class ClientCore:
         assert self.deployment is not None
         kept = self._unrecorded
         last = kept[0].sequence - 1 if kept else self._sequence
-        lost, ticks = max(0, last - welcome.sequence), max(0, self.tick - welcome.tick)
+        lost, ticks = max(0, last - welcome.sequence), max(0, self.tick - welcome.branch_tick)
         self._lost += lost
         self._unrecorded = deque(
             structs.replace(sent, sequence=number) for number, sent in enumerate(kept, welcome.sequence + 1)
@@ -323,8 +315,8 @@ class ClientCore:
         self._downlink = welcome.downlink
         self._missing -= len(self._gaps)
         self._gaps.clear()
-        self.branch, self.tick = welcome.branch, welcome.tick
-        self.branch_ns = max(0, self.tick) * self.deployment.tick_ns
+        self.branch, self.tick = welcome.branch, welcome.branch_tick
+        self.branch_ns = self.tick * self.deployment.tick_ns
         self.go, self._done, self._done_number = None, b"", -1
         self.arrivals = deque(packet for packet in self.arrivals if self._has_arrived(packet))
         what = f"{ticks} ticks of this client's and {lost} packets that were recorded in them are lost"
@@ -465,7 +457,8 @@ class ClientCore:
 
     def _say_hello(self) -> None:
         received = min(self._gaps, default=self._downlink + 1) - 1
-        hello = ClientHello(self.name, self.boot, limits.PROTOCOL_VERSION, self._world, received, self._gone)
+        who = self.name, self.boot, limits.PROTOCOL_VERSION, self._world
+        hello = ClientHello(*who, received, self._gone, self.branch)
         self.actions.append(Publish(channels.CLIENT_HELLO, self.name, encode(hello)))
 
     def _count_sent(self, sent: Sequence[Sent]) -> None:

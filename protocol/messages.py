@@ -365,10 +365,8 @@ class Subscription(Item, frozen=True):
 
 
 class ClientHello(Message, frozen=True, tag="clienthello"):
-    """A client asks to be let in. `received` is the last downlink number it has.
-
-    It goes on with its own numbers when it had been let in and has lost the vHub: `returns` is how often.
-    """
+    """A client asks to be let in. `received` is the last downlink number that it has, in `branch`. It goes on with its
+    own numbers when it had been let in and has lost the vHub: `returns` is how often."""
 
     name: Name
     boot: Name
@@ -376,13 +374,13 @@ class ClientHello(Message, frozen=True, tag="clienthello"):
     world: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     received: Counter
     returns: Counter = 0
+    branch: Counter = 0
 
 
 class ClientWelcome(Message, frozen=True):
     """The vHub accepts a client, as an answer to its hello with the same `returns`: numbers go on from `sequence`, the
     next downlink is `downlink` + 1. Everything up to `sequence` is recorded, nothing behind it is: who comes back sends
-    that again. `tick` is the last that is closed; who was here before the branch with this number knows more, and none
-    of that holds."""
+    that again. Who was here before the branch with this number knows more than `branch_tick`, which does not hold."""
 
     name: Name
     boot: Name
@@ -393,7 +391,7 @@ class ClientWelcome(Message, frozen=True):
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     run: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
     branch: Counter = 0
-    tick: Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)] = -1
+    branch_tick: Counter = 0
     returns: Counter = 0
 
 

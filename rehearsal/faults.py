@@ -96,7 +96,8 @@ def _kill(dice: Dice, names: Sequence[str]) -> Fault:
 def _end(system: System, name: str, names: Sequence[str]) -> None:
     """Kill a node; one is started at once if none is left, since no further tick would be committed."""
     system.kill(name)
-    if not any(other in system.processes for other in names):
+    stopped = system.supervisor.roster.stopped
+    if not any(other in system.processes and other not in stopped for other in names):
         system.start(name)
 
 
@@ -237,7 +238,8 @@ def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
         system.later(for_ms * MS, partial(_when_answered, system, asked, go_on))
 
     def go_on(system: System) -> None:
-        asked = [ask(system, "rate", pace=pace), ask(system, "resume")]
+        asked = [] if system.healed else [ask(system, "rate", pace=pace)]
+        asked.append(ask(system, "resume"))
         system.later(300 * MS, partial(_when_answered, system, asked, be_fast))
 
     def be_fast(system: System) -> None:

@@ -8,7 +8,7 @@ Neighbours: `swarm` flies seeds under it, `replica` computes again, `packet_laws
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final
 
 from msgspec.structs import replace
@@ -213,7 +213,12 @@ class Laws:
         self._captured_told = {tick for tick in self._captured_told if tick <= self.committed}
         self._untold = untold
 
-    def lose(self, records: int, captured: int) -> None:
+    def lose_supervisor(self, journal: Sequence[bytes]) -> None:
+        """The supervisor's machine is lost: of what no commit has told it knows what its journal has."""
+        left = fold_supervisor(self._deployment, journal).recovered
+        self._untold = [entry.message() for entry in left if entry.outage_ns < 0]
+
+    def lose_hub(self, records: int, captured: int) -> None:
         """The vHub's machine is lost with so many records; up to tick `captured` the capture holds what it held."""
         journal = self._journals[channels.VHUB]
         del journal[len(journal) - records :]

@@ -16,8 +16,8 @@ def lose_hub(system: System, records: int, back_ns: int = HUB_BACK_NS) -> None:
     if channels.VHUB not in system.processes or system.hub.ended is not None:
         return
     lost = system.hub_journal.lose(records)
-    if system.settings.on_loss is not None:
-        system.settings.on_loss(lost, system.hub_journal.captured_tick)
+    if system.settings.on_hub_loss is not None:
+        system.settings.on_hub_loss(lost, system.hub_journal.captured_tick)
     system.hub_journal.ending = None
     system.kill_hub("now", back_ns)
 
@@ -27,4 +27,6 @@ def lose_supervisor(system: System, records: int) -> None:
     journal = system.journal
     begun = next(at for at, raw in enumerate(journal) if isinstance(decode_any(Record, raw), CommitRecord))
     del journal[max(begun + 1, len(journal) - records) :]
+    if system.settings.on_supervisor_loss is not None:
+        system.settings.on_supervisor_loss(journal)
     system.kill(channels.SUPERVISOR)

@@ -6,7 +6,7 @@ Neighbours: `system` runs them.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -68,8 +68,10 @@ class Settings:
     on_commit: Callable[[Frame], None] | None = None
     on_closing: Callable[[Closing], None] | None = None
     on_epoch: Callable[[Epoch], None] | None = None
-    on_loss: Callable[[int, int], None] | None = None
+    on_hub_loss: Callable[[int, int], None] | None = None
     """Told of records that the vHub's journal has lost with a machine: how many, and up to which tick it is captured.
     """
+    on_supervisor_loss: Callable[[Sequence[bytes]], None] | None = None
+    """Told of the supervisor's journal that is left when its machine is lost."""
     on_say: Callable[[str, str, str], None] | None = None
     on_journal: Callable[[str, bytes], None] | None = None

@@ -230,7 +230,8 @@ class Flight:
             observer=self._see,
             observes=("journal", "publish"),
             on_closing=self.laws.close,
-            on_loss=self.laws.lose,
+            on_hub_loss=self.laws.lose_hub,
+            on_supervisor_loss=self.laws.lose_supervisor,
             on_commit=self._committed,
         )
         self.system = System(RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), plan.ticks), chosen)

@@ -129,7 +129,10 @@ class Sessions:
         if session is None:
             session = self.by_name[hello.name] = Session(hello.name, hello.boot)
         if hello.returns:
-            downlink = min(hello.received, downlink)
+            has = hello.received
+            if hello.branch != state.branch:
+                has = min(has, 0 if member is None else member.branched)
+            downlink = min(has, downlink)
         else:  # another process: the numbers of what the one before has sent are taken
             waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
             sequence = max([sequence, *(packet.sequence for packet in waiting)])
@@ -146,7 +149,7 @@ class Sessions:
             build.deployment,
             build.run,
             state.branch,
-            state.closed,
+            state.branch_tick,
             hello.returns,
         )
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))

@@ -51,6 +51,8 @@ class Member:
     downlink: int = 0
     """Number of the last message to the client."""
     active: bool = True
+    branched: int = 0
+    """The number of that message when the last branch began: what was said then behind it is void."""
 
     def is_due(self, tick: int) -> bool:
         return self.active and self.period > 0 and tick % self.period == 0
@@ -69,7 +71,7 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     closed: int
     packets: tuple[int, int, int, int]
     refusals: list[tuple[str, int]]
-    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool]]
+    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int]]
     links: list[tuple[str, str, int, int, int, int, int]]
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
@@ -136,6 +138,8 @@ class HubState:
         if epoch.branch_tick < self.closed:
             raise Malformed(f"branch {epoch.branch} from tick {epoch.branch_tick}, tick {self.closed} is closed")
         self.branch, self.branch_tick = epoch.branch, epoch.branch_tick
+        for member in self.members.values():
+            member.branched = member.downlink
         return True
 
     # --- joining -----------------------------------------------------------------------------------------------------
@@ -146,7 +150,7 @@ class HubState:
         subscriptions = tuple((robot, channel) for robot, channel in joining.subscriptions)
         member = self.members[joining.name] = Member(joining.period, subscriptions, tick)
         if known is not None:
-            member.sequence, member.downlink = known.sequence, known.downlink
+            member.sequence, member.downlink, member.branched = known.sequence, known.downlink, known.branched
         self._receivers.clear()
 
     def leave(self, name: str) -> None:
@@ -364,7 +368,7 @@ class HubState:
                 "packets": [self.packets.offered, self.packets.delivered, self.packets.dropped, self.packets.refused],
                 "refusals": sorted(self.refusals.items()),
                 "members": [
-                    [name, m.period, m.subscriptions, m.joined_tick, m.sequence, m.downlink, m.active]
+                    [name, m.period, m.subscriptions, m.joined_tick, m.sequence, m.downlink, m.active, m.branched]
                     for name, m in sorted(self.members.items())
                 ],
                 "links": [

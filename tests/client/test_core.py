@@ -59,6 +59,7 @@ class Air:
     def __init__(self) -> None:
         self.now_ns = 0
         self.tick = -1
+        self.epoch = 1
         self.hub = HubCore("boot", bytes(32), 0)
         self.deliveries: list[Deliveries] = []
         self._said: list[Publish] = []
@@ -110,7 +111,7 @@ class Air:
         self.tick += 1
         self.now_ns += DEPLOYMENT.tick_ns
         frame = Frame(self.tick, LAYOUT, NUMBERS, {})
-        commit = Commit(1, self.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, [], False)
+        commit = Commit(self.epoch, self.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, [], False)
         self.tell(channels.COMMIT, channels.VHUB, encode(commit))
         robots = [entity.name for entity in LAYOUT.robots]
         packet = RobotPacket("red.goal", 0, "", "encoder", b"%16d" % self.tick)
