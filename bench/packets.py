@@ -178,13 +178,13 @@ class Talk:
         core.begin(self._journal.past(core, RUN), 0)
         self._perform()
         for name in (*self._clients, EAR):
-            self._come(name, again=self.count.crashes > 0)
+            self._come(name, self.count.crashes)
         owners = [(robot, "n1") for robot in self._robots]
         self._say(channels.EPOCH, SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [], b"")))
         self._say(channels.TEMPO, SUPERVISOR, encode(Tempo("fast", False)))
 
-    def _come(self, name: str, again: bool) -> None:
-        hello = ClientHello(name, "one", limits.PROTOCOL_VERSION, "", 0, again)
+    def _come(self, name: str, losses: int) -> None:
+        hello = ClientHello(name, "one", limits.PROTOCOL_VERSION, "", 0, losses)
         self._say(channels.CLIENT_HELLO, name, encode(hello))
         wanted = [Subscription(robot, sensor) for robot, _, sensor in self._sensed] if name == EAR else []
         self._say(channels.UP, name, encode(Join(name, "one", 0, wanted)))
@@ -244,7 +244,7 @@ class Talk:
         if tick % AWAY_EVERY == AWAY_AT:
             self.core.client_gone(EAR, tick * self.deployment.tick_ns)
         elif tick % AWAY_EVERY == BACK_AT:
-            self._come(EAR, again=False)
+            self._come(EAR, 0)
 
     def _recorded(self, name: str) -> int:
         assert self.core.state is not None
