@@ -1,14 +1,14 @@
 """Looks whether a deployment could run here, before it does: what is fine, what is not, and what to do.
 
 Each check is a function that gives findings about one subject, and a row of `CHECKS`; nothing is changed, nothing is
-started. Checks of one host are about the machine they run on: for another one, the same command runs there, and its
-findings come home as JSON. Neighbours: `doctor_command`, `protocol.certificates`.
+started. Checks are about the machine they run on, which is the supervisor's or a host of the deployment: they run on
+each host, too, and their findings come home. Neighbours: `doctor_hosts` asks the hosts, `doctor_there` is their side,
+`doctor_command`, `protocol.certificates`.
 """
 
 from __future__ import annotations
 
 import ctypes
-import errno
 import importlib.metadata
 import os
 import platform
@@ -16,15 +16,18 @@ import shutil
 import socket
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
 from packaging.requirements import Requirement
 
-from foosim.protocol import identity, limits, wall
+from foosim.protocol import limits, wall
 from foosim.protocol.addresses import Address, check_listen
 from foosim.protocol.certificates import (
+    CA_FILE,
     CA_KEY_FILE,
     KEY_SUFFIX,
     PASSWORD_SUFFIX,
@@ -41,8 +44,16 @@ from foosim.protocol.certificates import (
 )
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Refused
 from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.hosts import places
+from foosim.supervisor.guard import hosted_folder
+from foosim.supervisor.install import SYSTEM_FOLDER, USER_FOLDER
+from foosim.supervisor.pki_hosts import identities_on, passwords_of
+from foosim.supervisor.reach import REMEDIES, listen
+from foosim.supervisor.remote import unit_name
 from foosim.supervisor.run_folder import runs_folder
+from foosim.supervisor.units import units_of
 
 State = Literal["fine", "warning", "problem"]
 
@@ -76,11 +87,39 @@ class Case:
     insecure: bool = False
     pki: Path | None = None
     captures: Path = Path("captures")
+    host: str | None = None
+    """Which host of the deployment this machine is; None is the supervisor's."""
+    ca: str = ""
+    """On a host: the fingerprint of the root that the run has; empty for a run without certificates."""
+
+    @property
+    def is_there(self) -> bool:
+        return self.host is not None
+
+    @property
+    def address(self) -> Address:
+        """Where the supervisor would listen."""
+        return check_listen(self.listen, self.insecure, 2, self.pki is not None or bool(self.ca))
+
+    @property
+    def radio(self) -> Address:
+        """Where the vHub would."""
+        address, place = self.address.next_port(), places(self.deployment).get(VHUB)
+        return address if place is None else replace(address, host=self.deployment.hosts[place].address)
+
+    @property
+    def has_vhub(self) -> bool:
+        """Whether the vHub is to run on this machine."""
+        return places(self.deployment).get(VHUB) == self.host
+
+    def issued(self, remedy: str) -> str:
+        """Return a remedy that is carried out where certificates are issued, which a host is not."""
+        return f"{remedy}, then foosim-pki send DIR {self.host} FILE" if self.is_there else remedy
 
 
 def examine(case: Case) -> list[Finding]:
     """Return the findings of all checks on this machine, in the order of the checks."""
-    return [finding for name, check in CHECKS.items() for finding in _made(name, check(case))]
+    return [Finding(name, *said, host=case.host or HERE) for name, check in CHECKS.items() for said in check(case)]
 
 
 def is_well(findings: Iterable[Finding]) -> bool:
@@ -90,11 +129,6 @@ def is_well(findings: Iterable[Finding]) -> bool:
 
 _Said = tuple[str, State, str, str]
 """Subject, state, text, remedy."""
-
-
-def _made(name: str, said: Iterable[_Said]) -> Iterator[Finding]:
-    for subject, state, text, remedy in said:
-        yield Finding(name, subject, state, text, remedy)
 
 
 # --- versions --------------------------------------------------------------------------------------------------------
@@ -134,45 +168,67 @@ def _arithmetic(case: Case) -> Iterator[_Said]:
 
 
 def _certificates(case: Case) -> Iterator[_Said]:
-    """Everybody's certificate or password: there, of this root, its own key, valid, for the right host."""
+    """The certificate or password of everybody here: there, of this root, its own key, valid, for the right host."""
     folder = case.pki
+    if folder is None and case.ca:
+        remedy = (
+            f"say in hosts.{case.host}.pki in which folder they are to be, then foosim-pki send DIR {case.host} FILE"
+        )
+        yield "folder", "problem", "the deployment does not say where they are on this host", remedy
+        return
     if folder is None:
         yield "folder", "fine", "none: only this machine can take part, or whoever reaches it with --insecure", ""
         return
     try:
-        read_ca(folder, wall.now_utc())
+        ca = read_ca(folder, wall.now_utc())
     except CertificateError as error:
-        yield "ca.pem", "problem", error.what, f"foosim-pki init {folder}"
+        remedy = f"foosim-pki send DIR {case.host} FILE" if case.is_there else f"foosim-pki init {folder}"
+        yield CA_FILE, "problem", error.what, remedy
         return
-    yield "ca.pem", "fine", "", ""
+    if case.ca not in ("", fingerprint(ca)):
+        yield CA_FILE, "problem", "another root than the run's", f"foosim-pki send DIR {case.host} FILE"
+        return
+    yield CA_FILE, "fine", "", ""
     if (folder / CA_KEY_FILE).exists():
-        yield (
-            CA_KEY_FILE,
-            "warning",
-            "is beside the certificates",
-            "keep it where certificates are issued",
-        )
-    for who in identity.identities_of(case.deployment):
-        yield _certificate(folder, who, case)
+        remedy = "remove it there" if case.is_there else "keep it where certificates are issued"
+        yield CA_KEY_FILE, "problem" if case.is_there else "warning", "is beside the certificates", remedy
+    here = identities_on(case.deployment, case.host)
+    passwords = passwords_of(case.deployment, here)
+    for who in dict.fromkeys([*here, *passwords]):
+        yield _password(folder, who, case) if who in passwords else _certificate(folder, who, case)
     for path in sorted((*folder.glob(f"*{KEY_SUFFIX}"), *folder.glob(f"*{PASSWORD_SUFFIX}"))):
         if path.stat().st_mode & 0o077:
             yield path.name, "problem", "can be read by others", f"chmod 600 {path}"
 
 
+def fingerprint(certificate: x509.Certificate) -> str:
+    """Return what tells a certificate from all others, in hex."""
+    return certificate.fingerprint(hashes.SHA256()).hex()
+
+
+def _password(folder: Path, who: str, case: Case) -> _Said:
+    """Look at a client's password, and that it has no certificate beside it."""
+    try:
+        read_password(folder / f"{who}{PASSWORD_SUFFIX}")
+    except CertificateError as error:
+        return who, "problem", error.what, case.issued(f"foosim-pki issue {_folder(case)} {who} --password")
+    if certificate_path(folder, who).exists():
+        return who, "problem", "has a password and a certificate, which this run does not take", "remove its .pem"
+    return who, "fine", "has a password", ""
+
+
+def _folder(case: Case) -> Path:
+    """Return the folder in which certificates are issued, as a remedy names it."""
+    assert case.pki is not None
+    return Path("DIR") if case.is_there else case.pki
+
+
 def _certificate(folder: Path, who: str, case: Case) -> _Said:
-    """Look at what one of the run shows; where clients have passwords, at a client's."""
-    if who.startswith("client.") and case.deployment.access.radio == "password":
-        path = folder / f"{who}{PASSWORD_SUFFIX}"
-        try:
-            read_password(path)
-        except CertificateError as error:
-            return who, "problem", error.what, f"foosim-pki issue {folder} {who} --password"
-        if certificate_path(folder, who).exists():
-            return who, "problem", "has a password and a certificate, which this run does not take", "remove its .pem"
-        return who, "fine", "has a password", ""
-    path = certificate_path(folder, who)
+    """Look at the certificate that one of the run shows."""
+    path, issuing = certificate_path(folder, who), _folder(case)
     if not path.exists():
-        return who, "problem", "no certificate", f"foosim-pki issue {folder} {who}"
+        remedy = f"foosim-pki send DIR {case.host} FILE" if case.is_there else f"foosim-pki issue {issuing} {who}"
+        return who, "problem", "no certificate", remedy
     try:
         now = wall.now_utc()
         found = read_certificate(path)
@@ -180,16 +236,17 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
         check_key(key_path(folder, who), found)
         credentials = load_credentials(folder, who)
     except CertificateError as error:
-        return who, "problem", error.what, f"foosim-pki renew {folder} {who}, or remove both files and issue anew"
+        remedy = f"foosim-pki renew {issuing} {who}, or remove both files and issue anew"
+        return who, "problem", error.what, case.issued(remedy)
     assert credentials is not None
-    address = check_listen(case.listen, case.insecure, 2, secured=True)
+    address = {SUPERVISOR: case.address, VHUB: case.radio}.get(who)
     hosts = [host.lower() for host in hosts_of(found)]
-    if who in (SUPERVISOR, VHUB) and not address.is_wildcard and address.host.strip("[]").lower() not in hosts:
-        remedy = f"foosim-pki renew {folder} {who} --host {address.host}"
+    if address is not None and not address.is_wildcard and address.host.strip("[]").lower() not in hosts:
+        remedy = case.issued(f"foosim-pki renew {issuing} {who} --host {address.host}")
         return who, "problem", f"is for {', '.join(hosts)}, not for {address.host}", remedy
     soon = credentials.ends_soon(wall.now_utc())
     if soon:
-        return who, "warning", soon, f"foosim-pki renew {folder} {who}"
+        return who, "warning", soon, case.issued(f"foosim-pki renew {issuing} {who}")
     return who, "fine", f"until {found.not_valid_after_utc:%Y-%m-%d}", ""
 
 
@@ -197,28 +254,20 @@ def _certificate(folder: Path, who: str, case: Case) -> _Said:
 
 
 def _ports(case: Case) -> Iterator[_Said]:
-    """Whether both planes can listen where they are asked to."""
-    address = check_listen(case.listen, case.insecure, 2, case.pki is not None)
-    for plane, its in (("simulation plane", address), ("radio plane", address.next_port())):
-        yield _port(plane, its)
+    """Whether those who listen on this machine can, where they are asked to."""
+    if not case.is_there:
+        yield _port("simulation plane", case.address)
+    if case.has_vhub:
+        yield _port("radio plane", case.radio)
 
 
 def _port(plane: str, address: Address) -> _Said:
-    host = address.host.strip("[]")
     try:
-        family, kind, number, _, place = socket.getaddrinfo(host, address.port, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, kind, number) as tried:
-            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            tried.bind(place)
+        listen(address).close()
     except socket.gaierror as error:
         return plane, "problem", f"{address}: no such host, {error.strerror}", "give a name or address of this machine"
     except OSError as error:
-        remedies = {
-            errno.EADDRINUSE: "end what listens there, or take another port",
-            errno.EADDRNOTAVAIL: "give an address of this machine, see `ip address`",
-            errno.EACCES: "take a port above 1023",
-        }
-        return plane, "problem", f"{address}: {error.strerror}", remedies.get(error.errno or 0, "take another address")
+        return plane, "problem", f"{address}: {error.strerror}", REMEDIES.get(error.errno or 0, "take another address")
     return plane, "fine", f"{address} is free" if address.port else f"{address}: the system chooses a free port", ""
 
 
@@ -243,7 +292,8 @@ def _clock_state() -> int:
 
 def _disk(case: Case) -> Iterator[_Said]:
     """Room and the right to write where runs keep journals and captures go."""
-    for subject, folder in (("runs", runs_folder()), ("captures", case.captures)):
+    here = {"runs": runs_folder(), "captures": case.captures}
+    for subject, folder in ({"runs": hosted_folder()} if case.is_there else here).items():
         place = folder.absolute()
         while not place.exists():
             place = place.parent
@@ -270,6 +320,38 @@ def _commands(case: Case) -> Iterator[_Said]:
             yield name, "fine", found, ""
 
 
+def is_users_systemd() -> bool:
+    """Whether this user's units are those of a user's own systemd."""
+    return os.geteuid() != 0
+
+
+def _units(case: Case) -> Iterator[_Said]:
+    """On a host: the units of the nodes that systemd is to run there, as they would be written now."""
+    nodes, own = case.deployment.nodes, case.host
+    if own is None:
+        return
+    wanted = [name for name, host in places(case.deployment).items() if host == own and name in nodes]
+    wanted = [name for name in wanted if nodes[name].launch == "systemd"]
+    if not wanted:
+        return
+    secured = " --pki DIR" if case.ca else ""
+    remedy = f"foosim-supervisor install {case.host} FILE{secured}, with the run's --listen and --set"
+    is_users = is_users_systemd()
+    folder = Path(os.path.expandvars(USER_FOLDER if is_users else SYSTEM_FOLDER))
+    try:
+        units = units_of(case.deployment, own, case.address, is_users)
+    except Refused as refused:
+        yield "units", "problem", refused.what, remedy
+        return
+    for name in map(unit_name, wanted):
+        try:
+            is_same = (folder / name).read_text() == units[name]
+        except OSError:
+            yield name, "problem", f"not in {folder}", remedy
+            continue
+        yield (name, "fine", "", "") if is_same else (name, "warning", "is not as it would be written now", remedy)
+
+
 CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
     "versions": _versions,
     "arithmetic": _arithmetic,
@@ -278,5 +360,6 @@ CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
     "ports": _ports,
     "clock": _clock,
     "disk": _disk,
+    "units": _units,
 }
 """Every check by its name, in the order in which they are shown."""

@@ -34,14 +34,20 @@ BLOCK_BYTES: Final = 1 << 20
 TAKE_OVER_S: Final = 10.0
 
 Run = Annotated[str, typer.Argument(help="Which run.", show_default=False)]
+VersionOfLauncher = Annotated[str, typer.Option(help="Refuse another version of foosim than this.")]
 File = Annotated[str, typer.Argument(help="Which file of the run's folder.", show_default=False)]
+
+
+def hosted_folder() -> Path:
+    """Return the folder of the runs that have processes on this machine, and their supervisor elsewhere."""
+    return platformdirs.user_state_path("foosim") / "hosts"
 
 
 def run_folder(run: str) -> Path:
     """Return the folder of a run on this machine, on which its supervisor is not."""
     if not is_name(run):
         raise BadValue(f"not a run: {NAME_RULE}", run)
-    return platformdirs.user_state_path("foosim") / "hosts" / run
+    return hosted_folder() / run
 
 
 class Guard:
@@ -158,6 +164,14 @@ def send(run: str, file: str) -> None:
     out.flush()
 
 
+def _check_version(version_of_launcher: str) -> None:
+    """End this process when the launcher has another version of foosim."""
+    here = version("foosim")
+    if version_of_launcher not in ("", here):
+        print(f"{GUARD}: foosim {here} is installed there, the run has {version_of_launcher}", file=sys.stderr)
+        raise typer.Exit(OTHER_VERSION)
+
+
 app = new_app()
 
 
@@ -171,14 +185,21 @@ def run_command(
     run: Run,
     name: Annotated[str, typer.Argument(help="Which process of it.", show_default=False)],
     command: Annotated[list[str], typer.Argument(help="What to start.", show_default=False)],
-    version_of_launcher: Annotated[str, typer.Option(help="Refuse another version of foosim than this.")] = "",
+    version_of_launcher: VersionOfLauncher = "",
 ) -> None:
     """Run a process of a run until standard input ends."""
-    here = version("foosim")
-    if version_of_launcher not in ("", here):
-        print(f"{GUARD}: foosim {here} is installed there, the run has {version_of_launcher}", file=sys.stderr)
-        raise typer.Exit(OTHER_VERSION)
+    _check_version(version_of_launcher)
     raise typer.Exit(Guard(run, name).run(command))
+
+
+@app.command("examine")
+def examine_command(version_of_launcher: VersionOfLauncher = "") -> None:
+    """Answer a doctor on another machine how this one is, over standard input and output."""
+    _check_version(version_of_launcher)
+    from foosim.supervisor.doctor_there import serve  # a guard of a process starts quickly
+
+    serve(sys.stdin.buffer, sys.stdout.buffer)
+    raise typer.Exit(DONE)
 
 
 @app.command("send")

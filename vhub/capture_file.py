@@ -12,6 +12,7 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Final
 
@@ -24,7 +25,7 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch, Origin
 from foosim.vhub.mcap_file import McapWriter
-from foosim.vhub.mcap_scan import Scanned, scan
+from foosim.vhub.mcap_scan import UNSYNCED_BYTES, Scanned, scan
 from foosim.vhub.packet import IN_FLIGHT
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import (
@@ -130,10 +131,13 @@ class CaptureFile:
 
     With `journal_tick`, a file that is there is one that this run left unfinished: it is gone on with, and `torn_bytes`
     of it were cut off. A journal has all ticks from that one on: bytes that are damaged, not just cut, are only given
-    up when it does. A file that ends before its description is begun anew; one that has its end is refused.
+    up when it does. A file that ends before its description is begun anew; one that has its end is refused. `at_once`:
+    a run waits, and what was synced long ago is not looked through.
     """
 
-    def __init__(self, path: Path, described: Described, journal_tick: int | None = None) -> None:
+    def __init__(
+        self, path: Path, described: Described, journal_tick: int | None = None, *, at_once: bool = False
+    ) -> None:
         self.path = path
         self.done = Progress()
         self.torn_bytes = 0
@@ -147,7 +151,7 @@ class CaptureFile:
         self._file = self._open(journal_tick is not None)
         try:
             run = described.metadata.get("run", "")
-            found = None if journal_tick is None else self._scanned(journal_tick, run)
+            found = None if journal_tick is None else self._scanned(journal_tick, run, at_once)
             self.mcap = McapWriter(self._write_bytes, PROFILE, None if found is None else found.book)
             if found is None:
                 self._channels = self._declare()
@@ -315,10 +319,15 @@ class CaptureFile:
 
     # --- a file that was left unfinished -----------------------------------------------------------------------------
 
-    def _scanned(self, journal_tick: int, run: str) -> Scanned | None:
+    def _scanned(self, journal_tick: int, run: str, at_once: bool) -> Scanned | None:
         """Return what the file has, cut at its last whole record; None when it has to be begun anew."""
         with os.fdopen(os.dup(self._file), "rb") as stream:
-            found = scan(stream, os.fstat(self._file).st_size, str(self.path))
+            size = os.fstat(self._file).st_size
+            if at_once and size > UNSYNCED_BYTES:
+                with mmap(self._file, size - UNSYNCED_BYTES, access=ACCESS_READ) as old, memoryview(old) as trusted:
+                    found = scan(stream, size, str(self.path), trusted)
+            else:
+                found = scan(stream, size, str(self.path))
         if found.finished:
             raise CaptureError(f"{self.path}: is finished; a capture is never overwritten")
         if found.metadata.get(METADATA, {}).get("run", run) != run:

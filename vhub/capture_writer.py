@@ -97,7 +97,8 @@ class CaptureWriter:
         """Whether the thread waits to be told of the next row."""
         self._changed = threading.Condition()
         """Guards the queue, the error and the ends; notified when any of them changes in a way that is waited for."""
-        self._file = CaptureFile(path, Described(deployment, deployment_name, deployment_text, metadata), journal_tick)
+        described = Described(deployment, deployment_name, deployment_text, metadata)
+        self._file = CaptureFile(path, described, journal_tick, at_once=True)
         self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
         """How far the file was that is gone on with."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)

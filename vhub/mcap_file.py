@@ -39,8 +39,10 @@ _INDEX: Final = struct.Struct("<BQHI")
 INDEX_FIELDS: Final = struct.Struct("<HI")
 _CHUNK: Final = struct.Struct("<BQQQQII4sQ")
 CHUNK_FIELDS: Final = struct.Struct("<QQQII")
+CHUNK_HEAD_BYTES_MAX: Final = CHUNK_FIELDS.size + 64
+"""Its fields, and the name of a compression."""
 _FOOTER_START: Final = struct.Struct("<BQQQ")
-_U64: Final = struct.Struct("<Q")
+PLACE: Final = struct.Struct("<Q")
 
 assert sys.byteorder == "little", "indexes are written as the machine has them"
 
@@ -426,8 +428,8 @@ def unpack_chunk(content: bytes, place: str) -> bytes:
     _, _, size, checksum, name_length = CHUNK_FIELDS.unpack_from(content)
     at = CHUNK_FIELDS.size + name_length
     compression = content[CHUNK_FIELDS.size : at].decode()
-    (length,) = _U64.unpack_from(content, at)
-    data = content[at + _U64.size :]
+    (length,) = PLACE.unpack_from(content, at)
+    data = content[at + PLACE.size :]
     if size > CHUNK_BYTES_MAX:
         raise CaptureError(f"{place}: a chunk of {size} bytes, at most {CHUNK_BYTES_MAX} are read")
     if length != len(data):

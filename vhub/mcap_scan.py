@@ -1,17 +1,19 @@
 """The whole records of an MCAP file that has no end, so that a writer can go on behind them.
 
 A process that is killed leaves a record that is cut; a machine that loses its power may leave bytes that were never
-written. Everything before is kept, chunk by chunk, each with its checksum; nothing behind is. Neighbours: `mcap_file`
-(the container), `capture_writer` (goes on), `capture_recovery` (completes).
+written. Everything before is kept, chunk by chunk, each with its checksum; nothing behind is. Who is in a hurry looks
+at the heads of old chunks only: what was synced long ago is there. Neighbours: `mcap_file` (the container),
+`capture_writer` (goes on), `capture_recovery` (completes).
 """
 
 from __future__ import annotations
 
 import struct
 from array import array
+from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
-from typing import BinaryIO
+from typing import BinaryIO, Final
 
 import zstandard
 from mcap import records
@@ -22,15 +24,25 @@ from mcap.opcode import Opcode
 from foosim.vhub.mcap_file import (
     CHUNK_BYTES_MAX,
     CHUNK_FIELDS,
+    CHUNK_HEAD_BYTES_MAX,
     INDEX_FIELDS,
     MAGIC,
     MESSAGE_FIELDS,
+    PLACE,
     RECORD,
     Book,
     chunk_records,
     unpack_chunk,
 )
 from foosim.vhub.rows import CaptureError
+
+NOTHING: Final = memoryview(b"")
+UNSYNCED_BYTES: Final = 8 * 1024 * 1024
+"""More than is written between two syncs, a second apart: what stands before that is on the disk."""
+
+
+_DAMAGED: Final = (EndOfFile, struct.error, ValueError, KeyError, IndexError, CaptureError, zstandard.ZstdError)
+"""What reading a record raises that is not what was written."""
 
 
 @dataclass(slots=True)
@@ -56,11 +68,18 @@ class Scanned:
         return self.size - self.book.offset
 
 
-def scan(stream: BinaryIO, size: int, name: str) -> Scanned:
+def scan(stream: BinaryIO, size: int, name: str, trusted: memoryview = NOTHING) -> Scanned:
     """Read a file's records up to the first that is cut or damaged, or its end.
 
-    Raises CaptureError when it does not start as an MCAP file does, with as much as it has.
+    `trusted` is the file's beginning of which only the heads of records are looked at, unless they are damaged. Raises
+    CaptureError when it does not start as an MCAP file does, with as much as it has.
     """
+    if trusted:
+        with suppress(*_DAMAGED):
+            found = _Scan(stream, size, name).run(trusted)
+            if found.book.offset >= len(trusted):
+                return found
+        stream.seek(0)
     return _Scan(stream, size, name).run()
 
 
@@ -75,16 +94,57 @@ class _Scan:
         """The records of the last chunk."""
         self._indexed = 0
         """How many of its messages are indexed."""
+        self._places: dict[int, tuple[int, int, int]] = {}
+        """By channel, the last message in a chunk that was not unpacked: the chunk's start and stop, its own place."""
 
-    def run(self) -> Scanned:
+    def run(self, trusted: memoryview = NOTHING) -> Scanned:
         start = self._stream.read(len(MAGIC))
         if not MAGIC.startswith(start):
             raise CaptureError(f"{self._name}: no MCAP file, it does not start with {MAGIC!r}")
         self._book.offset = len(MAGIC) if start == MAGIC else 0
+        if self._book.offset and trusted:
+            self._pass_over(trusted)
         while self._book.offset and self._next():
             continue
         self._look_at_the_last_chunk()
+        self._read_places()
         return self._found
+
+    def _pass_over(self, content: memoryview) -> None:
+        """Take records by their heads, chunks without their content, up to the last that is whole."""
+        book, stop = self._book, len(content)
+        while (at := book.offset + RECORD.size) <= stop:
+            opcode, length = RECORD.unpack_from(content, book.offset)
+            if at + length > stop or not 1 <= opcode < Opcode.DATA_END:
+                break
+            if opcode == Opcode.CHUNK:
+                self._indexed = 0
+                self._note_chunk(bytes(content[at : at + CHUNK_HEAD_BYTES_MAX]), length)
+            elif opcode == Opcode.MESSAGE_INDEX:
+                self._pass_index(content, at, length)
+            else:
+                self._take(opcode, bytes(content[at : at + length]))
+            book.offset = at + length
+        self._stream.seek(book.offset)
+        if book.chunks:  # further indexes of it may come
+            last = book.chunks[-1]
+            start, stop = last.chunk_start_offset + RECORD.size, last.chunk_start_offset + last.chunk_length
+            self._chunk = unpack_chunk(bytes(content[start:stop]), self._name)
+
+    def _pass_index(self, content: memoryview, at: int, length: int) -> None:
+        channel, size = INDEX_FIELDS.unpack_from(content, at)
+        (place,) = PLACE.unpack_from(content, at + length - PLACE.size)
+        last = self._book.chunks[-1]
+        start, stop = last.chunk_start_offset + RECORD.size, last.chunk_start_offset + last.chunk_length
+        self._places[channel] = start, stop, place
+        self._note_index(channel, size // (2 * PLACE.size), at - RECORD.size, RECORD.size + length)
+
+    def _read_places(self) -> None:
+        """Read the last messages of topics that had none in the chunks that were unpacked."""
+        for channel, (start, stop, place) in self._places.items():
+            if self._topics[channel] not in self._found.last:
+                self._stream.seek(start)
+                self._note_last(channel, unpack_chunk(self._stream.read(stop - start), self._name), place)
 
     def _next(self) -> bool:
         """Take the next record; False at the first that is not whole, and where the data end."""
@@ -105,7 +165,7 @@ class _Scan:
             return False
         try:
             self._take(opcode, content)
-        except (EndOfFile, struct.error, ValueError, KeyError, IndexError, CaptureError, zstandard.ZstdError):
+        except _DAMAGED:
             self._found.is_cut = False
             return False
         self._book.offset += RECORD.size + length
@@ -131,23 +191,27 @@ class _Scan:
             book.metadata.append(records.MetadataIndex(offset=offset, length=length, name=metadata.name))
             self._found.metadata[metadata.name] = metadata.metadata
         elif opcode == Opcode.CHUNK:
-            self._take_chunk(content, offset, length)
+            self._take_chunk(content)
         elif opcode == Opcode.MESSAGE_INDEX:
             self._take_index(content, offset, length)
 
-    def _take_chunk(self, content: bytes, offset: int, length: int) -> None:
+    def _take_chunk(self, content: bytes) -> None:
         chunk = unpack_chunk(content, self._name)
+        self._note_chunk(content, len(content))
+        self._chunk, self._indexed = chunk, 0
+
+    def _note_chunk(self, content: bytes, length: int) -> None:
+        """Enter a chunk of so many bytes into the book; `content` is its beginning at least."""
         first_ns, last_ns, size, _, name_length = CHUNK_FIELDS.unpack_from(content)
         name = content[CHUNK_FIELDS.size : CHUNK_FIELDS.size + name_length].decode()
-        self._chunk, self._indexed = chunk, 0
         book = self._book
         book.start_ns, book.end_ns = min(book.start_ns, first_ns), max(book.end_ns, last_ns)
         book.chunks.append(
             records.ChunkIndex(
-                chunk_start_offset=offset,
-                chunk_length=length,
+                chunk_start_offset=book.offset,
+                chunk_length=RECORD.size + length,
                 compression=name,
-                compressed_size=len(content) - CHUNK_FIELDS.size - name_length - 8,
+                compressed_size=length - CHUNK_FIELDS.size - name_length - PLACE.size,
                 uncompressed_size=size,
                 message_start_time=first_ns,
                 message_end_time=last_ns,
@@ -162,11 +226,17 @@ class _Scan:
         entries = array("Q", content[INDEX_FIELDS.size :])
         if size != 8 * len(entries) or not entries or channel not in self._topics:
             raise ValueError(f"an index of {size} bytes for channel {channel}")
-        _, start, stop = next(chunk_records(self._chunk[entries[-1] :]))
-        at = entries[-1]
-        self._found.last[self._topics[channel]] = self._chunk[at + start + MESSAGE_FIELDS.size : at + stop]
-        self._book.counts[channel] += len(entries) // 2
-        self._indexed += len(entries) // 2
+        self._note_last(channel, self._chunk, entries[-1])
+        self._note_index(channel, len(entries) // 2, offset, length)
+
+    def _note_last(self, channel: int, chunk: bytes, at: int) -> None:
+        _, start, stop = next(chunk_records(chunk[at:]))
+        self._found.last[self._topics[channel]] = chunk[at + start + MESSAGE_FIELDS.size : at + stop]
+
+    def _note_index(self, channel: int, count: int, offset: int, length: int) -> None:
+        """Enter an index of so many messages in the last chunk into the book."""
+        self._book.counts[channel] += count
+        self._indexed += count
         last = self._book.chunks[-1]
         last.message_index_offsets[channel] = offset
         last.message_index_length += length

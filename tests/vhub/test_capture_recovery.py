@@ -12,10 +12,12 @@ from mcap.reader import make_reader
 
 from foosim.protocol.errors import Refused
 from foosim.protocol.journal import Journal, JournalError
+from foosim.vhub import capture_file
 from foosim.vhub.capture_reader import capture_info, open_capture
 from foosim.vhub.capture_recovery import UNCLEAN, Recovered, recover_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.mcap_file import MAGIC, McapFile, Message
+from foosim.vhub.mcap_scan import UNSYNCED_BYTES
 from foosim.vhub.rows import CaptureError
 
 if TYPE_CHECKING:
@@ -208,8 +210,12 @@ def test_no_capture_is_refused(tmp_path: Path) -> None:
         assert (tmp_path / "cut.mcap").read_bytes() == content
 
 
-def test_a_writer_goes_on_with_what_it_left(chunked: bytes, path: Path, hub_run: HubRun, tmp_path: Path) -> None:
+@pytest.mark.parametrize("unsynced", [1000, UNSYNCED_BYTES])
+def test_a_writer_goes_on_with_what_it_left(
+    chunked: bytes, path: Path, hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unsynced: int
+) -> None:
     """As a vHub does that was killed and started again: it feeds all of its journal, and the run goes on."""
+    monkeypatch.setattr(capture_file, "UNSYNCED_BYTES", unsynced)
     whole = rows(path, 64)
     for size in (10, first_chunk(chunked), len(chunked) // 2, len(chunked) - 3000):
         going = cut(tmp_path, chunked[:size])

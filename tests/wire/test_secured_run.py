@@ -4,10 +4,11 @@ import json
 from pathlib import Path
 
 from foosim.client.client import connect
-from foosim.protocol.deployment_file import apply_sets, read_deployment_text
-from foosim.protocol.units import parse_pace
+from foosim.protocol.certificates import operator_credentials
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor import control, pki
+from foosim.supervisor.control import Control
+from foosim.vhub.capture_reader import open_capture
 from tests.wire.conftest import House
 
 CLIENTS = ("--set", "clients={hand: {}}", "--set", "players={}")
@@ -45,16 +46,36 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     assert code == 0, output
 
 
-def test_certificates_change_nothing_in_the_world(house: House) -> None:
+def went_on(desk: Control, *what: str) -> bool:
+    """Whether all of this was lost or came, and the run went on each time."""
+    entries = desk.status()["recoveries"]
+    told = [(entry["what"], entry["name"]) for entry in entries if entry["outage_ms"] is not None]
+    return all(tuple(each.split()) in told for each in what)
+
+
+def test_a_run_with_certificates_survives_kills_and_is_the_run_without(house: House) -> None:
+    """A node, the supervisor (the router of one plane) and the vHub (that of the other): all dial and listen anew."""
     folder = certificates(house.folder / "certs")
     pki.issue(folder, ["client.player-red", "client.player-blue"])
-    short = ("--pace", "fast", "--for", "200ms", "--set", "engine=pure", "--json", "--pki", folder)
-    code, output, error = house.end(house.up(*short, players=True))
+    up = house.up("--json", "--engine", "pure", "--pki", folder, players=True)
+    house.ticking(5)
+    with Control(house.info().simulation, operator_credentials(folder)) as desk:
+        house.kill("red")
+        house.wait_for("red to come back", lambda: went_on(desk, "node red", "join red"))
+        house.kill("supervisor")
+        house.wait_for("another supervisor", lambda: went_on(desk, "supervisor supervisor"))
+        house.kill("vhub")
+        house.wait_for("the vHub to come back", lambda: went_on(desk, "vhub vhub"))
+        house.ticking(desk.status()["ticks"] + 20)
+        desk.ask("down")
+    code, output, error = house.end(up)
     assert code == 0, error
     content = json.loads(output.splitlines()[-1])
-    text = apply_sets(read_deployment_text(house.table), "table.yaml", ["engine=pure"])
-    rehearsed = rehearse(text, "table.yaml", 100, nodes=None, pace=parse_pace("fast")).json
-    for same in ("digest", "packets", "nodes"):
-        assert content[same] == rehearsed[same], same
-    capture = (house.folder / content["capture"]).read_bytes()
-    assert str(folder).encode() not in capture, "where secrets are is nobody's business"
+    told = [(entry["what"], entry["name"]) for entry in content["recoveries"]]
+    assert told == [("node", "red"), ("join", "red"), ("supervisor", "supervisor"), ("vhub", "vhub")]
+    same = rehearse(house.table.read_text(), "table.yaml", content["ticks"], None, ["engine=pure"]).json
+    assert content["digest"] == same["digest"] and content["packets"] == same["packets"]
+    capture = house.folder / content["capture"]
+    assert open_capture(capture).about.finished
+    assert str(folder).encode() not in capture.read_bytes(), "where secrets are is nobody's business"
+    assert house.processes_with(str(house.folder)) == {}
