@@ -47,7 +47,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     are those of `up`, whatever the number of nodes.
 
     With --swarm a seed decides the number of nodes (3 to 5), their clocks, the weather on the bus (delay, loss,
-    repeats) and 8 to 20 faults of at least three kinds in 230 ticks on the pure engine (--for: more of both): processes
+    repeats) and 8 to 20 faults of at least three kinds in 208 ticks on the pure engine (--for: more of both): processes
     killed, ended amid a turn, paused, slow, stopped, cut off one way or both, clogged; memory and clocks that jump; old
     messages once more; robots moved, balls added, removed and pushed, the run paused. Everything that is written, said
     and closed is checked against the laws; then all heals, and everybody has to be back.

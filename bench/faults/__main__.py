@@ -24,11 +24,12 @@ from bench.faults.cluster import Cluster, FaultError
 from bench.faults.digest import DISTURBED
 from bench.faults.kinds import KINDS, NODE, Kind, Trial
 from bench.faults.launched import LAUNCHED, Launched
+from bench.faults.outside import OUTSIDE
 
 COUNT: Final = 20
 TRIALS_A_RUN: Final = 20
 """Then a new run begins, so that the frames of each can be computed again."""
-ALL: Final = (*KINDS, *LAUNCHED, DISTURBED)
+ALL: Final = (*KINDS, *OUTSIDE, *LAUNCHED, DISTURBED)
 
 
 @dataclass(slots=True)

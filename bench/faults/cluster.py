@@ -18,6 +18,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self, TypeVar
 
+import numpy as np
+
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.units import parse_pace
@@ -26,6 +28,7 @@ from foosim.rehearsal.verify import verify_capture
 from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.launcher import Child, Launcher
 from foosim.supervisor.run_folder import RunFolder, open_run, run_exists
+from foosim.vhub.capture_reader import open_capture
 from tests.wire.proxy import Proxy, Weather
 
 TABLE: Final = Path(__file__).resolve().parents[2] / "deploy" / "table.yaml"
@@ -98,6 +101,11 @@ class Cluster:
         return sorted(self.deployment.nodes)
 
     @property
+    def radio(self) -> str:
+        """The address for clients that are let in beside the players."""
+        return f"tcp/127.0.0.1:{self._port + 1}"
+
+    @property
     def run_folder(self) -> RunFolder:
         return open_run(self.name)
 
@@ -134,8 +142,7 @@ class Cluster:
             return [*words, "--pace", self.pace]
         words = ["--connect", self.proxies[process].address]
         if process == VHUB:
-            listen = f"tcp/127.0.0.1:{self._port + 1}"
-            words += ["--listen", listen, "--capture", str(self.capture)]
+            words += ["--listen", self.radio, "--capture", str(self.capture)]
             return ["foosim-vhub", *words, "--run-folder", str(self.folder / f"{self.name}.vhub")]
         program = ["foosim-player"] if process in self.deployment.players else ["foosim-node"]
         return [*self._programs.get(process, program), "--name", process, *words]
@@ -230,6 +237,9 @@ class Cluster:
             verified = verify_capture(self.capture)
             if not verified.equal:
                 raise FaultError(f"the capture differs when it is computed again: {verified}")
+            for block in open_capture(self.capture).frame_blocks:
+                if not np.isfinite(block.values).all():
+                    raise FaultError("the capture has frames with numbers that are not finite")
             return
         again = rehearse(self.text, "table.yaml", result["ticks"], None, pace=parse_pace("fast")).json
         for figure in ("digest", "packets", "score"):

@@ -24,6 +24,7 @@ FAULTS: Final = (
     kinds.robot_moved,
     kinds.supervisor_killed,
     kinds.vhub_killed,
+    kinds.both_killed,
 )
 
 

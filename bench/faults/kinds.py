@@ -27,6 +27,7 @@ KILLED_MS: Final = 250.0
 HUNG_MS: Final = 1500.0
 SUPERVISOR_MS: Final = 2000.0
 VHUB_MS: Final = 1000.0
+BOTH_MS: Final = SUPERVISOR_MS + VHUB_MS
 BACK_MS: Final = 2000.0
 JOIN_MS: Final = 1000.0
 BLINK_S: Final = 0.2
@@ -208,6 +209,21 @@ def vhub_killed(trial: Trial) -> Figures:
     return _started_again(trial, VHUB)
 
 
+def both_killed(trial: Trial) -> Figures:
+    """`kill -9` of supervisor and vHub at once: each goes on from its own journal, whoever is back first."""
+    cluster = trial.cluster
+    trial.calm()
+    known = len(cluster.recoveries(SUPERVISOR, SUPERVISOR))
+    both = [SUPERVISOR, VHUB]
+    trial.dice.shuffle(both)
+    for process in both:
+        cluster.take_down(process)
+    trial.dice.shuffle(both)
+    for process in both:
+        cluster.start(process)
+    return {"outage": float(cluster.next_recovery(SUPERVISOR, SUPERVISOR, known)["outage_ms"])}
+
+
 def _started_again(trial: Trial, process: str) -> Figures:
     cluster = trial.cluster
     trial.calm()
@@ -286,6 +302,7 @@ KINDS: Final = (
     Kind("robot_moved", "a robot moves to another node and back", robot_moved),
     Kind("supervisor_killed", "kill -9 of the supervisor", supervisor_killed, {"outage": SUPERVISOR_MS}),
     Kind("vhub_killed", "kill -9 of the vHub", vhub_killed, {"outage": VHUB_MS}),
+    Kind("both_killed", "kill -9 of supervisor and vHub", both_killed, {"outage": BOTH_MS}),
     Kind("twin_refused", "a second node of the same name", twin_refused),
     Kind(
         "node_joins",

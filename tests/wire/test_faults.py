@@ -14,6 +14,9 @@ from bench.faults.__main__ import ALL, Found, main, p99
 from bench.faults.cluster import Cluster, FaultError
 from bench.faults.digest import FAULTS
 from bench.faults.kinds import KINDS, NODE, Trial, twin_refused
+from bench.faults.outside import OUTSIDE
+from bench.faults.outside import SETS as WITH_CLIENT
+from foosim.vhub.capture_reader import open_capture
 from tests.wire.proxy import Weather
 
 if TYPE_CHECKING:
@@ -41,8 +44,24 @@ def test_a_run_disturbed_by_every_fault_is_the_run_that_would_have_been(house: H
     with pytest.raises(FaultError, match=r"digest: .*, undisturbed "):
         cluster.compare(result)
     assert result["handovers"] + result["moves"] > 0
-    assert {entry["what"] for entry in result["recoveries"]} == {"node", "join", "supervisor", "vhub"}
+    told = [(it["what"], it["name"], it["reason"], it["tick"], it["epoch"]) for it in result["recoveries"]]
+    assert {what for what, *_ in told} == {"node", "join", "supervisor", "vhub"}
+    rows = open_capture(cluster.capture).recoveries
+    assert [(row.what, row.name, row.reason, row.tick, row.epoch) for row in rows] == told
     assert house.processes_with(str(house.folder)) == {}
+
+
+def test_what_comes_from_outside_costs_a_run_nothing_but_packets(house: House) -> None:
+    """`end` computes the capture again: it is equal, and everything in it is finite."""
+    with Cluster(house.folder, "outside", (*SETS, *WITH_CLIENT), pace="0.5x", seed=SEED) as cluster:
+        for kind in OUTSIDE:
+            kind.trial(Trial(cluster, random.Random(SEED), calm_s=(0.0, 0.05)))
+        result = cluster.end(altered=True)
+    capture = open_capture(cluster.capture)
+    assert capture.frames.column("ball", "quarantined", 1).max() == 1.0, "the ball was hit too hard"
+    causes = capture.packets.cause[capture.packets.source == "flooder"]
+    assert "rx_full" in set(causes) and result["packets"]["refused"] > 0
+    assert result["recoveries"] == [] and house.processes_with(str(house.folder)) == {}
 
 
 def test_every_kind_of_make_faults_is_made_here_or_needs_a_world_of_its_own() -> None:
