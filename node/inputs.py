@@ -22,9 +22,14 @@ class Inputs:
         self._branch = self._branch_tick = 0
 
     def begin(self, epoch: Epoch) -> bool:
-        """A new epoch issues orders again. Deliveries stay true, unless it is of a newer branch: then return True."""
+        """A new epoch issues orders again. Deliveries stay true, unless it is of a newer branch: then return True.
+
+        A node that was away for long has some of ticks that nobody asks for any more.
+        """
         self._orders.clear()
         if epoch.branch <= self._branch:
+            oldest = epoch.tick - limits.KEPT_TICKS
+            self._deliveries = {tick: kept for tick, kept in self._deliveries.items() if tick >= oldest}
             return False
         self._deliveries.clear()
         self._branch, self._branch_tick = epoch.branch, epoch.branch_tick
