@@ -54,12 +54,17 @@ def start_log(name: str) -> logging.Logger:
     return logger
 
 
-def clock_name() -> str:
-    """Return a name for the clock of `time.monotonic_ns`: it counts from the start of this machine, not longer."""
+def machine_start() -> str:
+    """Return a name for this start of this machine; another start of it has another one. Empty where there is none."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
     except OSError:
-        return f"process {os.getpid()}"  # no other process's times are comparable
+        return ""
+
+
+def clock_name() -> str:
+    """Return a name for the clock of `time.monotonic_ns`: it counts from the start of this machine, not longer."""
+    return machine_start() or f"process {os.getpid()}"  # then no other process's times are comparable
 
 
 def new_boot() -> str:

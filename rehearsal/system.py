@@ -119,7 +119,7 @@ class System:
         """Let a vHub in, which goes on from the journal of the one before."""
         self._boots += 1
         start = f"boot-{self._boots}", fingerprint, self._now_of(channels.VHUB)
-        hub = self.hub = self.settings.hub(*start, clock=self.hub_journal.machine)
+        hub = self.hub = self.settings.hub(*start, machine=self.hub_journal.machine)
 
         def turn(now_ns: int) -> None:
             build = hub.member.build

@@ -79,13 +79,13 @@ class _World:
 class HubCore:
     """The vHub's state machine. `actions` is what the shell performs next."""
 
-    def __init__(self, boot: str, fingerprint: bytes, now_ns: int, world: str = "", clock: str = "") -> None:
-        """`clock` names the clock of `now_ns`: that of a machine, since it was started."""
+    def __init__(self, boot: str, fingerprint: bytes, now_ns: int, world: str = "", machine: str = "") -> None:
+        """`machine` names the present start of the machine, where that has a name."""
         self.actions: list[HubAction] = []
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
-        self.door, self.footing = Door(self), Footing(self, clock)
+        self.door, self.footing = Door(self), Footing(self, machine)
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
@@ -311,7 +311,7 @@ class HubCore:
         assert layout is not None
         added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
         chain = self.commits.chain_at(self.state.closed)
-        where = commit, self._epoch_payload, self.capture_file, chain, self.footing.clock
+        where = commit, self._epoch_payload, self.capture_file, chain, self.footing.machine
         return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added, *where))
 
     def _release(self, now_ns: int) -> None:
@@ -367,7 +367,7 @@ class HubCore:
         self.actions += past.words()
         if past.epoch is not None:
             self._take_epoch(past.epoch)
-            self.footing.stand(past.clock, past.published)
+            self.footing.stand(past.machine, past.published)
         self._patience.progress(self.deployment.tick_ns, now_ns)
 
     def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:

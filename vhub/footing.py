@@ -22,30 +22,30 @@ if TYPE_CHECKING:
 
 
 class Footing:
-    """Whether one vHub waits, and what follows when it does not any more. `clock` is that of its machine."""
+    """Whether one vHub waits, and what follows when it does not any more. `machine` is the present start of its
+    machine, empty where that has no name."""
 
-    def __init__(self, core: HubCore, clock: str) -> None:
+    def __init__(self, core: HubCore, machine: str) -> None:
         self.waits = False
         self.lost_machine = False
         """Whether the journal was written before the machine was started the last time."""
         self._core = core
-        self._clock = clock
-        self._journal_clock = clock
+        self._machine = self._written_on = machine
         self._published: list[bytes] = []
         """What is said first: the last deliveries of the vHub before, which may have been written and not said."""
         self._from = limits.COUNTER_MAX
         """The epoch from which on it may proceed."""
 
     @property
-    def clock(self) -> str:
-        """The clock that the journal names: that of the machine before, until its end is known to be all there is."""
-        return self._journal_clock if self.waits else self._clock
+    def machine(self) -> str:
+        """What the journal names: the start of the machine before, until its end is known to be all there is."""
+        return self._written_on if self.waits else self._machine
 
-    def stand(self, clock: str, published: bytes) -> None:
-        """Wait: the journal that is gone on with names this clock, and these deliveries as the last ones."""
-        self.waits, self._journal_clock = True, clock
+    def stand(self, machine: str, published: bytes) -> None:
+        """Wait: the journal that is gone on with names this start of a machine, and these deliveries as the last."""
+        self.waits, self._written_on = True, machine
         self._published = [published] if published else []
-        self.lost_machine = clock != self._clock
+        self.lost_machine = "" != machine != self._machine != ""
 
     def standing(self) -> Publish:
         """Say how far the world has come here."""

@@ -38,7 +38,7 @@ from foosim.protocol.messages import Build, End
 from foosim.protocol.notify import Notify
 from foosim.protocol.orphan import Orphan
 from foosim.protocol.probe import ProgressOption
-from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
+from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.vhub.capture_file import check_new, origin_metadata
@@ -76,7 +76,7 @@ class HubProcess:
         credentials: Credentials | None = None,
     ) -> None:
         """`open_radio` listens for the clients of a deployment, which comes with the handshake."""
-        self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns(), clock=clock_name())
+        self.core = HubCore(new_boot(), library_fingerprint(), time.monotonic_ns(), machine=machine_start())
         self._options = options
         self._open_radio = open_radio
         self._admission = Admission(credentials, SUPERVISOR, simulation.locator, time.monotonic_ns())

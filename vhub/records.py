@@ -40,8 +40,8 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     """Where the capture is; empty when there is none."""
     chain: bytes = CHAIN_START
     """Over the frames up to that of the last closed tick."""
-    clock: str = ""
-    """The clock of the machine, since it was started: a journal that goes on by another one may have lost its end."""
+    machine: str = ""
+    """The start of the machine on which it was written: what came last of one before may not have reached the disk."""
 
 
 def first_head(build: Build, deployment: Deployment, capture: str) -> bytes:
@@ -174,7 +174,7 @@ class Fold:
         self.commit = head.commit
         self.epoch = head.epoch
         self.chain = head.chain
-        self.clock = head.clock
+        self.machine = head.machine
         self.inputs: InputsRecord | None = None
         """Who joins and leaves at the tick behind the last closed one, where that was written."""
 
@@ -189,7 +189,7 @@ class Fold:
                 self.epoch = raw
                 self.state.turn_to(record)
             else:
-                self.clock = record.clock
+                self.machine = record.machine
 
     def _close(self, record: TickRecord) -> Folded:
         state = self.state

@@ -42,8 +42,8 @@ class Past:
     committed: Committed | None = None
     """The commit of the last closed tick; None before the first."""
     chain: bytes = CHAIN_START
-    clock: str = ""
-    """The one that the journal names."""
+    machine: str = ""
+    """The start of the machine that the journal names."""
     epoch: Epoch | None = None
     inputs: InputsRecord | None = None
     sent: dict[int, bytes] = field(default_factory=dict)
@@ -98,7 +98,7 @@ def recall(
             raise Malformed(f"the capture has tick {captured.tick}, its journal ends at {fold.state.closed}")
         untold = [record for record in found if isinstance(record, Epoch) and record.epoch > captured.epoch]
         past.kept[:0] = [KeepEpoch(epoch) for epoch in untold]
-    past.layout, past.inputs, past.chain, past.clock = fold.layout, fold.inputs, fold.chain, fold.clock
+    past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
     _name_branch(past)
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
     frame = _frame(fold)

@@ -1,15 +1,15 @@
 """Bugs planted in the cores, one rule switched off each: the swarm must find every one of them.
 
 That a thousand seeds find nothing proves something only if they find these. To add one: a function in `node`,
-`supervisor` or `vhub` that swaps what has to be swapped, with the rule that it breaks and the seed that finds it.
-Neighbours: `planting` (how they are planted), `bench.gate` (finds the first seed of each), `rehearsal.swarm`.
+`supervisor`, `vhub` or `branch` that swaps what has to be swapped, with the rule that it breaks and the seed that finds
+it. Neighbours: `planting` (how they are planted), `bench.gate` (finds the first seed of each), `rehearsal.swarm`.
 """
 
 from __future__ import annotations
 
 from typing import Final
 
-from bench.mutants import node, supervisor, vhub
+from bench.mutants import branch, node, supervisor, vhub
 from bench.mutants.planting import Mutant
 
-MUTANTS: Final[tuple[Mutant, ...]] = (*node.MUTANTS, *supervisor.MUTANTS, *vhub.MUTANTS)
+MUTANTS: Final[tuple[Mutant, ...]] = (*node.MUTANTS, *supervisor.MUTANTS, *vhub.MUTANTS, *branch.MUTANTS)

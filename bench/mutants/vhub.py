@@ -139,8 +139,8 @@ def _any_done(planting: Planting) -> None:
 
 @register("downlinks are not numbered", "each downlink has the next number", 1)
 def _same_number(planting: Planting) -> None:
-    def say_go(self: Any, session: Any, number: int, *given: Any) -> None:
-        before(self, session, number - number % 2, *given)
+    def say_go(self: Any, session: Any, go: Any) -> None:
+        before(self, session, replace(go, number=go.number - go.number % 2))
 
     before: Any = planting.swap(Sessions, "say_go", say_go)
 
