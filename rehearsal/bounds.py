@@ -23,6 +23,7 @@ KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {
     "Held._messages": limits.HELD_MESSAGES_MAX,
     "Requests._answers": ANSWERS_KEPT,
+    "Issued.by_tick": limits.EDITED_TICKS_KEPT,
     "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 10,

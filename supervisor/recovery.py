@@ -88,14 +88,16 @@ class Recovery:
             self.returns = {**owners, **self.returns}
             owners = dict.fromkeys(owners, name)
         owners.update((robot, name) for robot, node in self.returns.items() if node == name)
-        self.returns = {robot: node for robot, node in self.returns.items() if node != name}
+        away = {robot: node for robot, node in self.returns.items() if node != name}
         self.note("join", name, "back" if self._was_lost(name) else "started")
         if self._freezes:
-            frozen: list[Edit] = [Freeze(robot) for robot, node in sorted(self.returns.items()) if node != name]
+            frozen: list[Edit] = [Freeze(robot) for robot in sorted(away)]
             core.requests.order(core.frame.tick, [] if core.members else frozen)
             thawed: list[Edit] = [Thaw(robot) for robot in sorted(owners) if owners[robot] == name]
-            core.requests.order(core.released, [edit for edit in thawed if edit.name not in self.returns])
+            core.requests.order(core.released, [edit for edit in thawed if edit.name not in away])
         self.open(owners, [*core.members, name], now_ns)
+        self.returns = away
+        core.actions.append(Journal(encode(core.control())))
         core.say("info", f"node {name} takes part from tick {core.frame.tick}")
 
     def hear(self, process: Process, now_ns: int) -> None:
@@ -155,6 +157,10 @@ class Recovery:
         return any(entry.what == "node" and entry.name == name for entry in self.recovered)
 
     def open(self, owners: dict[str, str], members: Collection[str], now_ns: int) -> None:
+        """Open an epoch. Which robots go back later is written before it: who ends in between forgets none.
+
+        So those that are back in it are struck off behind it.
+        """
         core = self._core
         core.account.moves += sum(core.owners[robot] != owner for robot, owner in owners.items())
         core.actions.append(Journal(encode(core.control())))

@@ -19,6 +19,7 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced, Weather
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import OPERATOR, Settings, System
+from foosim.supervisor.recovery import Recovery
 from foosim.vhub.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -180,6 +181,31 @@ def test_the_supervisor_is_started_again_and_again() -> None:
     assert run.json["packets"] == same.json["packets"]
     assert sum(node["solved_ticks"] for node in run.json["nodes"].values()) >= TICKS
     assert run.json["reason"] == "done"
+
+
+@pytest.mark.parametrize("call", [1, 2])
+@pytest.mark.parametrize("amid", range(1, 5))
+def test_robots_go_back_also_when_the_supervisor_ends_amid_an_epoch(
+    monkeypatch: pytest.MonkeyPatch, call: int, amid: int
+) -> None:
+    """In the turn that opens the epoch without a node, or the one with it again."""
+    calls: list[int] = []
+    systems: list[System] = []
+
+    def opens(self: Recovery, *arguments: Any) -> None:
+        calls.append(amid)
+        if len(calls) == call:
+            restart(0, amid)(systems[0])
+        before(self, *arguments)
+
+    before = Recovery.open
+    monkeypatch.setattr(Recovery, "open", opens)
+    owners: list[dict[str, str]] = []
+    looks: list[Fault] = [(tick, lambda system: owners.append(dict(system.supervisor.owners))) for tick in (1, TICKS)]
+    run = disturbed([(1, systems.append), *looks, (40, kill("n2")), (80, start("n2"))], keeps_journals=True)
+    assert len(calls) > call and run.digests == undisturbed().digests
+    first, last = owners
+    assert last == first
 
 
 def test_a_node_that_does_not_come_back_to_the_supervisor_is_lost() -> None:
