@@ -30,7 +30,7 @@ def _old_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 1)
+@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 111)
 def _new_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch <= self.epoch and bool(before(self, channel, message, payload))
@@ -38,7 +38,7 @@ def _new_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node goes back to an old epoch", "epochs only grow", 10)
+@register("node goes back to an old epoch", "epochs only grow", 46)
 def _epochs_fall(planting: Planting) -> None:
     def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
         if self.epoch > epoch.epoch and self.name in epoch.roster:
@@ -163,17 +163,6 @@ def _ready_once(planting: Planting) -> None:
         self._said_ready = self._said_ready or said
 
     before: Any = planting.swap(Member, "wake", wake)
-
-
-@register("lost node does not say ready again", "an epoch without a node is no answer to its ready", 93)
-def _answered_by_another(planting: Planting) -> None:
-    def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
-        is_present = epoch.epoch == self.epoch
-        before(self, epoch, payload, now_ns)
-        if is_present:
-            self.member.entered()
-
-    before = planting.swap(NodeCore, "_on_epoch", on_epoch)
 
 
 @register("client answers a Go anew", "a Go that comes again gets the same bytes again", 1)

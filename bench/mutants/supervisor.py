@@ -36,7 +36,7 @@ class _AnyBasis(bytes):
     __hash__ = bytes.__hash__
 
 
-@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 7)
+@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 24)
 def _old_epochs(planting: Planting) -> None:
     def on_part(self: Any, part: Any, payload: bytes, now_ns: int) -> None:
         self.arrivals.take_part(part, self.frame.tick, self.members)
@@ -170,7 +170,7 @@ def _same_epoch(planting: Planting) -> None:
     before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
 
 
-@register("epochs are volatile", "a restarted supervisor goes on with a greater epoch", 2)
+@register("epochs are volatile", "a restarted supervisor goes on with a greater epoch", 60)
 def _volatile(planting: Planting) -> None:
     def stand_on(core: Any, history: Any) -> None:
         before(core, history)
@@ -210,7 +210,7 @@ def _never_lost(planting: Planting) -> None:
     planting.swap(Roster, "lose", lambda self, process: None)
 
 
-@register("a stopped node comes back", "who was stopped is not let in until it is started", 6)
+@register("a stopped node comes back", "who was stopped is not let in until it is started", 19)
 def _unstopped(planting: Planting) -> None:
     def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
         self._core.roster.stopped.discard(hello.name)

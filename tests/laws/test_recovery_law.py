@@ -143,6 +143,28 @@ def test_a_newcomer_that_is_silent_while_it_builds_is_let_in_when_it_is_ready() 
     assert run.json["nodes"]["n2"]["owned"] and run.digests == undisturbed(ticks=2_200).digests
 
 
+def test_an_epoch_without_a_node_is_no_answer_to_its_ready() -> None:
+    """A zombie's ready is lost, and the epoch that told it so comes once more: it says ready again."""
+    systems: list[System] = []
+    epochs: list[Traced] = []
+    readies: list[int] = []
+
+    def see(traced: Traced) -> None:
+        if traced.channel == channels.EPOCH.name:
+            epochs.append(traced)
+        elif systems and traced.process == "n2" and traced.channel == channels.READY.name:
+            readies.append(traced.now_ns)
+            if len(readies) == 1:
+                bus, last = systems[0].bus, epochs[-1]
+                bus.cut_off("n2", traced.now_ns + 1, hears=False)
+                bus.put(SUPERVISOR, channels.EPOCH, last.name, last.payload, traced.now_ns)
+
+    faults = [(100, systems.append), (100, pause("n2", 3_000))]
+    run = disturbed(faults, ticks=2_200, pace=Pace("realtime"), observer=see, observes=("publish",))
+    assert told(run) == [("node", "n2"), ("join", "n2")] and len(readies) > 1
+    assert run.digests == undisturbed(ticks=2_200).digests
+
+
 def test_a_short_pause_costs_nobody_its_membership() -> None:
     run = disturbed([(100, pause("n2", 200))], pace=Pace("realtime"))
     assert run.digests == undisturbed().digests and told(run) == []

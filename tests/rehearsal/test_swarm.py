@@ -21,7 +21,7 @@ from foosim.rehearsal.system import Settings
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MINUTE_TICKS: Final = 30_000
-SEEDS: Final = 48
+SEEDS: Final = 24
 
 
 @pytest.mark.parametrize("first", range(1001, 1001 + SEEDS, 8))
