@@ -18,11 +18,10 @@ from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_ap
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.identity import FORMS, identities_of
-from foosim.protocol.names import nearest_name
 from foosim.supervisor import pki
 from foosim.supervisor.pki import LEAF_DAYS, Shown
 from foosim.supervisor.pki_hosts import files_for, send_files
-from foosim.supervisor.remote import Remote
+from foosim.supervisor.remote import remote_of
 
 app = new_app()
 
@@ -128,9 +127,7 @@ def send(
     of anybody else is sent. What is there already under these names is replaced: send again after `renew`.
     """
     found = load_deployment(read_deployment_text(deployment), str(deployment))
-    if host not in found.hosts:
-        raise BadValue("unknown host", host, nearest_name(host, found.hosts))
-    for path in send_files(Remote(host, found.hosts[host]), folder, files_for(found, host)):
+    for path in send_files(remote_of(found, host), folder, files_for(found, host)):
         print(path)
 
 

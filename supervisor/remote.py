@@ -14,7 +14,9 @@ from importlib.metadata import version
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import BadValue
 from foosim.protocol.hosts import Host, places
+from foosim.protocol.names import nearest_name
 from foosim.supervisor.children import BY_SIGNAL, GUARD, OTHER_VERSION
 
 SSH_FAILED: Final = 255
@@ -111,6 +113,14 @@ class Remote:
 def unit_name(node: str) -> str:
     """Return the name of the unit of systemd that runs a node."""
     return f"foosim-{node}.service"
+
+
+def remote_of(deployment: Deployment, host: str) -> Remote:
+    """Return a host by its name. Raises BadValue, with the hosts that there are, for a name that none has."""
+    if host not in deployment.hosts:
+        declared = ", ".join(sorted(deployment.hosts)) or "none"
+        raise BadValue(f"unknown host (declared: {declared})", host, nearest_name(host, deployment.hosts))
+    return Remote(host, deployment.hosts[host])
 
 
 def remotes(deployment: Deployment) -> dict[str, Remote]:

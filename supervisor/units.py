@@ -17,8 +17,7 @@ from foosim.protocol.command import BAD_INPUT, REFUSED
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Failed
 from foosim.protocol.hosts import places
-from foosim.protocol.names import nearest_name
-from foosim.supervisor.remote import Remote, unit_name
+from foosim.supervisor.remote import Remote, remote_of, unit_name
 
 WATCHDOG_S: Final = 5
 MEMORY_MAX: Final = "1G"
@@ -118,11 +117,9 @@ def _escaped(words: Sequence[str]) -> str:
 
 def units_of(deployment: Deployment, host: str, address: Address, is_users: bool) -> dict[str, str]:
     """Return the units of a host's nodes, by file name. Raises BadValue or Failed when there are none."""
-    if host not in deployment.hosts:
-        raise BadValue("unknown host", host, nearest_name(host, deployment.hosts))
+    remote = remote_of(deployment, host)
     if address.port == 0 or address.is_wildcard:
         raise BadValue("a unit needs the address at which the supervisor always listens (--listen)", str(address))
-    remote = Remote(host, deployment.hosts[host])
     if address.is_loopback and remote.host.address not in ("localhost", address.host):
         raise BadValue(f"host {host} cannot connect to the supervisor there (--listen)", str(address))
     if address.protocol == "tls" and remote.host.pki is None:

@@ -93,7 +93,7 @@ def test_systemd_takes_them(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_a_unit_is_refused() -> None:
-    with pytest.raises(BadValue, match="unknown host, 'lefft', nearest is left"):
+    with pytest.raises(BadValue, match=r"unknown host \(declared: .*left.*\), 'lefft', nearest is left"):
         units_of(CLUSTER, "lefft", ADDRESS, is_users=False)
     with pytest.raises(Failed, match="no node is placed on host radio"):
         units_of(CLUSTER, "radio", ADDRESS, is_users=False)
