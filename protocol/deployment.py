@@ -8,7 +8,6 @@ whose names end in `_ns` (see units.py). The table's parameters are in table.py.
 
 import json
 from collections.abc import Mapping
-from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
@@ -19,31 +18,27 @@ from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.errors import BadValue
 from foosim.protocol.hosts import Host, Listen, Name, Placed
 from foosim.protocol.names import LineName, Team
-from foosim.protocol.references import LINK_RULES_MAX, SELECTORS_MAX
+from foosim.protocol.network import LinkRule, Network
 from foosim.protocol.scene import Shape
 from foosim.protocol.scenery import SCENERY_MAX, AssetFolder, Contents, Scenery, read_contents, scenery_shape
 from foosim.protocol.table import Part, Table
 from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks
 
 __all__ = [
-    "AccessSpec", "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "Jitter", "LinkRule",
+    "AccessSpec", "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "LinkRule",
     "Network", "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor",
     "deployment_schema", "deployment_schema_text", "parse_pace", "period_ticks",
 ]  # fmt: skip
 
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 OperatorName = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.OPERATOR_LENGTH_MAX)]
-Selector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
 ClassPath = Annotated[str, StringConstraints(pattern=names.CLASS_PATTERN, max_length=200)]
 
 Rate = Annotated[Fraction, Quantity(units.RATE, "1 mHz", "10 kHz")]
 LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
 AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
-Delay = Annotated[int, Quantity(units.TIME, "0 s", "60 s")]
 Size = Annotated[int, Quantity(units.SIZE, "64 KiB", "1000 TiB")]
-Spread = Annotated[int, Quantity(units.TIME, "1 ns", "60 s")]
 Deadline = Annotated[int, Quantity(units.TIME, "1 ms", "24 h")]
-Probability = Annotated[float, Quantity(units.PROBABILITY, "0 %", "100 %")]
 
 
 def _default(text: str, alias: str | None = None) -> Any:
@@ -117,57 +112,6 @@ class ClientSpec(Part):
 
     lockstep: bool = False
     rate_hz: Rate | None = Field(default=None, alias="rate")
-
-
-def _mean_is_sd(data: dict[str, Any]) -> int:
-    return int(data["sd_ns"])
-
-
-class Jitter(Part):
-    """A random delay on top of the constant one, never negative."""
-
-    shape: Literal["gamma"]
-    sd_ns: Spread = Field(alias="sd")
-    mean_ns: Spread = Field(alias="mean", default_factory=_mean_is_sd)
-
-
-def _one_or_more(value: object) -> object:
-    return [value] if isinstance(value, str) else value
-
-
-Selectors = Annotated[
-    list[Selector],
-    BeforeValidator(_one_or_more, json_schema_input_type=Selector | list[Selector]),
-    Field(min_length=1, max_length=SELECTORS_MAX),
-]
-
-
-class LinkRule(Part):
-    """What the directed links between the endpoints that `from` and `to` select do to a packet."""
-
-    id: Name
-    from_: Selectors = Field(alias="from")
-    to: Selectors
-    delay_ns: Delay = _default("0 s", "delay")
-    jitter: Jitter | None = None
-    loss: Probability = _default("0 %")
-    order: Literal["fifo", "free"] = "fifo"
-
-    def matches(self, source: str, destination: str) -> bool:
-        """True if a packet from source to destination is this rule's."""
-        return any(fnmatchcase(source, glob) for glob in self.from_) and any(
-            fnmatchcase(destination, glob) for glob in self.to
-        )
-
-
-class Network(Part):
-    """The links between endpoints: the first rule that matches; a pair without one is a perfect link."""
-
-    links: list[LinkRule] = Field(default=[], max_length=LINK_RULES_MAX)
-
-    def rule_for(self, source: str, destination: str) -> LinkRule | None:
-        """The first rule that matches the directed pair, or None for a perfect link."""
-        return next((rule for rule in self.links if rule.matches(source, destination)), None)
 
 
 class Capture(Part):

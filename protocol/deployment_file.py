@@ -13,7 +13,7 @@ import codecs
 import re
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +22,7 @@ from pydantic import ValidationError
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import DeploymentError, describe, show
+from foosim.protocol.network_references import check_network
 from foosim.protocol.references import Finding, Location, check_references
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.settings import place_sets
@@ -104,7 +105,7 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
     found = list(problems)
     if tree is not None:
         data = plain(tree)
-        findings = list(islice(check_references(data), PROBLEMS_MAX + 1))
+        findings = list(islice(chain(check_references(data), check_network(data)), PROBLEMS_MAX + 1))
         try:
             deployment = Deployment.model_validate(data)
         except ValidationError as error:

@@ -2,12 +2,11 @@
 
 It reads the plain data of a file, not the models, so that these problems are found beside those of single fields, in
 one go: whatever is missing or malformed is passed over here, since the schema reports it. deployment_file.py turns
-findings into lines with places.
+findings into lines with places; what concerns the network is in network_references.py.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any, Final, Literal
 
@@ -19,10 +18,6 @@ Location = tuple[str | int, ...]
 
 # Bounds of what is looked at; what is beyond them, the schema refuses.
 TEXTS_MAX: Final = 4096
-LINK_RULES_MAX: Final = 512
-SELECTORS_MAX: Final = 16
-"""Selectors on one side of a link rule."""
-JITTER_RATIO_MAX: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +33,17 @@ class Finding:
 
 def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found as they are asked for."""
-    view = _View(data)
-    between = (_names, _hosts, _robots, _nodes, _players, _links, _rates, _clients, _deadlines)
+    view = View(data)
+    between = (_names, _hosts, _robots, _nodes, _players, _rates, _clients, _deadlines)
     for check in (*between, _lines, _shapes, _scenery):
         yield from check(view)
 
 
-def _quoted(nearest: str | None) -> str | None:
+def quoted(nearest: str | None) -> str | None:
     return None if nearest is None else repr(nearest)
 
 
-class _View:
+class View:
     """Tolerant access to plain data: what is not of the expected kind looks empty."""
 
     def __init__(self, data: object) -> None:
@@ -94,7 +89,7 @@ class _View:
             return None
 
 
-def _names(view: _View) -> Iterator[Finding]:
+def _names(view: View) -> Iterator[Finding]:
     """Endpoints, and the processes that a run starts, have names of their own."""
     endpoints: dict[str, str] = {}
     processes: dict[str, str] = {}
@@ -114,24 +109,24 @@ def _names(view: _View) -> Iterator[Finding]:
                 scope.setdefault(name, section)
 
 
-def _hosts(view: _View) -> Iterator[Finding]:
+def _hosts(view: View) -> Iterator[Finding]:
     """Processes are placed on hosts that exist, by name or by label; a unit of systemd needs such a place."""
     labels = {label for host in view.hosts for _, label in view.texts("hosts", host, "labels")}
     places: list[Location] = [(section, name) for section in ("nodes", "players") for name in view.mapping(section)]
     for place in (*places, ("vhub",)):
         host, label = view.get(*place, "host"), view.get(*place, "label")
         if isinstance(host, str) and host not in view.hosts:
-            yield Finding((*place, "host"), "unknown host", host, _quoted(nearest_name(host, view.hosts)))
+            yield Finding((*place, "host"), "unknown host", host, quoted(nearest_name(host, view.hosts)))
         if isinstance(label, str) and host is not None:
             yield Finding((*place, "label"), "a label beside a host: one of them says where", label)
         elif isinstance(label, str) and label not in labels:
-            nearest = _quoted(nearest_name(label, labels))
+            nearest = quoted(nearest_name(label, labels))
             yield Finding((*place, "label"), "a label that no host has", label, nearest)
         if host is None and label is None and view.get(*place, "launch") == "systemd":
             yield Finding((*place, "launch"), "a unit of systemd needs a host or a label", "systemd")
 
 
-def _robots(view: _View) -> Iterator[Finding]:
+def _robots(view: View) -> Iterator[Finding]:
     """Lines exist and have one rod a team; channels are not called like built-in ones."""
     rods: dict[tuple[str, str], str] = {}
     lines = view.get("table", "lines")
@@ -143,13 +138,13 @@ def _robots(view: _View) -> Iterator[Finding]:
         if not (isinstance(team, str) and isinstance(line, str)):
             continue
         if line in LINE_NAMES and isinstance(lines, dict) and line not in lines:
-            yield Finding(("robots", name, "line"), "not in table.lines", line, _quoted(nearest_name(line, lines)))
+            yield Finding(("robots", name, "line"), "not in table.lines", line, quoted(nearest_name(line, lines)))
         first = rods.setdefault((team, line), name)
         if first != name:
             yield Finding(("robots", name, "line"), f"{team}'s line is already the rod {first}", line)
 
 
-def _nodes(view: _View) -> Iterator[Finding]:
+def _nodes(view: View) -> Iterator[Finding]:
     """Every robot has exactly one owner."""
     owner: dict[str, str] = {}
     if not view.robots:
@@ -158,7 +153,7 @@ def _nodes(view: _View) -> Iterator[Finding]:
         for index, robot in view.texts("nodes", node, "robots"):
             location = ("nodes", node, "robots", index)
             if robot not in view.robots:
-                yield Finding(location, "unknown robot", robot, _quoted(nearest_name(robot, view.robots)))
+                yield Finding(location, "unknown robot", robot, quoted(nearest_name(robot, view.robots)))
             elif robot in owner:
                 what = (
                     "listed twice" if owner[robot] == node else f"a robot with two owners, also of node {owner[robot]}"
@@ -170,13 +165,13 @@ def _nodes(view: _View) -> Iterator[Finding]:
             yield Finding(("robots", robot), "a robot that no node owns", robot, at="key")
 
 
-def _players(view: _View) -> Iterator[Finding]:
+def _players(view: View) -> Iterator[Finding]:
     """Players name robots that exist, and channels that those have."""
     for player in view.players if view.robots else ():
         for robot in view.mapping("players", player, "robots"):
             location: Location = ("players", player, "robots", robot)
             if robot not in view.robots:
-                yield Finding(location, "unknown robot", robot, _quoted(nearest_name(robot, view.robots)), at="key")
+                yield Finding(location, "unknown robot", robot, quoted(nearest_name(robot, view.robots)), at="key")
                 continue
             sensors = view.get("robots", robot, "sensors")
             if not isinstance(sensors, dict):
@@ -185,43 +180,14 @@ def _players(view: _View) -> Iterator[Finding]:
             seen = set()
             for index, channel in view.texts(*location):
                 if channel not in channels:
-                    nearest = _quoted(nearest_name(channel, channels))
+                    nearest = quoted(nearest_name(channel, channels))
                     yield Finding((*location, index), f"{robot} has no such channel", channel, nearest)
                 elif channel in seen:
                     yield Finding((*location, index), "a channel that is listed twice", channel)
                 seen.add(channel)
 
 
-def _links(view: _View) -> Iterator[Finding]:
-    """Every selector matches an endpoint; rules have names of their own."""
-    endpoints = [*view.robots, *view.players, *view.clients]
-    seen: dict[str, int] = {}
-    links = view.get("network", "links") if view.robots else None
-    for number in range(min(len(links), LINK_RULES_MAX) if isinstance(links, list) else 0):
-        location: Location = ("network", "links", number)
-        name = view.get(*location, "id")
-        if isinstance(name, str) and seen.setdefault(name, number) != number:
-            yield Finding((*location, "id"), f"a name that is also links[{seen[name]}]'s", name)
-        for side in ("from", "to"):
-            for index, glob in view.texts(*location, side):
-                if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
-                    nearest = _quoted(nearest_name(glob, endpoints))
-                    yield Finding((*location, side, index), "a selector that matches no endpoint", glob, nearest)
-        yield from _jitter(view, (*location, "jitter"))
-
-
-def _jitter(view: _View, location: Location) -> Iterator[Finding]:
-    """The spread of a gamma jitter fits its mean: else nearly all of it is 0, or nearly none of it is spread."""
-    try:
-        mean_ns, sd_ns = (units.parse_ns(view.get(*location, key)) for key in ("mean", "sd"))
-    except BadValue:
-        return
-    if not mean_ns <= JITTER_RATIO_MAX * sd_ns <= JITTER_RATIO_MAX * 3 * mean_ns:
-        what = f"not between 1/{JITTER_RATIO_MAX} of the mean and 3 times the mean"
-        yield Finding((*location, "sd"), what, view.get(*location, "sd"))
-
-
-def _rates(view: _View) -> Iterator[Finding]:
+def _rates(view: View) -> Iterator[Finding]:
     """The tick divides into its substeps; rates of sensors, lockstep and poses are whole ticks."""
     tick_ns = view.tick_ns()
     if tick_ns is None:
@@ -243,7 +209,7 @@ def _rates(view: _View) -> Iterator[Finding]:
         yield from _rate(view, place, tick_ns)
 
 
-def _rate(view: _View, place: Location, tick_ns: int) -> Iterator[Finding]:
+def _rate(view: View, place: Location, tick_ns: int) -> Iterator[Finding]:
     text = view.get(*place)
     try:
         rate = units.parse(text, units.RATE)
@@ -254,14 +220,14 @@ def _rate(view: _View, place: Location, tick_ns: int) -> Iterator[Finding]:
             yield Finding(place, bad.problem, text, bad.nearest)
 
 
-def _clients(view: _View) -> Iterator[Finding]:
+def _clients(view: View) -> Iterator[Finding]:
     """A client in lockstep has a rate."""
     for name in view.clients:
         if view.get("clients", name, "lockstep") is True and view.get("clients", name, "rate") is None:
             yield Finding(("clients", name, "rate"), "missing key of a client in lockstep", "rate", at="missing")
 
 
-def _deadlines(view: _View) -> Iterator[Finding]:
+def _deadlines(view: View) -> Iterator[Finding]:
     """Who is late is named before it is lost."""
     try:
         named_ns = units.parse_ns(view.get("deadlines", "tick_named"))
@@ -272,7 +238,7 @@ def _deadlines(view: _View) -> Iterator[Finding]:
         yield Finding(("deadlines", "tick_named"), "longer than tick_lost", view.get("deadlines", "tick_named"))
 
 
-def _lines(view: _View) -> Iterator[Finding]:
+def _lines(view: View) -> Iterator[Finding]:
     """Figures stay off the side walls, rods span the field, at either end of the stroke."""
     width, foot, rod = view.length("field", "width"), view.length("rod", "foot", "width"), view.length("rod", "length")
     for line in view.mapping("table", "lines"):
@@ -290,7 +256,7 @@ def _lines(view: _View) -> Iterator[Finding]:
             yield Finding(location, "the rod would leave the field uncovered", value, _millimetres((rod - width) / 2))
 
 
-def _shapes(view: _View) -> Iterator[Finding]:
+def _shapes(view: View) -> Iterator[Finding]:
     """The table's lengths describe a table that can be built."""
     for small, big, what in (
         (("rod", "inner_radius"), ("rod", "radius"), "not below the rod's radius"),
@@ -305,7 +271,7 @@ def _shapes(view: _View) -> Iterator[Finding]:
             yield Finding(("table", *small), what, view.get("table", *small))
 
 
-def _scenery(view: _View) -> Iterator[Finding]:
+def _scenery(view: View) -> Iterator[Finding]:
     """The pure engine has no meshes."""
     for name in view.mapping("scenery"):
         if view.get("engine") == "pure" and view.get("scenery", name, "shape") == "mesh":

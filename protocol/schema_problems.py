@@ -149,7 +149,8 @@ def _follow(path: Sequence[str | int]) -> tuple[Location, Mapping[str, Any], boo
 
 def _child(schema: Mapping[str, Any], step: str | int) -> Mapping[str, Any]:
     if isinstance(step, int):
-        found = schema.get("items", {})
+        several = schema.get("prefixItems", ())
+        found = several[step] if step < len(several) else schema.get("items", {})
     else:
         named, patterns = schema.get("properties", {}), schema.get("patternProperties", {})
         found = named.get(step) or next(iter(patterns.values()), schema.get("additionalProperties"))
@@ -162,6 +163,10 @@ def _resolve(schema: Mapping[str, Any]) -> Mapping[str, Any]:
         if "$ref" in schema:
             schema = _root()["$defs"][schema["$ref"].removeprefix("#/$defs/")]
         elif "anyOf" in schema:
-            schema = next((s for s in schema["anyOf"] if "$ref" in s or s.get("type") in ("array", "object")), {})
+            schema = next((s for s in schema["anyOf"] if _has_parts(s)), {})
         else:
             return schema
+
+
+def _has_parts(schema: Mapping[str, Any]) -> bool:
+    return not schema.keys().isdisjoint({"$ref", "discriminator", "enum"}) or schema.get("type") in ("array", "object")

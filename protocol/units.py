@@ -65,7 +65,7 @@ TICKS: Final = Dimension("number of ticks", _sizes(ticks="1", tick="1"), "int")
 _BINARY: Final = _sizes(KiB="1024", MiB="1048576", GiB="1073741824", TiB="1099511627776")
 SIZE: Final = Dimension("size", _sizes(B="1", kB="1e3", MB="1e6", GB="1e9", TB="1e12") | _BINARY, "int")
 RATE: Final = Dimension("rate", _sizes(Hz="1", kHz="1e3", mHz="1e-3"), "fraction")
-LENGTH: Final = Dimension("length", _sizes(m="1", cm="1e-2", mm="1e-3", um="1e-6"))
+LENGTH: Final = Dimension("length", _sizes(m="1", cm="1e-2", mm="1e-3", um="1e-6", km="1e3"))
 MASS: Final = Dimension("mass", _sizes(kg="1", g="1e-3", mg="1e-6"))
 ANGLE: Final = Dimension("angle", {"rad": Fraction(1), "mrad": Fraction(1, 1000), "deg": _DEGREE})
 SPEED: Final = Dimension("speed", {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "km/h": Fraction(5, 18)})
@@ -75,6 +75,13 @@ FORCE: Final = Dimension("force", _sizes(N="1", mN="1e-3", kN="1e3"))
 TORQUE: Final = Dimension("torque", {"N m": Fraction(1), "mN m": Fraction(1, 1000)})
 IMPULSE: Final = Dimension("impulse", {"N s": Fraction(1), "mN s": Fraction(1, 1000)})
 PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)})
+FREQUENCY: Final = Dimension("frequency", _sizes(Hz="1", kHz="1e3", MHz="1e6", GHz="1e9"))
+BITRATE: Final = Dimension(
+    "bit rate", _sizes(**{"bit/s": "1", "kbit/s": "1e3", "Mbit/s": "1e6", "Gbit/s": "1e9"}), "int"
+)
+LEVEL: Final = Dimension("level", _sizes(dB="1"))
+POWER: Final = Dimension("power level", _sizes(dBm="1"))
+GAIN: Final = Dimension("antenna gain", _sizes(dBi="1"))
 
 
 def parse(text: object, dimension: Dimension) -> Fraction:

@@ -1,0 +1,198 @@
+"""What one field of a deployment's `network:` cannot know: whether selectors match, and whether settings fit together.
+
+Like references.py, whose findings it makes, it reads plain data and passes over what is malformed.
+"""
+
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from fractions import Fraction
+from typing import Any, Final
+
+from foosim.protocol import names, units
+from foosim.protocol.errors import BadValue
+from foosim.protocol.impairments import BURSTS
+from foosim.protocol.names import nearest_name
+from foosim.protocol.network import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_MAX, REST
+from foosim.protocol.references import Finding, Location, View, quoted
+
+JITTER_RATIO_MAX: Final = 100
+_LASTING: Final = ("partition", "clog", "chaos")
+
+
+def check_network(data: object) -> Iterator[Finding]:
+    """All problems of the network's section, found as they are asked for."""
+    view = View(data)
+    endpoints = [*view.robots, *view.players, *view.clients]
+    if not view.mapping("network") or not view.robots:
+        return
+    yield from _radios(view)
+    yield from _carriers(view, endpoints)
+    yield from _links(view, endpoints)
+    yield from _events(view, endpoints)
+
+
+def _count(view: View, key: str, at_most: int) -> range:
+    entries = view.get("network", key)
+    return range(min(len(entries), at_most) if isinstance(entries, list) else 0)
+
+
+def _matches(view: View, location: Location, endpoints: Sequence[str], beside: Sequence[str] = ()) -> Iterator[Finding]:
+    """Every selector of a list matches an endpoint."""
+    for index, glob in view.texts(*location):
+        if glob not in beside and names.is_selector(glob) and not any(fnmatchcase(e, glob) for e in endpoints):
+            nearest = quoted(nearest_name(glob, [*endpoints, *beside]))
+            yield Finding((*location, index), "a selector that matches no endpoint", glob, nearest)
+
+
+def _radios(view: View) -> Iterator[Finding]:
+    for name in list(view.mapping("network", "radios"))[:RADIOS_MAX]:
+        yield from _impairments(view, ("network", "radios", name))
+
+
+def _carriers(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
+    radios = view.mapping("network", "radios")
+    for glob in list(view.mapping("network", "robots"))[:LINK_RULES_MAX]:
+        location: Location = ("network", "robots", glob)
+        if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
+            nearest = quoted(nearest_name(glob, endpoints))
+            yield Finding(location, "a selector that matches no endpoint", glob, nearest, at="key")
+        for index, radio in view.texts(*location):
+            if radio not in radios:
+                yield Finding((*location, index), "unknown radio", radio, quoted(nearest_name(radio, radios)))
+    for glob in list(view.mapping("network", "places"))[:LINK_RULES_MAX]:
+        if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
+            nearest = quoted(nearest_name(glob, endpoints))
+            yield Finding(("network", "places", glob), "a selector that matches no endpoint", glob, nearest, at="key")
+
+
+def _links(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
+    """Rules have names of their own and two ends, and go via radios that there are."""
+    seen: dict[str, int] = {}
+    radios = view.mapping("network", "radios")
+    for number in _count(view, "links", LINK_RULES_MAX):
+        location: Location = ("network", "links", number)
+        rule = view.mapping(*location)
+        name = rule.get("id")
+        if isinstance(name, str) and seen.setdefault(name, number) != number:
+            yield Finding((*location, "id"), f"a name that is also links[{seen[name]}]'s", name)
+        if rule and "between" in rule:
+            for side in ("from", "to"):
+                if side in rule:
+                    yield Finding((*location, side), "beside `between`, which is both directions", side, at="key")
+        for side in ("from", "to") if rule and "between" not in rule else ():
+            if side not in rule:
+                yield Finding((*location, side), "missing key", side, at="missing")
+        for side in ("from", "to", "between"):
+            yield from _matches(view, (*location, side), endpoints)
+        via = rule.get("via")
+        if isinstance(via, str) and via not in radios:
+            yield Finding((*location, "via"), "unknown radio", via, quoted(nearest_name(via, radios)))
+        yield from _impairments(view, location)
+
+
+def _impairments(view: View, location: Location) -> Iterator[Finding]:
+    """Settings of one link or radio fit together."""
+    written = [key for key in BURSTS if view.get(*location, key) is not None]
+    for key in written[1:]:
+        yield Finding((*location, key), f"beside {written[0]}: a link has one model of bursts", key, at="key")
+    yield from _burst(view, (*location, "burst"))
+    yield from _jitter(view, (*location, "jitter"))
+
+
+def _burst(view: View, location: Location) -> Iterator[Finding]:
+    burst = view.mapping(*location)
+    if not burst:
+        return
+    lengths = [key for key in ("mean_bad", "mean_burst") if key in burst]
+    if len(lengths) == 2:
+        yield Finding(
+            (*location, "mean_burst"), "beside mean_bad: a time, or lost packets in a row", "mean_burst", at="key"
+        )
+    elif not lengths:
+        yield Finding((*location, "mean_bad"), "missing key (or mean_burst)", "mean_bad", at="missing")
+    if "dwell" in burst and "mean_bad" not in burst:
+        yield Finding((*location, "dwell"), "lengths of times need mean_bad", "dwell", at="key")
+    loss, bad = _share(burst.get("loss")), _share(burst.get("bad_loss", "100 %"))
+    if loss is not None and bad is not None and loss >= bad:
+        yield Finding((*location, "loss"), "not below bad_loss, which is lost in bad times", burst.get("loss"))
+
+
+def _share(text: object) -> Fraction | None:
+    try:
+        return units.parse(text, units.PROBABILITY)
+    except BadValue:
+        return None
+
+
+def _jitter(view: View, location: Location) -> Iterator[Finding]:
+    """The spread of a jitter fits its mean: else nearly all of it is 0, or nearly none of it is spread."""
+    shape = view.get(*location, "shape")
+    if shape == "mixture":
+        shares = [
+            _share(view.get(*location, "parts", n, "share")) for n in range(len(view.get(*location, "parts") or ()))
+        ]
+        if None not in shares and sum(share or 0 for share in shares) != 1:
+            yield Finding((*location, "parts"), "shares that do not add up to 100 %", len(shares))
+        return
+    if shape not in ("gamma", "lognormal"):
+        return
+    try:
+        mean_ns, sd_ns = (units.parse_ns(view.get(*location, key)) for key in ("mean", "sd"))
+    except BadValue:
+        return
+    if not mean_ns <= JITTER_RATIO_MAX * sd_ns <= JITTER_RATIO_MAX * 3 * mean_ns:
+        what = f"not between 1/{JITTER_RATIO_MAX} of the mean and 3 times the mean"
+        yield Finding((*location, "sd"), what, view.get(*location, "sd"))
+
+
+def _events(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
+    """Each event does one thing, to what there is, for a time that it says."""
+    rules = [rule.get("id") for rule in view.get("network", "links") or () if isinstance(rule, dict)]
+    links = [name for name in rules if isinstance(name, str)]
+    for number in _count(view, "events", EVENTS_MAX):
+        location: Location = ("network", "events", number)
+        event = view.mapping(*location)
+        if event:
+            yield from event_findings(view, location, event, endpoints, links)
+
+
+def event_findings(
+    view: View, location: Location, event: Any, endpoints: Sequence[str], links: Sequence[str]
+) -> Iterator[Finding]:
+    """What is wrong with one event, at its location."""
+    actions = [key for key in ACTIONS if key in event]
+    if not actions:
+        yield Finding((*location, "heal"), f"missing key: one of {', '.join(ACTIONS)}", "heal", at="missing")
+        return
+    for key in actions[1:]:
+        yield Finding((*location, key), f"beside {actions[0]}: an event does one thing", key, at="key")
+    action = actions[0]
+    if "for" in event and "until" in event:
+        yield Finding((*location, "until"), "beside `for`: one of them says how long", "until", at="key")
+    for key in ("for", "until") if action not in _LASTING else ():
+        if key in event:
+            yield Finding((*location, key), f"{action} happens at once", key, at="key")
+    if action == "chaos" and "for" not in event and "until" not in event:
+        yield Finding((*location, "until"), "missing key: chaos needs an end (until or for)", "until", at="missing")
+    yield from _ends(view, location)
+    if action == "partition":
+        groups = view.get(*location, "partition")
+        for index in range(len(groups) if isinstance(groups, list) else 0):
+            yield from _matches(view, (*location, "partition", index), endpoints, (REST,))
+    for side in ("from", "to"):
+        yield from _matches(view, (*location, "clog", side), endpoints)
+    yield from _matches(view, (*location, "chaos", "among"), endpoints)
+    link = view.get(*location, "set", "link")
+    if isinstance(link, str) and link not in links:
+        yield Finding((*location, "set", "link"), "unknown link rule", link, quoted(nearest_name(link, links)))
+    if view.mapping(*location, "set"):
+        yield from _impairments(view, (*location, "set"))
+
+
+def _ends(view: View, location: Location) -> Iterator[Finding]:
+    try:
+        at_ns, until_ns = (units.parse_ns(view.get(*location, key)) for key in ("at", "until"))
+    except BadValue:
+        return
+    if until_ns <= at_ns:
+        yield Finding((*location, "until"), "not after the event's time", view.get(*location, "until"))
