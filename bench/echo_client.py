@@ -17,7 +17,8 @@ from typing import Final
 
 import numpy as np
 
-from foosim.client.core import ClientCore, Outgoing
+from foosim.client.core import ClientCore
+from foosim.client.packets import Outgoing
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish
 from foosim.protocol.channels import Plane

@@ -27,8 +27,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Generic, Self, TypeVar
 
-from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics, Outgoing, check_subscription
+from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded, UnknownName
+from foosim.client.packets import Outgoing, check_packet, check_subscription
 from foosim.client.payloads import Command, Value, channel_kind, decode_payload, encode_command
 from foosim.client.player import NS_PER_S, Newest, Sample
 from foosim.protocol import channels, limits
@@ -228,12 +229,15 @@ class Client:
 
     # --- taking part -------------------------------------------------------------------------------------------------
 
-    def subscribe(self, robot: str, channel: str) -> None:
-        """Ask to hear a robot's channel; before `lockstep` or `listen`. Raises UnknownName, NotJoined."""
-        check_subscription(self.deployment, robot, channel)
-        if self._period is not None and (robot, channel) not in self._subscriptions:
-            raise NotJoined(f"subscribe to {robot} {channel} before lockstep() or listen(): this client has joined")
-        self._subscriptions.add((robot, channel))
+    def subscribe(self, source: str, channel: str) -> None:
+        """Ask to hear a robot's channel, or what another client broadcasts on one; before `lockstep` or `listen`.
+
+        Raises UnknownName, PacketError for what is no channel, NotJoined.
+        """
+        check_subscription(self.deployment, source, channel)
+        if self._period is not None and (source, channel) not in self._subscriptions:
+            raise NotJoined(f"subscribe to {source} {channel} before lockstep() or listen(): this client has joined")
+        self._subscriptions.add((source, channel))
 
     def lockstep(self, rate_hz: float | Fraction | None = None) -> Iterator[int]:
         """Take part in lockstep: yield each of the client's ticks while the run waits, until the run ends.
@@ -250,13 +254,13 @@ class Client:
         return self._ticks(period)
 
     def listen(self, subscriptions: Iterable[tuple[str, str]] = ()) -> None:
-        """Take part without being waited for, and hear these (robot, channel) beside those of `subscribe`.
+        """Take part without being waited for, and hear these (endpoint, channel) beside those of `subscribe`.
 
         The vHub takes the client in at a tick soon after; what is sent before that is lost. Raises UnknownName and
         NotJoined.
         """
-        for robot, channel in subscriptions:
-            self.subscribe(robot, channel)
+        for source, channel in subscriptions:
+            self.subscribe(source, channel)
         if self._period:
             raise NotJoined("listen() after lockstep(): a client joins once")
         self._join(0)
@@ -264,13 +268,13 @@ class Client:
     # --- packets -----------------------------------------------------------------------------------------------------
 
     def send(self, destination: str, channel: str, payload: bytes) -> None:
-        """Send opaque bytes to a robot's (or another client's) channel.
+        """Send opaque bytes to a robot's (or another client's) channel; to an empty destination: see `broadcast`.
 
         After `listen` at once, in lockstep with the tick. Nothing says whether a packet arrives. Raises UnknownName
         for a destination, PacketError for a size, NotJoined, RunEnded and ConnectionFailed.
         """
         packet = Outgoing(destination, channel, bytes(payload))
-        self._core.check(packet)
+        check_packet(self.deployment, packet)
         self._check_sending()
         if self._period:
             if len(self._outgoing) + len(self._commands) >= limits.PACKETS_PER_MESSAGE_MAX:
@@ -279,6 +283,13 @@ class Client:
             return
         self._core.send([packet], time.monotonic_ns())
         self._link.perform()
+
+    def broadcast(self, channel: str, payload: bytes) -> None:
+        """Send opaque bytes to all who have subscribed to this client's channel; otherwise as `send`.
+
+        Each of them is one packet on a link of its own: some may get it, others not.
+        """
+        self.send("", channel, payload)
 
     def receive(self, timeout_s: float = 1.0) -> list[Packet]:
         """After `listen`: return what has arrived, waiting for it up to `timeout_s` of wall time.

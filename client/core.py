@@ -5,19 +5,20 @@ Hello until it is answered, Join until the vHub is heard. In lockstep `go` is th
 `arrivals` and sends when it likes; what it sent is kept until the vHub has recorded it. Downlinks are numbered: repeats
 are dropped, gaps counted. When the vHub is gone (`hub_gone`) all starts again with hello, and goes on where it was; or
 where the run does, if that has lost its last ticks and goes on as a branch from before them.
-Neighbours: `player` and `client` drive it; `vhub.sessions` is the other side.
+Neighbours: `player` and `client` drive it, `packets` says what it may send; `vhub.sessions` is the other side.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from msgspec import structs
 
-from foosim.client.errors import PacketError, UnknownName
+from foosim.client.errors import PacketError
+from foosim.client.packets import Outgoing, check_packet, check_subscription, split
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
@@ -39,7 +40,6 @@ from foosim.protocol.messages import (
     Subscription,
     Up,
 )
-from foosim.protocol.names import CHANNEL_ECHO
 from foosim.protocol.refusals import Refusals
 
 AGAIN_NS: Final = 200_000_000
@@ -49,17 +49,6 @@ AWAY_AGAIN_NS: Final = 50_000_000
 NEVER_NS: Final = limits.COUNTER_MAX
 GAPS_KEPT: Final = 1024
 """How many numbers of missing downlinks are remembered, so that a late one is told from a repeat."""
-PACKET_OVERHEAD_BYTES: Final = 128
-"""No packet takes more in a message beside its payload: two names and two numbers."""
-
-
-@dataclass(frozen=True, slots=True)
-class Outgoing:
-    """A packet to send: opaque `payload` to a robot's (or another client's) `channel`."""
-
-    destination: str
-    channel: str
-    payload: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,16 +193,16 @@ class ClientCore:
     # --- what the client does --------------------------------------------------------------------------------------
 
     def join(self, period_ticks: int, subscriptions: Iterable[tuple[str, str]]) -> None:
-        """Take part: in lockstep every `period_ticks`, or free-running with 0; hear these (robot, channel).
+        """Take part: in lockstep every `period_ticks`, or free-running with 0; hear these (endpoint, channel).
 
-        Raises UnknownName for a robot or channel that the deployment does not have.
+        Raises UnknownName for an endpoint or a robot's channel that the deployment does not have.
         """
         assert self.deployment is not None and self.welcome is not None, "join before a welcome"
         assert period_ticks >= 0, period_ticks
         wanted = sorted(set(subscriptions))
-        for robot, channel in wanted:
-            check_subscription(self.deployment, robot, channel)
-        items = [Subscription(robot, channel) for robot, channel in wanted]
+        for source, channel in wanted:
+            check_subscription(self.deployment, source, channel)
+        items = [Subscription(source, channel) for source, channel in wanted]
         self._join = encode(Join(self.name, self.boot, period_ticks, items))
         self._period = period_ticks
         self._is_heard = False
@@ -257,7 +246,7 @@ class ClientCore:
         if self.is_away:
             self._resend_ns = NEVER_NS
             return
-        for part in _split(sent, channels.UP.bytes_max):
+        for part in split(sent, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part, self.branch)))
 
     # --- messages --------------------------------------------------------------------------------------------------
@@ -417,25 +406,13 @@ class ClientCore:
         """Return the packets with their numbers, checked; nothing is counted yet."""
         if len(packets) > limits.PACKETS_PER_MESSAGE_MAX:
             raise PacketError(f"{len(packets)} packets at once, at most {limits.PACKETS_PER_MESSAGE_MAX} are allowed")
+        assert self.deployment is not None
         for packet in packets:
-            self.check(packet)
+            check_packet(self.deployment, packet)
         return [
             Sent(self._sequence + index, packet.destination, packet.channel, stamp_ns, packet.payload)
             for index, packet in enumerate(packets, 1)
         ]
-
-    def check(self, packet: Outgoing) -> None:
-        """Raise UnknownName or PacketError for a packet that could not be sent."""
-        deployment = self.deployment
-        assert deployment is not None
-        destination = packet.destination
-        if not any(destination in known for known in (deployment.robots, deployment.players, deployment.clients)):
-            raise UnknownName("unknown destination", destination, deployment.endpoints())
-        if not 1 <= len(packet.channel) <= limits.NAME_LENGTH_MAX:
-            raise PacketError(f"channel {packet.channel!r}: not 1 to {limits.NAME_LENGTH_MAX} characters")
-        size = len(packet.payload)
-        if size > limits.PAYLOAD_BYTES_MAX:
-            raise PacketError(f"{size} bytes in one packet, at most {limits.PAYLOAD_BYTES_MAX} are allowed")
 
     def _recorded(self, sequence: int) -> None:
         """Forget what the vHub has recorded."""
@@ -449,7 +426,7 @@ class ClientCore:
 
     def _resend(self, whole: bool) -> None:
         """Send again what is not recorded: all of it, or the first message's worth."""
-        for part in _split(self._unrecorded, channels.UP.bytes_max):
+        for part in split(self._unrecorded, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part, self.branch)))
             if not whole:
                 break
@@ -467,27 +444,3 @@ class ClientCore:
 
     def _publish(self, payload: bytes) -> None:
         self.actions.append(Publish(channels.UP, self.name, payload))
-
-
-def check_subscription(deployment: Deployment, robot: str, channel: str) -> None:
-    """Raise UnknownName unless the deployment has this robot and the robot has this channel to hear."""
-    if robot not in deployment.robots:
-        raise UnknownName("unknown robot", robot, deployment.robots)
-    heard = [*deployment.robots[robot].sensors, CHANNEL_ECHO]
-    if channel not in heard:
-        raise UnknownName(f"{robot} has no such channel to hear", channel, heard)
-
-
-def _split(sent: Iterable[Sent], bytes_max: int) -> Iterator[list[Sent]]:
-    """Yield the packets in as many messages as their sizes need."""
-    part: list[Sent] = []
-    size = 0
-    for packet in sent:
-        bytes_more = len(packet.payload) + PACKET_OVERHEAD_BYTES
-        if part and size + bytes_more > bytes_max - PACKET_OVERHEAD_BYTES:
-            yield part
-            part, size = [], 0
-        part.append(packet)
-        size += bytes_more
-    if part:
-        yield part

@@ -56,7 +56,9 @@ KINDS: Final = (*_NUMBERS, CHANNEL_ECHO)
 
 
 def channel_kind(deployment: Deployment, robot: str, channel: str) -> str:
-    """Return the kind of a robot's channel; raises UnknownName."""
+    """Return the kind of an endpoint's channel, bytes for players and clients; raises UnknownName."""
+    if robot in deployment.players or robot in deployment.clients:
+        return CHANNEL_ECHO
     if robot not in deployment.robots:
         raise UnknownName("unknown robot", robot, deployment.robots)
     settings = deployment.robots[robot]

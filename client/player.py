@@ -8,13 +8,14 @@ process `foosim-player` and the rehearsal run this same loop. Neighbours: `core`
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Final, Protocol, cast
 
-from foosim.client.core import NEVER_NS, ClientCore, Outgoing
-from foosim.client.errors import PlayerError, UnknownName
+from foosim.client.core import NEVER_NS, ClientCore
+from foosim.client.errors import PacketError, PlayerError, UnknownName
+from foosim.client.packets import Outgoing, check_packet
 from foosim.client.payloads import Command, Value, channel_kind, decode_payload, encode_command
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment import Player as Declaration
@@ -27,9 +28,9 @@ NS_PER_S: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One packet of a robot's channel: its value, and when it was sent and due (simulated ns)."""
+    """One packet of an endpoint's channel: its value, and when it was sent and due (simulated ns)."""
 
-    robot: str
+    source: str
     channel: str
     sequence: int
     sent_ns: int
@@ -38,16 +39,30 @@ class Sample:
 
 
 Samples = Mapping[tuple[str, str], Sample]
-"""The newest sample of each (robot, channel) that has arrived up to now; what has not come yet is absent."""
+"""The newest sample of each (endpoint, channel) that has arrived up to now; what has not come yet is absent."""
 Commands = Mapping[str, Command]
 """What each robot shall do, by name; a robot that is left out keeps its last command."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """What a player does at a tick that also speaks: its commands, and packets to others in the order of sending.
+
+    A packet without a destination is a broadcast to all that hear the player's channel.
+    """
+
+    commands: Commands
+    packets: Sequence[Outgoing] = ()
 
 
 class Player(Protocol):
     """A controller. It sees packets only: samples are as old as the network made them, and some never come."""
 
-    def act(self, tick: int, samples: Samples) -> Commands:
-        """Return commands at `tick`. Equal calls in equal order must give equal commands: use no clock, no dice."""
+    def act(self, tick: int, samples: Samples) -> Commands | Turn:
+        """Return commands at `tick`, or a Turn that has packets, too.
+
+        Equal calls in equal order must give equal results: use no clock, no dice.
+        """
 
 
 PlayerFactory = Callable[[Deployment, Mapping[str, Any]], Player]
@@ -80,7 +95,7 @@ class Newest:
     """Keeps the newest sample of each channel that is heard; what was sent later may have come earlier."""
 
     def __init__(self, kinds: Mapping[tuple[str, str], str]) -> None:
-        """`kinds` is the kind of what each (robot, channel) carries; packets of others are passed over."""
+        """`kinds` is the kind of what each (endpoint, channel) carries; packets of others are passed over."""
         self.samples: dict[tuple[str, str], Sample] = {}
         self.malformed = 0
         """Samples that did not fit their channel."""
@@ -156,7 +171,7 @@ class PlayerLoop:
             raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)
         declared = self._declaration = deployment.players[name]
         self._player = self._make(deployment)
-        wanted = [(robot, channel) for robot, heard in sorted(declared.robots.items()) for channel in heard]
+        wanted = deployment.heard_by(name)
         self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in wanted})
         if declared.lockstep:
             self.core.join(deployment.ticks(declared.rate_hz), wanted)
@@ -180,14 +195,39 @@ class PlayerLoop:
             raise PlayerError(f"player {self.core.name}: {what}") from error
 
     def _act(self, tick: int) -> list[Outgoing]:
-        """Ask the player, and check and pack what it commands, in the robots' name order."""
-        deployment, declared = self.core.deployment, self._declaration
-        assert self._player is not None and deployment is not None and declared is not None
+        """Ask the player, and check what it says and commands; commands are last, in the robots' name order."""
+        assert self._player is not None
         where = f"player {self.core.name} at tick {tick}"
         try:
-            commands = self._player.act(tick, self.newest.samples)
+            turn = self._player.act(tick, self.newest.samples)
         except Exception as error:
             raise PlayerError(f"{where}: act failed: {_describe(error)}") from error
+        if not isinstance(turn, Turn):
+            turn = Turn(turn)
+        return [*self._packets(turn.packets, where), *self._commands(turn.commands, where)]
+
+    def _packets(self, packets: object, where: str) -> list[Outgoing]:
+        """Return what the player says to others, and to its robots on channels of theirs."""
+        deployment, declared = self.core.deployment, self._declaration
+        assert deployment is not None and declared is not None
+        if not isinstance(packets, Sequence) or not all(isinstance(packet, Outgoing) for packet in packets):
+            raise PlayerError(f"{where}: a turn's packets are a {type(packets).__name__}, not a sequence of Outgoing")
+        for packet in packets:
+            to = packet.destination
+            if to in deployment.robots and to not in declared.robots:
+                raise PlayerError(f"{where}: {UnknownName('not one of its robots', to, declared.robots)}")
+            if not isinstance(packet.payload, bytes):
+                raise PlayerError(f"{where}: a payload is a {type(packet.payload).__name__}, not bytes")
+            try:
+                check_packet(deployment, packet)
+            except (UnknownName, PacketError) as error:
+                raise PlayerError(f"{where}: {error}") from error
+        return list(packets)
+
+    def _commands(self, commands: object, where: str) -> list[Outgoing]:
+        """Return a player's commands as packets, in the robots' name order."""
+        deployment, declared = self.core.deployment, self._declaration
+        assert deployment is not None and declared is not None
         if not isinstance(commands, Mapping):
             raise PlayerError(f"{where}: act gave a {type(commands).__name__}, not a mapping from robots to Commands")
         packets = []

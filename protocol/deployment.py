@@ -8,6 +8,7 @@ whose names end in `_ns` (see units.py). The table's parameters are in table.py.
 
 import json
 from collections.abc import Mapping
+from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
@@ -18,7 +19,7 @@ from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.errors import BadValue
 from foosim.protocol.hosts import Host, Listen, Name, Placed
 from foosim.protocol.names import LineName, Team
-from foosim.protocol.network import LinkRule, Network
+from foosim.protocol.network import LinkRule, Network, Selector
 from foosim.protocol.scene import Shape
 from foosim.protocol.scenery import SCENERY_MAX, AssetFolder, Contents, Scenery, read_contents, scenery_shape
 from foosim.protocol.table import Part, Table
@@ -94,12 +95,18 @@ class NodeSpec(Placed):
 
 
 class Player(Placed):
-    """A controller that `up` starts: a class with `act(tick, samples) -> commands`."""
+    """A controller that `up` starts: a class with `act(tick, samples) -> commands`.
+
+    It may command its `robots` and hears their channels, and those of others that `hears` selects. One that is `on` a
+    robot is on board of it: its packets leave from and come to where the robot is.
+    """
 
     class_: ClassPath = Field(alias="class")
     rate_hz: Rate = Field(alias="rate")
     lockstep: bool = True
-    robots: dict[RobotName, list[Name]] = Field(max_length=limits.ENTITIES_MAX)
+    on: RobotName | None = None
+    robots: dict[RobotName, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    hears: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
 
 
@@ -108,8 +115,12 @@ class VHubSpec(Placed):
 
 
 class ClientSpec(Part):
-    """An endpoint that is started by hand. One in lockstep is waited for before tick 0 and has a rate."""
+    """An endpoint that is started by hand, on board of a robot or anywhere.
 
+    One in lockstep is waited for before tick 0 and has a rate.
+    """
+
+    on: RobotName | None = None
     lockstep: bool = False
     rate_hz: Rate | None = Field(default=None, alias="rate")
 
@@ -207,6 +218,26 @@ class Deployment(Part):
     def endpoints(self) -> list[str]:
         """The names that packets go from and to, sorted: robots, players and clients."""
         return sorted([*self.robots, *self.players, *self.clients])
+
+    def carriers(self) -> dict[str, str]:
+        """The robot on whose board each player and client is that is on one."""
+        boarded = {**self.players, **self.clients}
+        return {name: spec.on for name, spec in boarded.items() if spec.on is not None}
+
+    def heard_by(self, name: str) -> list[tuple[str, str]]:
+        """The (endpoint, channel) that a player subscribes to, sorted: its robots' and what `hears` selects."""
+        player = self.players[name]
+        heard = {(robot, channel) for robot, channels in player.robots.items() for channel in channels}
+        for glob, channels in player.hears.items():
+            for other in self.endpoints():
+                if other != name and fnmatchcase(other, glob):
+                    heard.update((other, channel) for channel in channels if self._has(other, channel))
+        return sorted(heard)
+
+    def _has(self, endpoint: str, channel: str) -> bool:
+        """Whether an endpoint may say something on a channel: players and clients on any, robots on their own."""
+        robot = self.robots.get(endpoint)
+        return robot is None or channel in (*robot.sensors, names.CHANNEL_ECHO)
 
     def owners(self) -> dict[str, str]:
         """The node of each robot at the start, in the robots' name order."""

@@ -358,9 +358,9 @@ class Answer(Message, frozen=True):
 
 
 class Subscription(Item, frozen=True):
-    """A robot's channel that a client wants to hear."""
+    """A channel of an endpoint (a robot, player or client) that a client wants to hear."""
 
-    robot: Name
+    source: Name
     channel: Name
 
 
@@ -404,10 +404,13 @@ class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
 
 
 class Sent(Item, frozen=True):
-    """One packet that a client sends; `stamp_ns` is its own clock's, recorded and never judged."""
+    """One packet that a client sends; `stamp_ns` is its own clock's, recorded and never judged.
+
+    `destination` is empty when it goes to all who subscribe to the client's channel.
+    """
 
     sequence: Counter
-    destination: Name
+    destination: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     channel: Name
     stamp_ns: Counter
     payload: Payload

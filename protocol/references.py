@@ -34,7 +34,7 @@ class Finding:
 def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found as they are asked for."""
     view = View(data)
-    between = (_names, _hosts, _robots, _nodes, _players, _rates, _clients, _deadlines)
+    between = (_names, _hosts, _robots, _nodes, _players, _hears, _on, _rates, _clients, _deadlines)
     for check in (*between, _lines, _shapes, _scenery):
         yield from check(view)
 
@@ -185,6 +185,37 @@ def _players(view: View) -> Iterator[Finding]:
                 elif channel in seen:
                     yield Finding((*location, index), "a channel that is listed twice", channel)
                 seen.add(channel)
+
+
+def _hears(view: View) -> Iterator[Finding]:
+    """What a player hears of others: selectors that match another endpoint, channels that one of these has."""
+    endpoints = [*view.robots, *view.players, *view.clients] if view.robots else []
+    for player in view.players if endpoints else ():
+        for glob in view.mapping("players", player, "hears"):
+            location: Location = ("players", player, "hears", glob)
+            if not names.is_selector(glob):
+                continue
+            matched = [name for name in endpoints if name != player and fnmatchcase(name, glob)]
+            if not matched:
+                nearest = quoted(nearest_name(glob, [name for name in endpoints if name != player]))
+                yield Finding(location, "a selector that matches no other endpoint", glob, nearest, at="key")
+                continue
+            if any(name not in view.robots for name in matched):
+                continue
+            sensors = {channel for robot in matched for channel in view.mapping("robots", robot, "sensors")}
+            for index, channel in view.texts(*location):
+                if channel not in (*sensors, names.CHANNEL_ECHO):
+                    nearest = quoted(nearest_name(channel, [*sensors, names.CHANNEL_ECHO]))
+                    yield Finding((*location, index), f"{glob} has no such channel", channel, nearest)
+
+
+def _on(view: View) -> Iterator[Finding]:
+    """Players and clients are on board of robots that exist."""
+    for section in ("players", "clients"):
+        for name in view.mapping(section) if view.robots else ():
+            robot = view.get(section, name, "on")
+            if isinstance(robot, str) and robot not in view.robots:
+                yield Finding((section, name, "on"), "unknown robot", robot, quoted(nearest_name(robot, view.robots)))
 
 
 def _rates(view: View) -> Iterator[Finding]:

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Final
 
-from foosim.client.core import ClientCore, Outgoing
+from foosim.client.core import ClientCore
+from foosim.client.packets import Outgoing
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.deployment_file import load_deployment

@@ -191,6 +191,6 @@ class Door:
 
 def _is_member(known: Member | Joining, join: Join) -> bool:
     """Whether a client takes part as it asks to."""
-    wanted = {(item.robot, item.channel) for item in join.subscriptions}
+    wanted = {(item.source, item.channel) for item in join.subscriptions}
     active = isinstance(known, Joining) or known.active
-    return active and known.period == join.period and {(robot, name) for robot, name in known.subscriptions} == wanted
+    return active and known.period == join.period and {(source, name) for source, name in known.subscriptions} == wanted

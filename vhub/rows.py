@@ -154,9 +154,9 @@ class PacketRow(Row, frozen=True):
 
 
 class SubscriptionRow(Row, frozen=True):
-    """A robot's channel that a client hears."""
+    """A channel of an endpoint that a client hears."""
 
-    robot: str
+    source: str
     channel: str
 
 
@@ -380,7 +380,7 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
     tick = closing.frame.tick
     rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
     for joining in closing.joins:
-        subscriptions = [SubscriptionRow(robot, channel) for robot, channel in joining.subscriptions]
+        subscriptions = [SubscriptionRow(source, channel) for source, channel in joining.subscriptions]
         rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions))
     return rows
 

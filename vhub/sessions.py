@@ -191,7 +191,7 @@ class Sessions:
 
     def join(self, join: Join) -> None:
         """Note a join; it takes effect when the hub closes a tick that suits its period."""
-        subscriptions = [(wanted.robot, wanted.channel) for wanted in join.subscriptions]
+        subscriptions = [(wanted.source, wanted.channel) for wanted in join.subscriptions]
         self.joins[join.name] = Joining(join.name, join.period, sorted(set(subscriptions)))
 
     def take_joins(self, tick: int) -> list[Joining]:

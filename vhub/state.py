@@ -126,7 +126,8 @@ class HubState:
                 gamma_quantiles_ns(rule.jitter.mean_ns, rule.jitter.sd_ns)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
-        self._receivers: dict[tuple[str, str], tuple[str, ...]] = {}
+        self._receivers: dict[tuple[str, str], tuple[str, ...]] | None = None
+        """Who hears each (endpoint, channel), in name order; None when it is to be found anew."""
 
     def turn_to(self, epoch: Epoch) -> bool:
         """Go on in the branch that an epoch is of; False when it is the present one.
@@ -151,14 +152,14 @@ class HubState:
         member = self.members[joining.name] = Member(joining.period, subscriptions, tick)
         if known is not None:
             member.sequence, member.downlink, member.branched = known.sequence, known.downlink, known.branched
-        self._receivers.clear()
+        self._receivers = None
 
     def leave(self, name: str) -> None:
         """Let a client go: nothing is offered to it any more."""
         if name in self.members:
             self.members[name].subscriptions = ()
             self.members[name].active = False
-            self._receivers.clear()
+            self._receivers = None
 
     def due_members(self, tick: int) -> list[str]:
         """Return the lockstep clients that are due at `tick`, in name order."""
@@ -176,10 +177,7 @@ class HubState:
         sent_ns = tick * self.tick_ns
         for packet in packets:
             sequence = (tick << OUTBOX_SHIFT) + packet.index
-            receivers: Sequence[str] = (
-                (packet.destination,) if packet.destination else self._subscribers(packet.robot, packet.channel)
-            )
-            for receiver in receivers:
+            for receiver in self._addressed(packet.robot, packet.destination, packet.channel):
                 if receiver not in self._endpoints:
                     self.refuse("no_route")
                     continue
@@ -195,11 +193,17 @@ class HubState:
         for cause, count in self.refused_at_door:
             self.refuse(cause, count)
         for source in sorted(admitted):
+            copies = 0
             for sent in sorted(admitted[source], key=lambda packet: packet.sequence):
-                if self._admit(source, sent):
-                    flight = Flight(
-                        source, sent.destination, sent.channel, sent.sequence, sent_ns, sent.stamp_ns, sent.payload
-                    )
+                if not self._admit(source, sent):
+                    continue
+                receivers = self._addressed(source, sent.destination, sent.channel)
+                copies += 0 if sent.destination else len(receivers)
+                if copies > limits.PACKETS_PER_MESSAGE_MAX:
+                    self.refuse("broadcast_full")
+                    continue
+                for receiver in receivers:
+                    flight = Flight(source, receiver, sent.channel, sent.sequence, sent_ns, sent.stamp_ns, sent.payload)
                     self._send(flight, tick, fates)
         self.closed = tick
         deliveries = self._arrive_at_robots(tick + 1, frame, fates)
@@ -248,7 +252,7 @@ class HubState:
         if sent.sequence <= member.sequence:
             return self.refuse("duplicate")
         member.sequence = sent.sequence
-        if sent.destination not in self._endpoints:
+        if sent.destination and sent.destination not in self._endpoints:
             return self.refuse("no_route")
         return True
 
@@ -262,14 +266,20 @@ class HubState:
         """Note packets that are refused between closings; the next closing counts them."""
         self.at_door[cause] = self.at_door.get(cause, 0) + count
 
-    def _subscribers(self, robot: str, channel: str) -> tuple[str, ...]:
-        """Return the clients that hear a robot's channel, in name order."""
-        receivers = self._receivers.get((robot, channel))
-        if receivers is None:
-            wanted = (robot, channel)
-            receivers = tuple(name for name in sorted(self.members) if wanted in self.members[name].subscriptions)
-            self._receivers[wanted] = receivers
-        return receivers
+    def _addressed(self, source: str, destination: str, channel: str) -> tuple[str, ...]:
+        """Return to whom a packet goes: to its destination, or to the clients that hear the source's channel by name.
+
+        Each receiver is one offered packet; without a receiver nothing is offered.
+        """
+        if destination:
+            return (destination,)
+        if self._receivers is None:
+            heard: dict[tuple[str, str], list[str]] = {}
+            for name in sorted(self.members):
+                for pair in self.members[name].subscriptions:
+                    heard.setdefault(pair, []).append(name)
+            self._receivers = {pair: tuple(names) for pair, names in heard.items()}
+        return self._receivers.get((source, channel), ())
 
     def _link(self, source: str, destination: str) -> Link:
         link = self.links.get((source, destination))

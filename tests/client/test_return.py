@@ -7,7 +7,8 @@ from typing import Final
 
 import pytest
 
-from foosim.client.core import AWAY_AGAIN_NS, ClientCore, Outgoing
+from foosim.client.core import AWAY_AGAIN_NS, ClientCore
+from foosim.client.packets import Outgoing
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.channels import Plane
