@@ -117,11 +117,14 @@ def fitting_edits(layout: Layout, edits: Sequence[messages.Edit]) -> list[messag
     """Return the edits that do something to a world with this layout, in their order.
 
     An addition of a name that is taken, the removal of what was not added, a push of what is no free body and a freeze
-    of what is no robot change nothing: a function of the order alone, the same for all who read it.
+    of what is no robot change nothing, and what happens to the network is the vHub's: a function of the order alone,
+    the same for all who read it.
     """
     models = dict(layout.models)
     fitting: list[messages.Edit] = []
     for edit in edits:
+        if isinstance(edit, messages.Disrupt):
+            continue
         if isinstance(edit, messages.Add):
             if edit.name in models or edit.model not in ADDABLE:
                 continue

@@ -74,6 +74,8 @@ DOWNLINKS_KEPT_MAX: Final = 16_384
 """How many numbered downlinks are kept for one client."""
 UPLINKS_KEPT_MAX: Final = 65_536
 """How many packets a client keeps that the vHub has not recorded yet."""
+EVENT_BYTES_MAX: Final = 4_096
+"""What one request may say that shall happen to the network."""
 EDITED_TICKS_KEPT: Final = 256
 """Ticks whose edits the supervisor knows after they are committed: a branch orders them again."""
 CHECKPOINT_TICKS: Final = 500

@@ -53,7 +53,16 @@ class Thaw(Message, frozen=True):
     name: Name
 
 
-Edit = Add | Remove | Push | Freeze | Thaw
+class Disrupt(Message, frozen=True):
+    """Do to the network what `event` says, as JSON like an event of a deployment without its time: it is the tick's.
+
+    Nodes do not look at it; the vHub does from frame k+1 on, when order k carries it.
+    """
+
+    event: Annotated[str, Meta(max_length=limits.EVENT_BYTES_MAX)]
+
+
+Edit = Add | Remove | Push | Freeze | Thaw | Disrupt
 Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 

@@ -6,6 +6,7 @@ or from the first one that both ends carry. Without rule and radio a link is as 
 Neighbours: `radios`, `impairments`; `network_references` checks what one field cannot know.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -138,6 +139,11 @@ class Event(Part):
     set: Change | None = None
     chaos: Chaos | None = None
     heal: Literal["all", "partitions", "clogs", "chaos", "settings"] | None = None
+
+
+def event_of(text: str, at_ns: int) -> Event:
+    """Return the event that JSON without a time describes, at a time; raises ValueError (pydantic's) for none."""
+    return Event.model_validate({**json.loads(text), "at": f"{at_ns} ns"})
 
 
 ACTIONS: Final = ("partition", "clog", "set", "chaos", "heal")

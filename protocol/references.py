@@ -7,6 +7,7 @@ findings into lines with places; what concerns the network is in network_referen
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any, Final, Literal
 

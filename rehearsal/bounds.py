@@ -26,7 +26,7 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Issued.by_tick": limits.EDITED_TICKS_KEPT,
     "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
-    "Lags.cells": 1 << 10,
+    "Lags.cells": 1 << 13,
     "HubState.links": limits.CLIENTS_MAX,
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }

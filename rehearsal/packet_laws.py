@@ -226,7 +226,7 @@ class PacketLaws:
         """Law 5: offered = delivered + dropped + in flight, in all and for every link."""
         packets, flying = state.packets, state.in_flight()
         hold(packets.in_flight == len(flying), f"{packets.in_flight} packets in flight, there are {len(flying)}")
-        links = [link.state for link in state.links.values()]
+        links = list(state.fabric.states.values())
         total = sum(link.offered for link in links), sum(link.delivered for link in links)
         hold(total == (packets.offered, packets.delivered), "the links' account is not that of all")
         hold(all(link.offered >= link.delivered + link.dropped for link in links), "a link has more fates than packets")
@@ -242,7 +242,10 @@ class PacketLaws:
             counted[DELIVERED if not cause else IN_FLIGHT if cause == IN_FLIGHT else DROPPED] += 1
         packets = state.packets
         by_link = Counter((source, to) for (source, to, _, _), (_, cause) in self._fates.items() if cause not in OPEN)
-        dropped = {pair: link.state.dropped for pair, link in state.links.items() if link.state.dropped}
+        dropped: Counter[tuple[str, str]] = Counter()
+        for (source, destination, _), link in state.fabric.states.items():
+            if link.dropped:
+                dropped[source, destination] += link.dropped
         hold(dict(by_link) == dropped, f"receivers lack {by_link}, links count {dropped} as dropped")
         told = {DELIVERED: packets.delivered, DROPPED: packets.dropped, IN_FLIGHT: packets.in_flight}
         hold(counted == told, f"fates {counted}, the account says {told}")

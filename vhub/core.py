@@ -250,7 +250,7 @@ class HubCore:
         for joining in joins:
             state.join(joining, tick)
         closing = closing_of(frame, commit, state, joins, leaves, now_ns)
-        released = state.close_world(frame, packets, closing.fates)
+        released = state.close_world(frame, packets, closing.fates, commit.edits)
         due = state.due_members(tick)
         for name in due:
             self.door.go(name, tick, released.pop(name, []), now_ns)

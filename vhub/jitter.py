@@ -2,7 +2,7 @@
 
 The routine uses only + - x / of IEEE doubles (its own exponential and logarithm), so that the table is the same on
 every machine, whatever its mathematical library. Source of the series: Abramowitz and Stegun, Handbook of Mathematical
-Functions, 6.5.29 (incomplete gamma) and 6.1.41 (Stirling's series of ln gamma).
+Functions, 6.5.29 (incomplete gamma). Neighbours: `numbers` (the functions), `stages.delay` draws from the tables.
 """
 
 from __future__ import annotations
@@ -11,49 +11,22 @@ import math
 from functools import lru_cache
 from typing import Final
 
+from pydantic import TypeAdapter
+
+from foosim.protocol.draws import gaussian
+from foosim.protocol.impairments import (
+    GammaJitter,
+    Jitter,
+    LognormalJitter,
+    MixtureJitter,
+    ParetoJitter,
+    ShiftedExponentialJitter,
+    TableJitter,
+    UniformJitter,
+)
+from foosim.vhub.numbers import exp, ln, ln_gamma, power
+
 CELLS: Final = 4096
-_LN2: Final = 0.6931471805599453
-_LN_2PI: Final = 1.8378770664093453
-
-
-def _ln(x: float) -> float:
-    """Natural logarithm by x = m 2^e and the series of 2 artanh((m - 1) / (m + 1))."""
-    mantissa, exponent = math.frexp(x)
-    t = (mantissa - 1.0) / (mantissa + 1.0)
-    square, term, total, n = t * t, t, 0.0, 1
-    while abs(term) > 1e-18:
-        total += term / n
-        term *= square
-        n += 2
-    return 2.0 * total + exponent * _LN2
-
-
-def _exp(x: float) -> float:
-    """Exponential by Taylor's series after halving the argument and squaring the result."""
-    halvings = 0
-    while abs(x) > 0.25:
-        x /= 2.0
-        halvings += 1
-    term, total, n = 1.0, 1.0, 1
-    while abs(term) > 1e-18:
-        term *= x / n
-        total += term
-        n += 1
-    for _ in range(halvings):
-        total *= total
-    return total
-
-
-def _ln_gamma(a: float) -> float:
-    """ln Gamma(a), a > 0: the recurrence up to 10, then Stirling's series."""
-    shift = 0.0
-    while a < 10.0:
-        shift += _ln(a)
-        a += 1.0
-    inverse = 1.0 / a
-    square = inverse * inverse
-    series = inverse * (1 / 12 - square * (1 / 360 - square * (1 / 1260 - square * (1 / 1680))))
-    return (a - 0.5) * _ln(a) - a + 0.5 * _LN_2PI + series - shift
 
 
 class _Gamma:
@@ -61,13 +34,13 @@ class _Gamma:
 
     def __init__(self, a: float) -> None:
         self.a = a
-        self._ln_gamma = _ln_gamma(a)
+        self._ln_gamma = ln_gamma(a)
         self._density = 0.0
         """At the last x that was looked at."""
 
     def _power(self, x: float) -> float:
         """x^a e^-x / Gamma(a): the factor that P and the density share."""
-        return _exp(self.a * _ln(x) - x - self._ln_gamma)
+        return exp(self.a * ln(x) - x - self._ln_gamma)
 
     def quantile(self, p: float, low: float, rise: float) -> float:
         """The x >= `low` with P(a, x) = p, where P(a, low) = p - `rise`: Newton's iteration inside a bracket.
@@ -109,6 +82,105 @@ class _Gamma:
         return total * power, self._density
 
 
+ENDS: Final = (2.0**-20, 1.0 - 2.0**-20)
+"""The probabilities of the first and last quantile: those at 0 and 1 would be 0 and infinite."""
+
+
+def _probabilities() -> tuple[float, ...]:
+    return ENDS[0], *(cell / CELLS for cell in range(1, CELLS)), ENDS[1]
+
+
+_ANY_JITTER: Final[TypeAdapter[Jitter]] = TypeAdapter(Jitter)
+
+
+def quantiles_ns(jitter: Jitter, table: tuple[int, ...] = ()) -> tuple[int, ...]:
+    """Return the quantiles, in ns, of any jitter: CELLS + 1, and CELLS more within the last cell of a heavy tail.
+
+    `table` is the content of the file of one that has a file.
+    """
+    return _quantiles_of(_ANY_JITTER.dump_json(jitter, by_alias=True), table)
+
+
+@lru_cache(maxsize=256)
+def _quantiles_of(text: bytes, table: tuple[int, ...]) -> tuple[int, ...]:
+    jitter = _ANY_JITTER.validate_json(text)
+    if isinstance(jitter, GammaJitter):
+        return gamma_quantiles_ns(jitter.mean_ns, jitter.sd_ns)
+    if isinstance(jitter, MixtureJitter):
+        return _mixture(jitter)
+    if isinstance(jitter, TableJitter):
+        return _from_table(jitter, table)
+    return tuple(round(_quantile(jitter, above)) for above in (*_aboves(), *_tail_aboves()))
+
+
+def _aboves() -> tuple[float, ...]:
+    """Return the probabilities of more than each quantile, exact near 0."""
+    return 1.0 - ENDS[0], *((CELLS - cell) / CELLS for cell in range(1, CELLS)), 1.0 / CELLS
+
+
+def _tail_aboves() -> tuple[float, ...]:
+    """Return the same within the last cell."""
+    return *((CELLS - cell) / CELLS / CELLS for cell in range(1, CELLS)), ENDS[0] / CELLS
+
+
+def _quantile(jitter: UniformJitter | LognormalJitter | ShiftedExponentialJitter | ParetoJitter, above: float) -> float:
+    """Return the number, in ns, that a law with a closed form exceeds with this probability."""
+    if isinstance(jitter, UniformJitter):
+        return jitter.width_ns * (1.0 - above)
+    if isinstance(jitter, ShiftedExponentialJitter):
+        return max(float(jitter.min_ns), -jitter.mean_ns * ln(above))
+    if isinstance(jitter, ParetoJitter):  # Lomax: mean = scale / (alpha - 1)
+        scale = jitter.mean_ns * (jitter.alpha - 1.0)
+        return min(float(jitter.max_ns), scale * (power(above, -1.0 / jitter.alpha) - 1.0))
+    ratio = jitter.sd_ns / jitter.mean_ns
+    variance = ln(1.0 + ratio * ratio)
+    normal = -gaussian(int(above * 2.0**64))
+    return jitter.mean_ns * exp(math.sqrt(variance) * normal - variance / 2.0)
+
+
+def _mixture(jitter: MixtureJitter) -> tuple[int, ...]:
+    """Return the quantiles of a mixture of uniform parts, by bisection of its distribution function."""
+    parts = [(part.share, part.from_ns, max(part.to_ns, part.from_ns + 1)) for part in jitter.parts]
+
+    def below(x_ns: int) -> float:
+        return sum(share * min(1.0, max(0.0, (x_ns - low) / (high - low))) for share, low, high in parts)
+
+    quantiles, low_ns = [], min(low for _, low, _ in parts)
+    top_ns = max(high for _, _, high in parts)
+    for p in _probabilities():
+        high_ns = top_ns
+        while low_ns < high_ns:
+            middle_ns = (low_ns + high_ns) // 2
+            low_ns, high_ns = (middle_ns + 1, high_ns) if below(middle_ns) < p else (low_ns, middle_ns)
+        quantiles.append(low_ns)
+    return tuple(quantiles)
+
+
+TABLE_SCALE: Final = 8192
+"""netem writes a standard deviation as this number."""
+
+
+def read_table(text: str) -> tuple[int, ...]:
+    """Return the numbers of a file in netem's form, sorted; raises ValueError when it is none."""
+    lines = (line.partition("#")[0] for line in text.splitlines())
+    numbers = sorted(int(word) for line in lines for word in line.split())
+    if len(numbers) < 2:
+        raise ValueError("fewer than two numbers")
+    return tuple(numbers)
+
+
+def _from_table(jitter: TableJitter, table: tuple[int, ...]) -> tuple[int, ...]:
+    """Return mean + sd x entry / 8192 at each quantile, at least 0; between entries it is linear."""
+    assert table, "the jitter's file was given"
+    quantiles = []
+    for p in _probabilities():
+        place = p * (len(table) - 1)
+        cell = min(int(place), len(table) - 2)
+        entry = table[cell] + (table[cell + 1] - table[cell]) * (place - cell)
+        quantiles.append(max(0, round(jitter.mean_ns + jitter.sd_ns * entry / TABLE_SCALE)))
+    return tuple(quantiles)
+
+
 @lru_cache(maxsize=256)
 def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
     """Return CELLS + 1 quantiles, in ns, of a gamma distribution; the ends are those at 2^-20 and at 1 - 2^-20.
@@ -121,7 +193,7 @@ def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
     quantiles = []
     gamma = _Gamma(shape)
     x = p = 0.0
-    for above in (2.0**-20, *(cell / CELLS for cell in range(1, CELLS)), 1.0 - 2.0**-20):
+    for above in _probabilities():
         x = gamma.quantile(above, x, above - p)
         p = above
         quantiles.append(round(x * scale_ns))
@@ -131,5 +203,10 @@ def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
 def interpolate_ns(quantiles_ns: tuple[int, ...], word: int) -> int:
     """Return the quantile at word / 2^64, linear within its cell, in integer arithmetic."""
     cell = word >> 52
+    rest = word & 0xFFFFFFFFFFFFF
+    if cell == CELLS - 1 and len(quantiles_ns) > CELLS + 1:
+        inner = rest >> 40
+        low, high = quantiles_ns[cell if inner == 0 else CELLS + inner], quantiles_ns[CELLS + 1 + inner]
+        return low + (((high - low) * (rest & 0xFFFFFFFFFF)) >> 40)
     low = quantiles_ns[cell]
-    return low + (((quantiles_ns[cell + 1] - low) * (word & 0xFFFFFFFFFFFFF)) >> 52)
+    return low + (((quantiles_ns[cell + 1] - low) * rest) >> 52)

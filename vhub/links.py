@@ -1,55 +1,81 @@
 """Links: a directed pair of endpoints, its pipeline of stages, what they remember, and its account.
 
-A link exists from the first packet on it. Its rule is the first of the deployment that matches the pair; without one
-it is perfect. Neighbours: `stages` (the table that is walked), `state` (all links of a run).
+A link exists from the first packet on it; channels for which the deployment has another rule are links of their own.
+Its stages are made anew where an event changes its settings; what they remember stays. Neighbours: `stages` (the table
+that is walked), `fabric` (all links of a run, and what they share), `profiles` (whose settings).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from foosim.protocol.deployment import Network
-from foosim.protocol.draws import draw_key, draw_words
+from foosim.protocol.draws import Slot, draw_key, draw_words
+from foosim.protocol.radios import Radio
+from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
+from foosim.vhub.profiles import Profile, over
 from foosim.vhub.stages import STAGES, Stage
 
-
-@dataclass(slots=True)
-class LinkState:
-    """What a link's stages remember, and its account: plain values, part of the hub's state."""
-
-    last_due_ns: int = -1
-    offered: int = 0
-    delivered: int = 0
-    dropped: int = 0
-    delay_ns: int = 0
-    """Sum of (due - sent) of what was delivered, for people."""
+if TYPE_CHECKING:
+    from foosim.vhub.fabric import Fabric
 
 
 class Link:
     """One directed pair with its stages."""
 
-    def __init__(self, source: str, destination: str, network: Network, seed: int, state: LinkState) -> None:
-        rule = network.rule_for(source, destination)
+    def __init__(self, source: str, destination: str, profile: Profile, fabric: Fabric, state: LinkState) -> None:
+        self.source, self.destination = source, destination
+        self.profile = profile
         self.state = state
-        self.rule = rule.id if rule is not None else "perfect"
-        self._key = draw_key(seed, "link", source, destination)
-        self._draws = rule is not None and (rule.loss > 0.0 or rule.jitter is not None)
-        stages: list[Stage] = [stage for make in STAGES if (stage := make(rule)) is not None]
-        self._stages = stages
+        self._fabric = fabric
+        via = (profile.radio,) if profile.radio else ()
+        self._key = draw_key(fabric.seed, "link", source, destination, *via)
+        self._version = -1
+        self._until_ns = -1
+        self._stages: list[Stage] = []
+        self._draws = False
+        self._slots = 0
+
+    @property
+    def rule(self) -> str:
+        return self.profile.rule
+
+    def settings_at(self, time_ns: int) -> tuple[Radio, int]:
+        """Return the link's settings at a time, and until when they hold."""
+        settings, until_ns = self.profile.settings, 2**62
+        for change in self._fabric.timeline.changes_of(self.rule, self.source, self.destination):
+            if change.start_ns <= time_ns < change.end_ns:
+                settings = over(settings, change.changes)
+                until_ns = min(until_ns, change.end_ns)
+            elif change.start_ns > time_ns:
+                until_ns = min(until_ns, change.start_ns)
+        return settings, until_ns
+
+    def _renew(self, time_ns: int) -> None:
+        settings, self._until_ns = self.settings_at(time_ns)
+        self._version = self._fabric.timeline.version
+        setup = self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
+        self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
+        self._slots = slots_of(settings, is_radio=setup.is_radio)
+        self._draws = self._slots != 0
 
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
         state = self.state
-        state.offered += 1
-        flight.rule = self.rule
+        if flight.sent_ns >= self._until_ns or self._version != self._fabric.timeline.version:
+            self._renew(flight.sent_ns)
+        is_offered = flight.copy == 0
+        state.offered += is_offered
+        flight.rule, flight.radio = self.profile.rule, self.profile.radio
+        flight.due_ns = flight.sent_ns
         if self._draws:
+            flight.slots = self._slots
             flight.words = draw_words(self._key, flight.sequence, flight.copy)
         for stage in self._stages:
-            cause = stage.at_sending(flight, state)
+            cause = stage.at_sending(flight)
             if cause:
                 flight.cause = cause
-                state.dropped += 1
+                state.dropped += is_offered
                 return False
         return True
 
@@ -58,12 +84,29 @@ class Link:
 
         `hindered` is why its receiver does not take it; empty when it does.
         """
+        if self._version != self._fabric.timeline.version:
+            self._renew(flight.sent_ns)
+        state, is_offered = self.state, flight.copy == 0
         for stage in self._stages:
             cause = stage.at_arrival(flight, hindered)
             if cause:
                 flight.cause = cause
-                self.state.dropped += 1
+                state.dropped += is_offered
                 return False
-        self.state.delivered += 1
-        self.state.delay_ns += flight.due_ns - flight.sent_ns
+        state.delivered += is_offered
+        state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
         return True
+
+
+def slots_of(settings: Radio, *, is_radio: bool) -> int:
+    """Return which draws settings use: bit n for slot n."""
+    bursts = settings.burst, settings.gilbert_elliott, settings.markov4, settings.outages
+    used = {
+        Slot.LOSS: settings.loss > 0.0 or any(model is not None for model in bursts),
+        Slot.ERROR: is_radio,
+        Slot.JITTER: settings.jitter is not None,
+        Slot.DUPLICATE: settings.duplicate > 0.0,
+        Slot.CORRUPT: settings.corrupt is not None,
+        Slot.REORDER: settings.reorder is not None,
+    }
+    return sum(1 << slot for slot, is_used in used.items() if is_used)

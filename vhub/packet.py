@@ -1,12 +1,16 @@
-"""A packet on its way through the pipeline, and what became of it.
+"""A packet on its way through the pipeline, what became of it, and what led there.
 
 A flight is made when a packet is offered to one receiver; stages read it and write its due time, or name the one cause
-of its drop, with the inputs that led there. Neighbours: `links` walks the stages, `stages` are one file each.
+of its drop, and what they found on the way: the inputs of its fate. Neighbours: `links` walks the stages, `stages` are
+one file each.
 """
 
 from __future__ import annotations
 
+from math import log10
 from typing import Final
+
+import msgspec
 
 from foosim.protocol.limits import PACKET_HEAD_BYTES_MAX
 
@@ -15,47 +19,81 @@ DROPPED: Final = "dropped"
 IN_FLIGHT: Final = "in_flight"
 
 
-class Flight:
-    """One offered packet: from `source` to one receiver. Times are simulated nanoseconds."""
+class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    """One offered packet: from `source` to one receiver. Times are simulated nanoseconds.
 
-    __slots__ = (
-        "arrival_tick",
-        "cause",
-        "channel",
-        "copy",
-        "destination",
-        "due_ns",
-        "payload",
-        "released_wall_ns",
-        "rule",
-        "sent_ns",
-        "sequence",
-        "source",
-        "stamp_ns",
-        "words",
-    )
+    Levels are hundredths of dB or dBm, so that they compare as integers. What no stage of the link has looked at is 0
+    or empty.
+    """
 
-    def __init__(
-        self, source: str, destination: str, channel: str, sequence: int, sent_ns: int, stamp_ns: int, payload: bytes
-    ) -> None:
-        self.source = source
-        self.destination = destination
-        self.channel = channel
-        self.sequence = sequence
-        self.copy = 0
-        self.sent_ns = sent_ns
-        self.stamp_ns = stamp_ns
-        self.payload = payload
-        self.due_ns = sent_ns
-        self.arrival_tick = -1
-        """-1 until it is on its way; a packet that is dropped at sending never is."""
-        self.cause = ""
-        self.rule = ""
-        self.words: tuple[int, ...] = ()
-        """The draws of the packet, when a stage asked for them: eight 64-bit words."""
-        self.released_wall_ns = 0
+    source: str
+    destination: str
+    channel: str
+    sequence: int
+    sent_ns: int
+    stamp_ns: int
+    payload: bytes
+    published: bool = False
+    """Whether it goes to all who subscribe; else its sender named the receiver."""
+    copy: int = 0
+    """1 for a copy that the link made."""
+    due_ns: int = 0
+    arrival_tick: int = -1
+    """-1 until it is on its way; a packet that is dropped at sending never is."""
+    cause: str = ""
+    rule: str = ""
+    words: tuple[int, ...] = ()
+    """The draws of the packet, when a stage asked for them: eight 64-bit words."""
+    slots: int = 0
+    """Which of them its link uses: bit n for slot n."""
+    released_wall_ns: int = 0
+    radio: str = ""
+    queue_bytes: int = 0
+    """What waited before it when it came."""
+    queue_ns: int = 0
+    access_ns: int = 0
+    airtime_ns: int = 0
+    """On air or wire, all attempts together."""
+    propagation_ns: int = 0
+    jitter_ns: int = 0
+    distance_mm: int = 0
+    walls: tuple[str, ...] = ()
+    """Names of the bodies in the way."""
+    walls_cdb: int = 0
+    path_loss_cdb: int = 0
+    """With walls, shadowing and fading."""
+    shadowing_cdb: int = 0
+    fading_cdb: int = 0
+    received_cdbm: int = 0
+    snr_cdb: int = 0
+    interference: int = 0
+    """Power of others on air meanwhile, in units of 1e-21 W."""
+    rate_bps: int = 0
+    error_threshold: int = 0
+    """It was lost when its draw for errors was below this: the packet error rate in units of 2^-64."""
+    contenders: int = 0
+    retries: int = 0
+    is_bad: bool = False
+    """Whether the link was in a bad time."""
+    bits_flipped: int = 0
+    air_start_ns: int = 0
+    air_end_ns: int = 0
+    """When it was on air the last time; others who are on air between may spoil it."""
+    is_doubled: bool = False
+    """Whether the link makes a copy of it."""
+    is_settled: bool = False
+    """Whether it was acknowledged: nothing that is sent later spoils it."""
+    is_spoiled: bool = False
+    """Whether something else on air meanwhile was too strong for it to survive (LoRa)."""
+    outcome: str = ""
+    """What the medium found out and the channel says, at sending; empty when it came through."""
 
 
 def size_of(flight: Flight) -> int:
     """Return how many bytes a packet takes in a message at most."""
     return PACKET_HEAD_BYTES_MAX + len(flight.payload)
+
+
+def level_cdbm(power: int) -> int:
+    """Return a power in units of 1e-21 W as a level in 0.01 dBm; 0 for no power."""
+    return round(100.0 * (10.0 * log10(power) - 180.0)) if power else 0

@@ -205,7 +205,7 @@ class Fold:
             state.leave(name)
         for joining in record.joins:
             state.join(joining, record.tick)
-        released = state.close_world(frame, packets, closing.fates)
+        released = state.close_world(frame, packets, closing.fates, commit.edits)
         count_downlinks(state, frame.tick, released)
         state.at_door = dict(record.refused)
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)

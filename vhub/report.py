@@ -59,8 +59,8 @@ def report(core: HubCore) -> bytes:
             "refused": refused,
             "refusals": state.refusals,
             "links": [
-                [*pair, s.offered, s.delivered, s.dropped, s.delay_ns // s.delivered if s.delivered else 0]
-                for pair, s in sorted((pair, link.state) for pair, link in state.links.items())
+                [source, destination, s.offered, s.delivered, s.dropped, s.delay_ns // s.delivered if s.delivered else 0]
+                for (source, destination, _), s in sorted(state.fabric.states.items(), key=lambda item: item[0])
             ],
             "clients": sorted(state.members),
             "capture": core.capture,

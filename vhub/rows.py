@@ -24,8 +24,8 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.message_types import Counter
-from foosim.protocol.messages import Add, Delivered, Edit, Epoch, Freeze, Push, Recovered, Remove, Thaw
-from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight
+from foosim.protocol.messages import Add, Delivered, Disrupt, Edit, Epoch, Freeze, Push, Recovered, Remove, Thaw
+from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
 from foosim.vhub.records import Closing
 
 FORMAT: Final = 1
@@ -52,12 +52,14 @@ class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
 class EditRow(Row, frozen=True):
     """A change of the world by an order. Lists are x, y, z in the world frame, empty where the kind has none."""
 
-    kind: Literal["add", "remove", "push", "freeze", "thaw"]
+    kind: Literal["add", "remove", "push", "freeze", "thaw", "network"]
     name: str = ""
     model: str = ""
     position: list[float] = []
     velocity: list[float] = []
     impulse: list[float] = []
+    event: str = ""
+    """What happens to the network, as JSON."""
 
 
 class DeliveredRow(Row, frozen=True):
@@ -126,9 +128,10 @@ class FrameRow(Row, frozen=True):
     outboxes: list[OutboxRow]
 
 
-class PacketRow(Row, frozen=True):
+class PacketRow(Row, frozen=True, omit_defaults=True):
     """One offered packet and its fate, with the cause of a drop and what the verdict came from.
 
+    Levels are hundredths of a dB or dBm. What no stage looked at has its default and is left out of the file.
     `due_ns` and `arrival_tick` are -1 when it was dropped at sending. The words are the 64-bit draws that were used,
     in hex. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when the packet left
     for its receiver, 0 when it did not.
@@ -151,6 +154,30 @@ class PacketRow(Row, frozen=True):
     size: Counter
     payload: bytes
     wall_released_ns: Counter
+    radio: str = ""
+    published: bool = False
+    queue_bytes: Counter = 0
+    queue_ns: Counter = 0
+    access_ns: Counter = 0
+    airtime_ns: Counter = 0
+    propagation_ns: Counter = 0
+    jitter_ns: Counter = 0
+    distance_mm: Counter = 0
+    walls: list[str] = []
+    walls_cdb: int = 0
+    path_loss_cdb: int = 0
+    shadowing_cdb: int = 0
+    fading_cdb: int = 0
+    received_cdbm: int = 0
+    snr_cdb: int = 0
+    interference_cdbm: int = 0
+    rate_bps: Counter = 0
+    error_ppm: Counter = 0
+    error_word: WordHex = ""
+    contenders: Counter = 0
+    retries: Counter = 0
+    is_bad: bool = False
+    bits_flipped: Counter = 0
 
 
 class SubscriptionRow(Row, frozen=True):
@@ -257,14 +284,11 @@ class Plan:
     tick_ns: int
     frames_every: int
     base: Layout
-    draws: Mapping[str, tuple[bool, bool]]
-    """Whether the rule of that name uses the draw for loss, and for jitter."""
 
 
 def plan_of(deployment: Deployment) -> Plan:
     """Return the plan of a deployment's captures."""
-    draws = {rule.id: (rule.loss > 0.0, rule.jitter is not None) for rule in deployment.network.links}
-    return Plan(deployment.tick_ns, deployment.capture.frames_every, build_layout(deployment), draws)
+    return Plan(deployment.tick_ns, deployment.capture.frames_every, build_layout(deployment))
 
 
 def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
@@ -285,7 +309,6 @@ def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
         entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
         if known is None or frame.tick % plan.frames_every == 0:
             entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
-    draws = plan.draws
     for flight in closing.fates:
         sent_ns = flight.sent_ns
         entries.append(
@@ -294,18 +317,17 @@ def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
                 sent_ns,
                 flight.stamp_ns or sent_ns,
                 flight.sequence & 0xFFFF_FFFF,
-                _packet_row(flight, draws.get(flight.rule, _NO_DRAWS)),
+                packet_row(flight),
             )
         )
     return entries
 
 
-_NO_DRAWS: Final = (False, False)
 _FATES: Final[Mapping[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
 
 
-def _packet_row(flight: Flight, draws: tuple[bool, bool]) -> PacketRow:
-    words = flight.words
+def packet_row(flight: Flight) -> PacketRow:
+    """Return the row of a packet whose fate is final, or that is in flight at the end."""
     fate = _FATES.get(flight.cause, DROPPED)
     on_its_way = flight.arrival_tick >= 0
     return PacketRow(
@@ -321,11 +343,47 @@ def _packet_row(flight: Flight, draws: tuple[bool, bool]) -> PacketRow:
         fate,
         flight.cause if fate is DROPPED else "",
         flight.rule,
-        f"{words[Slot.LOSS]:016x}" if words and draws[0] else "",
-        f"{words[Slot.JITTER]:016x}" if words and draws[1] and on_its_way else "",
+        _word(flight, Slot.LOSS),
+        _word(flight, Slot.JITTER) if on_its_way else "",
         len(flight.payload),
         flight.payload,
         flight.released_wall_ns,
+        *_inputs(flight),
+    )
+
+
+def _word(flight: Flight, slot: Slot) -> str:
+    """Return a draw that the packet's link uses."""
+    return f"{flight.words[slot]:016x}" if flight.slots >> slot & 1 else ""
+
+
+def _inputs(flight: Flight) -> tuple[Any, ...]:
+    """Return what the stages found, in the order of a row."""
+    return (
+        flight.radio,
+        flight.published,
+        flight.queue_bytes,
+        flight.queue_ns,
+        flight.access_ns,
+        flight.airtime_ns,
+        flight.propagation_ns,
+        flight.jitter_ns,
+        flight.distance_mm,
+        list(flight.walls),
+        flight.walls_cdb,
+        flight.path_loss_cdb,
+        flight.shadowing_cdb,
+        flight.fading_cdb,
+        flight.received_cdbm,
+        flight.snr_cdb,
+        level_cdbm(flight.interference),
+        flight.rate_bps,
+        flight.error_threshold * 1_000_000 >> 64,
+        _word(flight, Slot.ERROR) if flight.error_threshold else "",
+        flight.contenders,
+        flight.retries,
+        flight.is_bad,
+        flight.bits_flipped,
     )
 
 
@@ -393,6 +451,8 @@ def edit_row(edit: Edit) -> EditRow:
         return EditRow("remove", edit.name)
     if isinstance(edit, Push):
         return EditRow("push", edit.name, impulse=list(edit.impulse))
+    if isinstance(edit, Disrupt):
+        return EditRow("network", "", event=edit.event)
     return EditRow("freeze" if isinstance(edit, Freeze) else "thaw", edit.name)
 
 
@@ -404,6 +464,8 @@ def edit_of(row: EditRow) -> Edit:
         return Remove(row.name)
     if row.kind == "push":
         return Push(row.name, _vector(row.impulse))
+    if row.kind == "network":
+        return Disrupt(row.event)
     return Freeze(row.name) if row.kind == "freeze" else Thaw(row.name)
 
 

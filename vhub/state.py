@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 
@@ -19,10 +18,10 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Delivered, Deliveries, Epoch, Received, RobotPacket, Sent
+from foosim.protocol.messages import Delivered, Deliveries, Disrupt, Edit, Epoch, Received, RobotPacket, Sent
 from foosim.protocol.sampling import Sampling, are_answered
-from foosim.vhub.jitter import gamma_quantiles_ns
-from foosim.vhub.links import Link, LinkState
+from foosim.vhub.fabric import Fabric
+from foosim.vhub.memory import AirState, LinkState, RadioState
 from foosim.vhub.packet import Flight
 from foosim.vhub.room import Room
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
@@ -62,21 +61,21 @@ class Member:
         return tick if self.period == 0 else -(-tick // self.period) * self.period
 
 
-_Flight = tuple[str, str, str, int, int, int, bytes, int, int, int, str, list[int]]
-
-
 class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole state as it is written, field by field as `HubState.snapshot` makes it."""
 
     closed: int
-    packets: tuple[int, int, int, int]
+    packets: tuple[int, int, int, int, int]
     refusals: list[tuple[str, int]]
     members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int]]
-    links: list[tuple[str, str, int, int, int, int, int]]
+    links: list[tuple[str, str, str, LinkState]]
+    radios: list[tuple[str, str, RadioState]]
+    airs: list[tuple[str, AirState]]
+    asked: list[tuple[int, str]]
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
     branch: tuple[int, int]
-    flights: list[_Flight]
+    flights: list[Flight]
 
 
 @dataclass(slots=True)
@@ -87,6 +86,8 @@ class Packets:
     delivered: int = 0
     dropped: int = 0
     refused: int = 0
+    copies: int = 0
+    """Made by links, on purpose; they are in none of the other counts."""
 
     @property
     def in_flight(self) -> int:
@@ -105,7 +106,7 @@ class HubState:
         self.packets = Packets()
         self.refusals: dict[str, int] = {}
         self.members: dict[str, Member] = {}
-        self.links: dict[tuple[str, str], Link] = {}
+        self.fabric = Fabric(deployment)
         self.deliveries: dict[int, list[Delivered]] = {first_tick - 1: [], first_tick: []}
         """What reaches robots at the last closed tick and at the next one."""
         self.final = first_tick
@@ -121,9 +122,6 @@ class HubState:
         self._flights: dict[int, list[Flight]] = {}
         """What is in flight, by the tick at which it arrives."""
         self.sampling = Sampling(deployment)
-        for rule in deployment.network.links:  # the tables are made before the run starts: they would hold up a tick
-            if rule.jitter is not None:
-                gamma_quantiles_ns(rule.jitter.mean_ns, rule.jitter.sd_ns)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
         self._receivers: dict[tuple[str, str], tuple[str, ...]] | None = None
@@ -167,21 +165,28 @@ class HubState:
 
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
-    def close_world(self, frame: Frame, packets: Iterable[RobotPacket], fates: list[Flight]) -> dict[str, list[Flight]]:
-        """Phase one of closing the frame's tick; `packets` in (robot, index) order.
+    def close_world(
+        self, frame: Frame, packets: Iterable[RobotPacket], fates: list[Flight], edits: Sequence[Edit] = ()
+    ) -> dict[str, list[Flight]]:
+        """Phase one of closing the frame's tick; `packets` in (robot, index) order, `edits` led to the frame.
 
         Append the packets whose fate is final to `fates` and return what is released, by client.
         """
         tick = frame.tick
         assert tick == self.closed + 1, (tick, self.closed)
         sent_ns = tick * self.tick_ns
+        self.fabric.turn_to(frame)
+        for edit in edits:
+            if isinstance(edit, Disrupt):
+                self.fabric.take(tick, sent_ns, edit.event)
         for packet in packets:
             sequence = (tick << OUTBOX_SHIFT) + packet.index
             for receiver in self._addressed(packet.robot, packet.destination, packet.channel):
                 if receiver not in self._endpoints:
                     self.refuse("no_route")
                     continue
-                flight = Flight(packet.robot, receiver, packet.channel, sequence, sent_ns, 0, packet.payload)
+                published = not packet.destination
+                flight = Flight(packet.robot, receiver, packet.channel, sequence, sent_ns, 0, packet.payload, published)
                 self._send(flight, tick, fates)
         return self._arrive_at_clients(tick, fates)
 
@@ -203,8 +208,8 @@ class HubState:
                     self.refuse("broadcast_full")
                     continue
                 for receiver in receivers:
-                    flight = Flight(source, receiver, sent.channel, sent.sequence, sent_ns, sent.stamp_ns, sent.payload)
-                    self._send(flight, tick, fates)
+                    what = sent.sequence, sent_ns, sent.stamp_ns, sent.payload, not sent.destination
+                    self._send(Flight(source, receiver, sent.channel, *what), tick, fates)
         self.closed = tick
         deliveries = self._arrive_at_robots(tick + 1, frame, fates)
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
@@ -281,19 +286,21 @@ class HubState:
             self._receivers = {pair: tuple(names) for pair, names in heard.items()}
         return self._receivers.get((source, channel), ())
 
-    def _link(self, source: str, destination: str) -> Link:
-        link = self.links.get((source, destination))
-        if link is None:
-            link = Link(source, destination, self.deployment.network, self.deployment.seed, LinkState())
-            self.links[source, destination] = link
-        return link
-
     def _send(self, flight: Flight, tick: int, fates: list[Flight]) -> None:
-        self.packets.offered += 1
-        if not self._link(flight.source, flight.destination).send(flight):
-            self.packets.dropped += 1
+        is_offered, payload = flight.copy == 0, flight.payload
+        self.packets.offered += is_offered
+        if not self.fabric.link(flight.source, flight.destination, flight.channel).send(flight):
+            self.packets.dropped += is_offered
             fates.append(flight)
             return
+        self._let_fly(flight, tick)
+        if flight.is_doubled:
+            self.packets.copies += 1
+            what = flight.sequence, flight.sent_ns, flight.stamp_ns, payload, flight.published
+            twin = Flight(flight.source, flight.destination, flight.channel, *what, copy=1)
+            self._send(twin, tick, fates)
+
+    def _let_fly(self, flight: Flight, tick: int) -> None:
         member = self.members.get(flight.destination)
         earliest = tick if member is not None and flight.source in self._robots else tick + 1
         arrival = max(earliest, -(-flight.due_ns // self.tick_ns))
@@ -305,6 +312,15 @@ class HubState:
             self._flights[arrival] = [flight]
         else:
             flights.append(flight)
+
+    def _arrive(self, flight: Flight, hindered: str) -> bool:
+        """Judge a packet at arrival, and count it: copies are in no account."""
+        link = self.fabric.link(flight.source, flight.destination, flight.channel)
+        is_delivered = link.arrive(flight, hindered)
+        if flight.copy == 0:
+            self.packets.delivered += is_delivered
+            self.packets.dropped += not is_delivered
+        return is_delivered
 
     def _take_arrivals(self, tick: int, to_robots: bool) -> list[Flight]:
         """Take out what arrives at `tick` at robots (or at clients), in (due, source, sequence, copy) order."""
@@ -331,11 +347,8 @@ class HubState:
                 continue
             down = member is None or not member.active
             hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
-            if self.links[flight.source, flight.destination].arrive(flight, hindered):
-                self.packets.delivered += 1
+            if self._arrive(flight, hindered):
                 released.setdefault(flight.destination, []).append(flight)
-            else:
-                self.packets.dropped += 1
             fates.append(flight)
         return released
 
@@ -347,10 +360,8 @@ class HubState:
             down = flight.destination in frame.layout and frame.at(flight.destination, "down") != 0.0
             fates.append(flight)
             hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
-            if not self.links[flight.source, flight.destination].arrive(flight, hindered):
-                self.packets.dropped += 1
+            if not self._arrive(flight, hindered):
                 continue
-            self.packets.delivered += 1
             deliveries.append(
                 Delivered(
                     flight.due_ns,
@@ -372,23 +383,24 @@ class HubState:
 
     def snapshot(self) -> bytes:
         """Return the whole state as bytes: equal states give equal bytes."""
+        fabric, p = self.fabric, self.packets
         return msgspec.msgpack.encode(
             {
                 "closed": self.closed,
-                "packets": [self.packets.offered, self.packets.delivered, self.packets.dropped, self.packets.refused],
+                "packets": [p.offered, p.delivered, p.dropped, p.refused, p.copies],
                 "refusals": sorted(self.refusals.items()),
                 "members": [
                     [name, m.period, m.subscriptions, m.joined_tick, m.sequence, m.downlink, m.active, m.branched]
                     for name, m in sorted(self.members.items())
                 ],
-                "links": [
-                    [*pair, s.last_due_ns, s.offered, s.delivered, s.dropped, s.delay_ns]
-                    for pair, s in sorted((pair, link.state) for pair, link in self.links.items())
-                ],
+                "links": [[*key, fabric.states[key]] for key in sorted(fabric.states)],
+                "radios": [[*key, fabric.radios[key]] for key in sorted(fabric.radios)],
+                "airs": [[name, fabric.airs[name].state] for name in sorted(fabric.airs)],
+                "asked": fabric.asked,
                 "deliveries": sorted(self.deliveries.items()),
                 "final": [self.final, self.was_final],
                 "branch": [self.branch, self.branch_tick],
-                "flights": [_pack(flight) for flight in self.in_flight()],
+                "flights": self.in_flight(),
             }
         )
 
@@ -402,18 +414,17 @@ class HubState:
         state.refusals = dict(content.refusals)
         for name, period, subscriptions, *rest in content.members:
             state.members[name] = Member(period, tuple(subscriptions), *rest)
-        for source, destination, *values in content.links:
-            link = Link(source, destination, deployment.network, deployment.seed, LinkState(*values))
-            state.links[source, destination] = link
+        state.fabric.restore(content.links, content.radios, content.airs, content.asked)
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final
         state.branch, state.branch_tick = content.branch
         if not {state.closed, state.closed + 1} <= state.deliveries.keys():
             raise Malformed(f"a state after tick {state.closed} without the deliveries of that tick and the next")
-        for packed in content.flights:
-            flight = _unpack(packed)
-            if (flight.source, flight.destination) not in state.links:
+        ends = {(source, destination) for source, destination, _ in state.fabric.states}
+        for flight in content.flights:
+            if (flight.source, flight.destination) not in ends:
                 raise Malformed(f"a packet in flight from {flight.source} to {flight.destination} without a link")
+            state.fabric.restore_flight(flight)
             state._flights.setdefault(flight.arrival_tick, []).append(flight)
         return state
 
@@ -426,30 +437,6 @@ def received(flights: Iterable[Flight]) -> list[Received]:
 def _order(flight: Flight) -> tuple[int, str, int, int, str]:
     """Where a packet stands among what arrives at one tick; the receiver tells copies of a broadcast apart."""
     return flight.due_ns, flight.source, flight.sequence, flight.copy, flight.destination
-
-
-def _pack(flight: Flight) -> list[Any]:
-    return [
-        flight.source,
-        flight.destination,
-        flight.channel,
-        flight.sequence,
-        flight.sent_ns,
-        flight.stamp_ns,
-        flight.payload,
-        flight.copy,
-        flight.due_ns,
-        flight.arrival_tick,
-        flight.rule,
-        flight.words,
-    ]
-
-
-def _unpack(packed: _Flight) -> Flight:
-    flight = Flight(*packed[:7])
-    flight.copy, flight.due_ns, flight.arrival_tick, flight.rule, words = packed[7:]
-    flight.words = tuple(words)
-    return flight
 
 
 assert limits.ROBOT_PACKETS_PER_TICK_MAX == 1 << OUTBOX_SHIFT

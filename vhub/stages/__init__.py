@@ -1,9 +1,9 @@
 """The stages of a link, in their fixed order: a table that the hub walks.
 
-Each stage is one file with a class that is made from a link's rule. It has two hooks, at sending and at arrival; a hook
-that drops the packet returns the name of the cause. A stage that has nothing to do on a link is left out there. What a
-stage remembers is a plain value in the link's state. To add one: its file, and its row here, at its place in the order
-admit, policy, duty, queue, medium, channel, residual, mangle, delay, receiver.
+Each stage is one file with a class that is made from a link's setup. It has two hooks, at sending and at arrival; a
+hook that drops the packet returns the name of the cause. A stage that has nothing to do on a link is left out there.
+What a stage remembers is a plain value in the hub's state: of the link, of the sender's radio or of the air. To add
+one: its file, and its row here.
 """
 
 from __future__ import annotations
@@ -11,23 +11,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from foosim.protocol.deployment import LinkRule
 from foosim.vhub.packet import Flight
+from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.admit import Admit
+from foosim.vhub.stages.channel import Channel
 from foosim.vhub.stages.delay import Delay
+from foosim.vhub.stages.duty import Duty
+from foosim.vhub.stages.mangle import Mangle
+from foosim.vhub.stages.medium import make_medium
+from foosim.vhub.stages.policy import Policy
+from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.receiver import Receiver
-from foosim.vhub.stages.residual import Residual
-
-
-class Memory(Protocol):
-    """What the stages of one link remember, part of the hub's state."""
-
-    last_due_ns: int
+from foosim.vhub.stages.residual import make_residual
 
 
 class Stage(Protocol):
     """One step of the pipeline on one link."""
 
-    def at_sending(self, flight: Flight, memory: Memory) -> str:
+    def at_sending(self, flight: Flight) -> str:
         """Judge a packet that is sent; return the cause of its drop, or an empty string."""
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:
@@ -37,8 +38,15 @@ class Stage(Protocol):
         """
 
 
-STAGES: Final[tuple[Callable[[LinkRule | None], Stage | None], ...]] = (
-    Residual.for_rule,
-    Delay.for_rule,
-    Receiver.for_rule,
+STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
+    Admit.for_link,
+    Policy.for_link,
+    Duty.for_link,
+    Queue.for_link,
+    make_medium,
+    Channel.for_link,
+    make_residual,
+    Mangle.for_link,
+    Delay.for_link,
+    Receiver.for_link,
 )

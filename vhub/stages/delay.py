@@ -1,41 +1,56 @@
-"""Delay: constant, plus jitter from a quantile table and a keyed draw; fifo unless the link says otherwise.
+"""Delay: queue, access, airtime and propagation, the constant delay, jitter, clogs; then the order of the link.
 
-Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Neighbours: `jitter`
-makes the table.
+Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo unless
+they say otherwise. Neighbours: `jitter` makes the table.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from foosim.protocol.deployment import LinkRule
-from foosim.protocol.draws import Slot
-from foosim.vhub.jitter import gamma_quantiles_ns, interpolate_ns
+from foosim.protocol.draws import Slot, chance_threshold
+from foosim.vhub.jitter import interpolate_ns, quantiles_ns
 from foosim.vhub.packet import Flight
-
-if TYPE_CHECKING:
-    from foosim.vhub.stages import Memory
+from foosim.vhub.setup import LinkSetup
 
 
 class Delay:
     """Sets the due time of a packet."""
 
-    def __init__(self, rule: LinkRule) -> None:
-        self._delay_ns = rule.delay_ns
-        self._fifo = rule.order == "fifo"
-        jitter = rule.jitter
-        self._quantiles_ns = () if jitter is None else gamma_quantiles_ns(jitter.mean_ns, jitter.sd_ns)
+    def __init__(self, setup: LinkSetup) -> None:
+        settings = setup.settings
+        self._memory = setup.memory
+        self._delay_ns = settings.delay_ns
+        self._fifo = settings.order == "fifo"
+        self._quantiles_ns = () if settings.jitter is None else quantiles_ns(settings.jitter, setup.table)
+        self._holds = setup.holds
+        self._bad_ns = 0 if settings.burst is None else settings.burst.bad_extra_delay_ns
+        reorder = settings.reorder
+        self._reordered = 0 if reorder is None else chance_threshold(reorder.probability)
+        self._extra_ns = 0 if reorder is None else reorder.extra_ns
 
     @classmethod
-    def for_rule(cls, rule: LinkRule | None) -> Delay | None:
-        """Return the stage, or None on a link without a rule: it is perfect, and fifo by itself."""
-        return None if rule is None else cls(rule)
+    def for_link(cls, setup: LinkSetup) -> Delay | None:
+        """Return the stage, or None where nothing takes time: such a link is fifo by itself."""
+        settings = setup.settings
+        timed = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
+        late = settings.jitter is not None or settings.reorder is not None or settings.burst is not None
+        return cls(setup) if timed or late or settings.delay_ns or setup.holds else None
 
-    def at_sending(self, flight: Flight, memory: Memory) -> str:
-        due_ns = flight.sent_ns + self._delay_ns
+    def at_sending(self, flight: Flight) -> str:
+        spent_ns = flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
+        due_ns = flight.sent_ns + spent_ns + self._delay_ns
         if self._quantiles_ns:
-            due_ns += interpolate_ns(self._quantiles_ns, flight.words[Slot.JITTER])
+            flight.jitter_ns = interpolate_ns(self._quantiles_ns, flight.words[Slot.JITTER])
+            due_ns += flight.jitter_ns
+        if flight.is_bad:
+            due_ns += self._bad_ns
+        for start_ns, end_ns in self._holds:
+            if start_ns <= due_ns < end_ns:
+                due_ns = end_ns
+        if self._extra_ns and flight.words[Slot.REORDER] < self._reordered:
+            flight.due_ns = due_ns + self._extra_ns
+            return ""
         if self._fifo:
+            memory = self._memory
             due_ns = max(due_ns, memory.last_due_ns + 1)
             memory.last_due_ns = due_ns
         flight.due_ns = due_ns

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from foosim.protocol.deployment import LinkRule
 from foosim.vhub.packet import Flight
-
-if TYPE_CHECKING:
-    from foosim.vhub.stages import Memory
+from foosim.vhub.setup import LinkSetup
 
 RECEIVER_DOWN: Final = "rx_down"
 RECEIVER_FULL: Final = "rx_full"
@@ -20,10 +17,10 @@ class Receiver:
     """
 
     @classmethod
-    def for_rule(cls, rule: LinkRule | None) -> Receiver:
+    def for_link(cls, setup: LinkSetup) -> Receiver:
         return cls()
 
-    def at_sending(self, flight: Flight, memory: Memory) -> str:
+    def at_sending(self, flight: Flight) -> str:
         return ""
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:

@@ -1,31 +1,132 @@
-"""Residual loss: packets that are lost for reasons that geometry does not explain, independently of each other."""
+"""Residual loss: what is lost for reasons that geometry does not explain, singly or in bursts.
+
+Bursts are a state: of time (all flows on a link see the same outages) or of the packets one after the other. Sources:
+Gilbert (1960) and Elliott (1963); Salsano, Ludovici and Ordine, "Definition of a general and intuitive loss model for
+packet networks" (2009) for the four states. All verdicts compare integers.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Final
 
-from foosim.protocol.deployment import LinkRule
-from foosim.protocol.draws import Slot, chance_threshold
+from foosim.protocol.draws import Slot, chance_threshold, draw_key
+from foosim.protocol.impairments import Burst, GilbertElliott, Markov4
+from foosim.vhub.episodes import Episodes, episodes_of_burst, episodes_of_outages
+from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
+from foosim.vhub.setup import LinkSetup
 
-if TYPE_CHECKING:
-    from foosim.vhub.stages import Memory
-
-RANDOM_LOSS = "random_loss"
+RANDOM_LOSS: Final = "random_loss"
+BURST_LOSS: Final = "burst_loss"
+CHAIN_BLOCK: Final = 1
+"""The block of a packet's draws of which the first word moves a chain on."""
 
 
 class Residual:
-    """Drops a packet when its keyed draw says so: an integer comparison, the same on every machine."""
+    """Independent losses, and those of a state that a subclass knows."""
 
-    def __init__(self, probability: float) -> None:
-        self._threshold = chance_threshold(probability)
+    def __init__(self, setup: LinkSetup, good_loss: float = 0.0, bad_loss: float = 0.0) -> None:
+        loss = setup.settings.loss
+        self._setup = setup
+        self._burst = chance_threshold(good_loss), chance_threshold(bad_loss)
+        self._any = tuple(chance_threshold(state + (1.0 - state) * loss) for state in (good_loss, bad_loss))
 
-    @classmethod
-    def for_rule(cls, rule: LinkRule | None) -> Residual | None:
-        return cls(rule.loss) if rule is not None and rule.loss > 0.0 else None
+    def is_bad(self, flight: Flight) -> bool:
+        """Whether the packet meets the link in its bad state."""
+        return False
 
-    def at_sending(self, flight: Flight, memory: Memory) -> str:
-        return RANDOM_LOSS if flight.words[Slot.LOSS] < self._threshold else ""
+    def at_sending(self, flight: Flight) -> str:
+        bad = flight.is_bad = self.is_bad(flight)
+        word = flight.words[Slot.LOSS]
+        if word >= self._any[bad]:
+            return ""
+        return BURST_LOSS if word < self._burst[bad] else RANDOM_LOSS
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:
         return ""
+
+
+class InTime(Residual):
+    """Bad times of a link, whoever sends in them."""
+
+    def __init__(self, setup: LinkSetup, episodes: list[Episodes], bad_loss: float) -> None:
+        super().__init__(setup, 0.0, bad_loss)
+        self._episodes = episodes
+
+    def is_bad(self, flight: Flight) -> bool:
+        return any([episodes.is_bad(flight.sent_ns) for episodes in self._episodes])
+
+
+class ByPacket(Residual):
+    """Two states, good and bad, that change from packet to packet."""
+
+    def __init__(self, setup: LinkSetup, p: float, r: float, good_loss: float, bad_loss: float) -> None:
+        super().__init__(setup, good_loss, bad_loss)
+        self._memory: LinkState = setup.memory
+        self._leaves = chance_threshold(p), chance_threshold(r)
+
+    def is_bad(self, flight: Flight) -> bool:
+        memory = self._memory
+        if self._setup.words(flight, CHAIN_BLOCK)[0] < self._leaves[memory.chain]:
+            memory.chain = 1 - memory.chain
+        return memory.chain == 1
+
+
+class FourStates(Residual):
+    """States 0 good, 1 a delivery within a burst, 2 a burst, 3 a single loss: lost are 2 and 3."""
+
+    def __init__(self, setup: LinkSetup, chain: Markov4) -> None:
+        super().__init__(setup, 0.0, 1.0)
+        self._memory: LinkState = setup.memory
+        self._steps: tuple[tuple[tuple[float, int], ...], ...] = (
+            ((chain.p14, 3), (chain.p13, 2)),
+            ((chain.p23, 2),),
+            ((chain.p31, 0), (chain.p32, 1)),
+            ((1.0, 0),),
+        )
+
+    def is_bad(self, flight: Flight) -> bool:
+        memory = self._memory
+        word, below = self._setup.words(flight, CHAIN_BLOCK)[0], 0.0
+        for chance, state in self._steps[memory.chain]:
+            below += chance
+            if word < chance_threshold(min(1.0, below)):
+                memory.chain = state
+                break
+        return memory.chain >= 2
+
+
+def chain_of_burst(burst: Burst) -> GilbertElliott:
+    """Return p and r with which the mean loss and the mean number of losses in a row are the configured ones.
+
+    With L the loss, e that in the bad state and b the mean run: r = 1 - (1 - 1/b) / e, p = r share / (1 - share) where
+    share = L / e. Source: the stationary distribution of the chain.
+    """
+    assert burst.mean_burst is not None
+    share = burst.loss / burst.bad_loss
+    r = 1.0 - (1.0 - 1.0 / burst.mean_burst) / burst.bad_loss
+    return GilbertElliott.model_construct(p=r * share / (1.0 - share), r=r, h=1.0 - burst.bad_loss, k=1.0)
+
+
+def make_residual(setup: LinkSetup) -> Residual | None:
+    """Return the stage of a link; None where nothing is lost."""
+    settings = setup.settings
+    chain = settings.gilbert_elliott
+    if settings.burst is not None and settings.burst.mean_burst is not None:
+        chain = chain_of_burst(settings.burst)
+    if chain is not None:
+        return ByPacket(setup, chain.p, chain.r, 1.0 - chain.k, 1.0 - chain.h)
+    if settings.markov4 is not None:
+        return FourStates(setup, settings.markov4)
+    times: list[Episodes] = []
+    words = int.from_bytes(setup.key[:8], "little")
+    bad_loss = 1.0
+    if settings.burst is not None:
+        times.append(episodes_of_burst(draw_key(words, "burst"), settings.burst))
+        bad_loss = settings.burst.bad_loss
+    if settings.outages is not None:
+        times.append(episodes_of_outages(draw_key(words, "outages"), settings.outages))
+        bad_loss = 1.0 if settings.burst is None else bad_loss
+    if times:
+        return InTime(setup, times, bad_loss)
+    return Residual(setup) if settings.loss > 0.0 else None

@@ -1,0 +1,58 @@
+"""The budget of one radio link: what its receiver gets of a packet's signal, and how that stands to the noise.
+
+Neighbours: `propagation` (the way of the signal), `stages.medium` and `stages.channel` (verdicts).
+"""
+
+from __future__ import annotations
+
+from foosim.protocol.draws import draw_key
+from foosim.protocol.radios import Fading
+from foosim.vhub.packet import Flight
+from foosim.vhub.propagation import OUT_OF_RANGE, Path, Propagation, level_of, centi, zeptowatt
+from foosim.vhub.radio.fading import block_of, fading_db, nakagami_m
+
+
+class Budget:
+    """Writes a packet's radio inputs, at sending. The two directions of a pair share their fading."""
+
+    def __init__(self, propagation: Propagation, source: str, destination: str, seed: int, air: str) -> None:
+        self.propagation = propagation
+        self._source, self._destination = source, destination
+        settings = propagation.settings
+        self._fading: Fading | None = settings.fading
+        first, second = sorted((propagation.world.body(source), propagation.world.body(destination)))
+        self._key = draw_key(seed, "fading", air, first, second)
+        self._sensitivity_cdbm = centi(settings.sensitivity_dbm)
+        self._speed_mm_ns = settings.speed_m_s * 1e-6
+
+    def path(self) -> Path:
+        """Return the way between the ends as they are in the newest frame."""
+        of = self.propagation
+        return of.path(of.antenna(self._source), of.antenna(self._destination), self._source, self._destination)
+
+    def measure(self, flight: Flight) -> str:
+        """Write what the receiver gets; return why it gets nothing, or an empty string."""
+        of, path = self.propagation, self.path()
+        flight.distance_mm, flight.walls, flight.walls_cdb = path.distance_mm, path.walls, path.walls_cdb
+        flight.propagation_ns = int(path.distance_mm / self._speed_mm_ns)
+        if path.cause:
+            return path.cause
+        fading_cdb = 0 if self._fading is None else self._fade(self._fading, flight.sent_ns, path.distance_mm)
+        flight.shadowing_cdb, flight.fading_cdb = path.shadowing_cdb, fading_cdb
+        flight.path_loss_cdb = path.loss_cdb - fading_cdb
+        flight.received_cdbm = of.power_cdbm + of.gain_cdb - flight.path_loss_cdb
+        flight.snr_cdb = flight.received_cdbm - of.noise_cdbm
+        return OUT_OF_RANGE if flight.received_cdbm < self._sensitivity_cdbm else ""
+
+    def ratio_cdb(self, flight: Flight) -> int:
+        """Return the ratio of a packet's signal to noise and to all that others send meanwhile."""
+        if not flight.interference:
+            return flight.snr_cdb
+        noise = zeptowatt(self.propagation.noise_cdbm)
+        return flight.received_cdbm - centi(level_of(noise + flight.interference))
+
+    def _fade(self, fading: Fading, time_ns: int, distance_mm: int) -> int:
+        parameter = fading.k_db
+        if fading.kind == "nakagami":
+            parameter = nakagami_m(distance_mm / 1000.0) if fading.m is None else fading.m
+        return centi(fading_db(self._key, block_of(time_ns, fading.coherence_ns), fading.kind, parameter))

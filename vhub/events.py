@@ -1,0 +1,176 @@
+"""The time line of a network: partitions, clogs, changed settings and chaos, as functions of simulated time.
+
+It is made from the deployment's events and from what was asked for while the run went on, in the order of time; every
+random length is drawn from (seed, number of the event), so that the same time line comes out wherever it is made.
+What lasts ends at the next `heal` at the latest. Neighbours: `stages.policy` (partitions), `stages.delay` (clogs),
+`links` (settings), `chaos` (what an event of chaos becomes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from foosim.protocol.draws import draw_key, draw_words
+from foosim.protocol.impairments import Impairments
+from foosim.protocol.network import REST, Event, Network, selects
+from foosim.vhub.chaos import chaos_settings, clogs_of_chaos, partitions_of_chaos
+from foosim.vhub.numbers import exponential_ns
+
+FOREVER_NS: Final = 2**62
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A time in which packets from one of `sources` to one of `destinations` do not pass."""
+
+    start_ns: int
+    end_ns: int
+    groups: tuple[frozenset[str], ...]
+    is_symmetric: bool
+
+    def parts(self, source: str, destination: str) -> bool:
+        """Whether a link is cut: its ends are in different groups, and, one way only, its source is in the first."""
+        one = next((n for n, group in enumerate(self.groups) if source in group), None)
+        other = next((n for n, group in enumerate(self.groups) if destination in group), None)
+        if one is None or other is None or one == other:
+            return False
+        return self.is_symmetric or one == 0
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """A time in which packets of some links wait."""
+
+    start_ns: int
+    end_ns: int
+    sources: frozenset[str]
+    destinations: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """New settings of a rule (of every link among some endpoints, when it names none) for a time."""
+
+    start_ns: int
+    end_ns: int
+    rule: str
+    changes: Impairments
+    among: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class ChaosTime:
+    """A time of chaos among some endpoints, and the key of its draws."""
+
+    start_ns: int
+    end_ns: int
+    key: bytes
+    among: frozenset[str]
+
+
+class Timeline:
+    """Everything that events do to links."""
+
+    def __init__(self, network: Network, seed: int, endpoints: Sequence[str]) -> None:
+        self._endpoints = endpoints
+        self._seed = seed
+        self._events = [(event, f"event {number}") for number, event in enumerate(network.events)]
+        """Each with what its draws are for: the same, whatever is added."""
+        self._asked = 0
+        self.cuts: list[Cut] = []
+        self.holds: list[Hold] = []
+        self.settings: list[Settings] = []
+        self.chaos: list[ChaosTime] = []
+        self.version = 0
+        """Grows with every change: links look again."""
+        self._compile()
+
+    def add(self, event: Event) -> None:
+        """Take an event that was asked for; it is not earlier than anything that was judged."""
+        self._events.append((event, f"request {self._asked}"))
+        self._asked += 1
+        self._compile()
+
+    def _compile(self) -> None:
+        self.version += 1
+        self.cuts, self.holds, self.settings, self.chaos = [], [], [], []
+        for event, purpose in sorted(self._events, key=lambda of: of[0].at_ns):
+            self._take(event, draw_key(self._seed, "network", purpose))
+
+    def _take(self, event: Event, key: bytes) -> None:
+        start_ns, end_ns = event.at_ns, _end_ns(event, key)
+        if event.partition is not None:
+            healed_ns = self._healed("partitions", start_ns, end_ns)
+            self.cuts.append(Cut(start_ns, healed_ns, self._groups(event.partition), event.symmetric))
+        elif event.clog is not None:
+            ends = self._selected(event.clog.from_), self._selected(event.clog.to)
+            self.holds.append(Hold(start_ns, self._healed("clogs", start_ns, end_ns), *ends))
+        elif event.set is not None:
+            until_ns = self._healed("settings", start_ns, FOREVER_NS)
+            self.settings.append(Settings(start_ns, until_ns, event.set.link, event.set))
+        elif event.chaos is not None:
+            among = self._selected(event.chaos.among)
+            chaos = ChaosTime(start_ns, self._healed("chaos", start_ns, end_ns), key, among)
+            self.chaos.append(chaos)
+            self.settings.append(Settings(start_ns, chaos.end_ns, "", chaos_settings(key), among))
+            for begin_ns, stop_ns, group, both in partitions_of_chaos(key, start_ns, chaos.end_ns, sorted(among)):
+                self.cuts.append(Cut(begin_ns, stop_ns, (group, among - group), both))
+
+    def _healed(self, what: str, start_ns: int, end_ns: int) -> int:
+        heals = (e.at_ns for e, _ in self._events if e.heal in ("all", what) and e.at_ns >= start_ns)
+        return min(end_ns, min(heals, default=FOREVER_NS))
+
+    def _selected(self, globs: Sequence[str]) -> frozenset[str]:
+        return frozenset(name for name in self._endpoints if selects(globs, name))
+
+    def _groups(self, groups: Iterable[Sequence[str]]) -> tuple[frozenset[str], ...]:
+        """Return the members of each group; an endpoint is in the first that selects it, `rest` are all others."""
+        left = set(self._endpoints)
+        named: list[frozenset[str] | None] = []
+        for globs in groups:
+            if list(globs) == [REST]:
+                named.append(None)
+                continue
+            members = frozenset(name for name in left if selects(globs, name))
+            left -= members
+            named.append(members)
+        return tuple(frozenset(left) if group is None else group for group in named)
+
+    # --- what links ask ----------------------------------------------------------------------------------------------
+
+    def cuts_of(self, source: str, destination: str) -> list[tuple[int, int]]:
+        """Return the times in which the link is cut, by start."""
+        return sorted((cut.start_ns, cut.end_ns) for cut in self.cuts if cut.parts(source, destination))
+
+    def holds_of(self, source: str, destination: str) -> list[tuple[int, int]]:
+        """Return the times in which the link is clogged, by start."""
+        times = [
+            (hold.start_ns, hold.end_ns)
+            for hold in self.holds
+            if source in hold.sources and destination in hold.destinations
+        ]
+        for chaos in self.chaos:
+            if {source, destination} <= chaos.among:
+                times += clogs_of_chaos(chaos.key, chaos.start_ns, chaos.end_ns, source, destination)
+        return sorted(times)
+
+    def changes_of(self, rule: str, source: str, destination: str) -> list[Settings]:
+        """Return the changed settings of a link, in the order in which they apply."""
+        return [
+            change
+            for change in self.settings
+            if change.rule == rule or (not change.rule and {source, destination} <= change.among)
+        ]
+
+
+def _end_ns(event: Event, key: bytes) -> int:
+    """Return when an event ends by itself."""
+    if event.until_ns is not None:
+        return event.until_ns
+    if event.lasts is None:
+        return FOREVER_NS
+    if not event.lasts.is_random:
+        return event.at_ns + event.lasts.ns
+    return event.at_ns + max(1, exponential_ns(event.lasts.ns, draw_words(key, 0)[0]))

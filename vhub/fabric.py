@@ -1,0 +1,163 @@
+"""All links of a run, and what they share: radios, airs, the world, the time line of events.
+
+Everything that is remembered is a plain value (`memory`), so that a state can be written down and taken up again.
+Neighbours: `state` (whose part it is), `links`, `profiles`, `events`, `world`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.draws import draw_key
+from foosim.protocol.frame import Frame
+from foosim.protocol.impairments import Impairments, TableJitter
+from foosim.protocol.network import Network, event_of
+from foosim.protocol.radios import Radio
+from foosim.vhub.air import Air
+from foosim.vhub.budget import Budget
+from foosim.vhub.events import Timeline
+from foosim.vhub.jitter import quantiles_ns, read_table
+from foosim.vhub.links import Link
+from foosim.vhub.memory import AirState, LinkState, RadioState
+from foosim.vhub.packet import Flight
+from foosim.vhub.profiles import NO_RADIO, Profile, Profiles
+from foosim.vhub.propagation import Propagation
+from foosim.vhub.setup import LinkSetup
+from foosim.vhub.traces import read_opportunities
+from foosim.vhub.world import World
+
+LinkKey = tuple[str, str, str]
+"""Source, destination, and the name of what decides the link's settings."""
+RadioKey = tuple[str, str]
+"""An endpoint and the name of a radio of its; or a link's own queue: its ends joined, and its rule."""
+
+_OWN_QUEUE: Final = ">"
+
+
+class Fabric:
+    """The network of a run."""
+
+    def __init__(self, deployment: Deployment, network: Network | None = None) -> None:
+        """`network` stands in for the deployment's."""
+        self.deployment = deployment
+        self.network = deployment.network if network is None else network
+        self.seed = deployment.seed if self.network.seed is None else self.network.seed
+        self.timeline = Timeline(self.network, self.seed, deployment.endpoints())
+        self.world = World(deployment, self.network)
+        self.profiles = Profiles(deployment, self.network)
+        self.states: dict[LinkKey, LinkState] = {}
+        """What the links remember that packets were sent on."""
+        self.radios: dict[RadioKey, RadioState] = {}
+        self.airs: dict[str, Air] = {}
+        self.asked: list[tuple[int, str]] = []
+        """Events that were asked for while the run went on: the tick, and the event as JSON."""
+        self._links: dict[tuple[str, str, str], Link] = {}
+        """By source, destination and what of the channel decides."""
+        self._propagations: dict[str, Propagation] = {}
+        for rule in (*self.network.links, *self.network.radios.values()):
+            if rule.jitter is not None:  # the tables are made before the run starts: they would hold up a tick
+                quantiles_ns(rule.jitter, self._table(rule))
+
+    def turn_to(self, frame: Frame) -> None:
+        """Take the newest committed frame."""
+        self.world.turn_to(frame)
+
+    def take(self, tick: int, at_ns: int, text: str) -> None:
+        """Take an event that was asked for, as JSON; it happens at a tick."""
+        self.asked.append((tick, text))
+        self.timeline.add(event_of(text, at_ns))
+
+    def link(self, source: str, destination: str, channel: str) -> Link:
+        """Return the link of a packet."""
+        kind = self.profiles.kind(channel)
+        link = self._links.get((source, destination, kind))
+        if link is None:
+            profile = self.profiles.find(source, destination, channel)
+            state = self.states.setdefault((source, destination, _name(profile)), LinkState())
+            link = self._links[source, destination, kind] = Link(source, destination, profile, self, state)
+        return link
+
+    def restore(
+        self,
+        links: Sequence[tuple[str, str, str, LinkState]],
+        radios: Sequence[tuple[str, str, RadioState]],
+        airs: Sequence[tuple[str, AirState]],
+        asked: Sequence[tuple[int, str]],
+    ) -> None:
+        """Take up what was written down of a network in which nothing has been sent yet."""
+        self.states = {(source, destination, name): state for source, destination, name, state in links}
+        self.radios = {(endpoint, radio): state for endpoint, radio, state in radios}
+        self.airs = {name: Air(state) for name, state in airs}
+        for tick, text in asked:
+            self.take(tick, tick * self.deployment.tick_ns, text)
+
+    def restore_flight(self, flight: Flight) -> None:
+        """Take up a packet in flight of such a state: it may be on air."""
+        settings = self.network.radios.get(flight.radio)
+        if settings is not None and settings.medium not in ("none", "wired"):
+            self._air(flight.radio, settings).restore(flight, self._propagation(flight.radio, settings))
+
+    def setup(
+        self, source: str, destination: str, profile: Profile, settings: Radio, key: bytes, memory: LinkState
+    ) -> LinkSetup:
+        """Return what the stages of a link are made from, for some time."""
+        timeline = self.timeline
+        radio = (source + _OWN_QUEUE + destination, profile.rule) if profile.is_own_queue else (source, profile.radio)
+        sender = self.radios.get(radio)
+        if sender is None:
+            sender = self.radios[radio] = RadioState()
+        air, budget = None, None
+        if settings.medium not in ("none", "wired"):
+            name = profile.radio or profile.rule
+            propagation = self._propagation(name, settings)
+            air = self._air(name, settings)
+            budget = Budget(propagation, source, destination, self.seed, settings.air or name)
+        return LinkSetup(
+            source,
+            destination,
+            settings,
+            profile.radio,
+            key,
+            memory,
+            sender,
+            self.world,
+            profile.rule != NO_RADIO,
+            air,
+            budget,
+            tuple(timeline.cuts_of(source, destination)),
+            tuple(timeline.holds_of(source, destination)),
+            self.network.defaults.in_flight_on_partition == "drop",
+            self._table(settings),
+            self._opportunities(settings),
+        )
+
+    def _propagation(self, name: str, settings: Radio) -> Propagation:
+        found = self._propagations.get(name)
+        if found is None:
+            key = draw_key(self.seed, "shadowing", settings.air or name)
+            found = self._propagations[name] = Propagation(settings, self.world, key)
+        return found
+
+    def _air(self, name: str, settings: Radio) -> Air:
+        name = settings.air or name
+        found = self.airs.get(name)
+        if found is None:
+            found = self.airs[name] = Air(AirState())
+        return found
+
+    def _table(self, settings: Impairments) -> tuple[int, ...]:
+        jitter = settings.jitter
+        return read_table(self._text(jitter.file)) if isinstance(jitter, TableJitter) else ()
+
+    def _opportunities(self, settings: Radio) -> tuple[int, ...]:
+        return () if settings.trace is None else read_opportunities(self._text(settings.trace.file))
+
+    def _text(self, path: str) -> str:
+        return self.deployment.asset_files[path].decode("ascii", "replace")
+
+
+def _name(profile: Profile) -> str:
+    """Return a profile's name: its rule, and the radio where the rule does not say it."""
+    return profile.rule if not profile.radio or profile.radio == profile.rule else f"{profile.rule}/{profile.radio}"

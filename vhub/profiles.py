@@ -1,0 +1,89 @@
+"""Which settings are a link's: the rule that matches, over the radio that it goes via, over the defaults.
+
+Neighbours: `protocol.network` (what is configured), `links` (a link is made from a profile), `lint` (prints them).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.impairments import BURSTS, Impairments
+from foosim.protocol.network import LinkRule, Network
+from foosim.protocol.radios import Radio
+
+PERFECT: Final = "perfect"
+ON_BOARD: Final = "on_board"
+"""The rule of a link between a robot and what is on it, where no rule matches: a perfect one."""
+NO_RADIO: Final = "no_radio"
+"""The rule of a link between two that have radios, none of them the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """What holds on a link: the name of what decided it, the radio that it goes via, and every setting."""
+
+    rule: str
+    radio: str
+    settings: Radio
+    is_own_queue: bool = False
+    """Whether the link has a queue of its own: its rule has a rate, else the sender's radio has one."""
+
+
+@lru_cache(maxsize=16)
+def _preset(name: str) -> Radio:
+    return Radio.model_validate({"preset": name})
+
+
+class Profiles:
+    """The profiles of one deployment's links."""
+
+    def __init__(self, deployment: Deployment, network: Network) -> None:
+        self._network = network
+        self._carriers = deployment.carriers()
+        self._by_channel = any(rule.channels is not None for rule in network.links)
+        self.on_radio = any(radio.medium not in ("none", "wired") for radio in network.radios.values())
+        """Whether the fate of packets may depend on where endpoints are."""
+
+    def kind(self, channel: str) -> str:
+        """Return what of a channel decides a link's profile: nothing, where no rule names channels."""
+        return channel if self._by_channel else ""
+
+    def body(self, endpoint: str) -> str:
+        """Return the robot that an endpoint is or is on."""
+        return self._carriers.get(endpoint, endpoint)
+
+    def find(self, source: str, destination: str, channel: str) -> Profile:
+        """Return the profile of packets from source to destination on a channel."""
+        network = self._network
+        rule = network.rule_for(source, destination, channel)
+        via = None if rule is None else rule.via
+        if via is None and (rule is not None or self.body(source) != self.body(destination)):
+            common = self._common(source, destination)
+            if common == "" and rule is None:
+                return Profile(NO_RADIO, "", _preset(PERFECT))
+            via = common or None
+        if via is None and rule is None and self.body(source) == self.body(destination):
+            return Profile(ON_BOARD, "", _preset(PERFECT))
+        base = _preset(network.defaults.preset) if via is None else network.radios[via]
+        if rule is None:
+            return Profile(via or network.defaults.preset, via or "", base)
+        return Profile(rule.id, via or "", over(base, rule), "rate_bps" in rule.model_fields_set or via is None)
+
+    def _common(self, source: str, destination: str) -> str | None:
+        """Return the first radio that both carry; empty when both carry some and none is common, None else."""
+        mine = self._network.radios_of(source, self.body(source))
+        theirs = self._network.radios_of(destination, self.body(destination))
+        if not mine or not theirs:
+            return None
+        return next((radio for radio in mine if radio in theirs), "")
+
+
+def over(base: Radio, changes: LinkRule | Impairments) -> Radio:
+    """Return a radio's settings with those that a rule writes; a model of bursts replaces another one."""
+    written = {key: getattr(changes, key) for key in changes.model_fields_set if key in Impairments.model_fields}
+    if any(key in written for key in BURSTS):
+        written = {key: None for key in BURSTS} | written
+    return base.model_copy(update=written)

@@ -1,0 +1,138 @@
+"""How a radio's signal gets from one place to another: path loss, walls, shadowing; the noise there, and the ratio.
+
+Levels are rounded to hundredths of a dB, so that verdicts compare integers and the last bit of a mathematical library
+decides nothing. Neighbours: `radio` (the formulas), `world` (places and walls), `budget` (one link), `air` (others).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import log10, sqrt
+from typing import Final
+
+from foosim.protocol.radio_materials import RadioMaterial
+from foosim.protocol.radios import Radio
+from foosim.protocol.scene import Vector
+from foosim.vhub.geometry import Crossing
+from foosim.vhub.radio.materials import slab_loss_db
+from foosim.vhub.radio.path_loss import ENVIRONMENTS, Environment, Itu1238, LogDistance, path_loss_db
+from foosim.vhub.radio.shadowing import shadowing_db
+from foosim.vhub.world import World
+
+BLOCKED: Final = "blocked"
+OUT_OF_RANGE: Final = "out_of_range"
+THERMAL_NOISE_DBM_HZ: Final = -174.0
+ZEPTOWATT_DBM: Final = -180.0
+"""1e-21 W: powers of others are summed in whole numbers of it, in any order."""
+
+
+def centi(level: float) -> int:
+    """Return a level in whole hundredths."""
+    return round(level * 100.0)
+
+
+def zeptowatt(level_cdbm: int) -> int:
+    """Return a power given in 0.01 dBm in whole units of 1e-21 W."""
+    return int(10.0 ** ((level_cdbm / 100.0 - ZEPTOWATT_DBM) / 10.0))
+
+
+def level_of(power: int) -> float:
+    """Return a power in units of 1e-21 W as a level in dBm."""
+    return 10.0 * log10(power) + ZEPTOWATT_DBM
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A signal's way between two places, levels in 0.01 dB. `cause` says that nothing gets through, and why."""
+
+    distance_mm: int
+    walls: tuple[str, ...]
+    walls_cdb: int
+    loss_cdb: int
+    """With walls and shadowing."""
+    shadowing_cdb: int
+    cause: str
+
+
+def crossing_db(crossing: Crossing, frequency_hz: float) -> float:
+    """Return what a thing in the way takes from a signal."""
+    material: RadioMaterial = crossing.material
+    if material.loss_db is not None:
+        return material.loss_db
+    assert material.is_ is not None, "a material or a loss"
+    thickness_m = crossing.chord_m if material.thickness_m is None else material.thickness_m
+    return slab_loss_db(material.is_, thickness_m, frequency_hz)
+
+
+def environment_of(settings: Radio) -> Environment:
+    """Return the environment of a radio with the figures that it writes."""
+    written, path_loss = ENVIRONMENTS[settings.path_loss.environment], settings.path_loss
+    if isinstance(written, LogDistance) and path_loss.environment == "log_distance":
+        written = replace(written, exponent=path_loss.exponent, reference_loss_db=path_loss.reference_db)
+    if isinstance(written, Itu1238):
+        written = replace(written, site=path_loss.site, floors=path_loss.floors)
+    return written
+
+
+class Propagation:
+    """One radio's signals in one world. `key` is that of the field of its shadowing."""
+
+    def __init__(self, settings: Radio, world: World, key: bytes) -> None:
+        self.settings = settings
+        self.world = world
+        self._key = key
+        self._environment = environment_of(settings)
+        shadowing, path_loss = settings.shadowing, settings.path_loss
+        environment = self._environment
+        sigmas = (environment.sigma_los, environment.sigma_nlos) if shadowing.on else (0.0, 0.0)
+        self._sigmas = sigmas if shadowing.sigma_db is None else (shadowing.sigma_db, shadowing.sigma_db)
+        distances = environment.d_corr_los, environment.d_corr_nlos
+        self._correlations = distances if shadowing.correlation_m is None else (shadowing.correlation_m,) * 2
+        self._range_m, self._strict = path_loss.range_m, path_loss.strict_los
+        x, y, z = settings.antenna.mount
+        self._mount = x, y, z
+        self.noise_cdbm = centi(
+            THERMAL_NOISE_DBM_HZ + 10.0 * log10(settings.bandwidth_hz) + settings.noise_figure_db
+        )
+        self.power_cdbm = centi(settings.tx_power_dbm + settings.antenna.gain_dbi)
+        self.gain_cdb = centi(settings.antenna.gain_dbi)
+        self.sense_cdbm = centi(settings.sense_dbm)
+        self._turns = -1
+        self._paths: dict[tuple[Vector, Vector, str, str], Path] = {}
+
+    def antenna(self, endpoint: str) -> Vector:
+        """Return where an endpoint's antenna is."""
+        return self.world.antenna(endpoint, self._mount)
+
+    def path(self, a: Vector, b: Vector, source: str, destination: str) -> Path:
+        """Return the way between two places at which the antennas of two endpoints are, or were."""
+        if self._turns != self.world.turns:
+            self._turns = self.world.turns
+            self._paths.clear()
+        one, other = self.world.body(source), self.world.body(destination)
+        key = (a, b, one, other) if a <= b else (b, a, other, one)
+        found = self._paths.get(key)
+        if found is None:
+            found = self._paths[key] = self._find(key[0], key[1], frozenset((one, other)))
+        return found
+
+    def _find(self, a: Vector, b: Vector, ignoring: frozenset[str]) -> Path:
+        dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+        distance_m = sqrt(dx * dx + dy * dy + dz * dz)
+        distance_mm = round(distance_m * 1000.0)
+        if self._range_m is not None and distance_m > self._range_m:
+            return Path(distance_mm, (), 0, 0, 0, OUT_OF_RANGE)
+        frequency_hz = self.settings.frequency_hz
+        crossings = self.world.crossings(a, b, ignoring)
+        walls = tuple(crossing.name for crossing in crossings)
+        walls_db = 0.0
+        for crossing in crossings:
+            walls_db += crossing_db(crossing, frequency_hz)
+        if crossings and self._strict:
+            return Path(distance_mm, walls, centi(walls_db), 0, 0, BLOCKED)
+        heights = a[2], b[2]
+        loss_db, is_nlos = path_loss_db(
+            self._environment, distance_m, frequency_hz, *heights, walls_db, bool(crossings)
+        )
+        shadow_db = shadowing_db(self._key, a, b, self._sigmas[is_nlos], self._correlations[is_nlos])
+        return Path(distance_mm, walls, centi(walls_db), centi(loss_db + shadow_db), centi(shadow_db), "")

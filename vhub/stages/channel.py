@@ -1,0 +1,67 @@
+"""The channel: whether a signal that was sent is strong enough at its receiver, and clear of the others'.
+
+At sending it says what the medium has found out for a unicast, and judges the rest by the draw for errors; at arrival it
+judges again what others spoiled that began later: broadcasts, and whatever is not sent again.
+"""
+
+from __future__ import annotations
+
+from foosim.protocol.draws import UNIT, Slot
+from foosim.vhub.air import DEAF
+from foosim.vhub.packet import Flight
+from foosim.vhub.propagation import OUT_OF_RANGE
+from foosim.vhub.radio.errors import LORA_SENSITIVITY_DBM
+from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.medium import COLLISION, SNR, error_threshold
+
+
+
+class Channel:
+    """Judges one link's signals."""
+
+    def __init__(self, setup: LinkSetup) -> None:
+        assert setup.budget is not None
+        self._budget, self._air = setup.budget, setup.air
+        self._settings = setup.settings
+
+    @classmethod
+    def for_link(cls, setup: LinkSetup) -> Channel | None:
+        return cls(setup) if setup.is_radio else None
+
+    def at_sending(self, flight: Flight) -> str:
+        if flight.outcome:
+            return flight.outcome
+        cause = self._judge(flight)
+        if not cause and self._air is not None and not flight.is_settled:
+            self._air.listen(flight, self._budget.propagation)
+            cause = self._judge(flight) if flight.interference else ""
+        return cause
+
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        return self._judge(flight) if flight.interference and not flight.is_settled else ""
+
+    def _judge(self, flight: Flight) -> str:
+        """Return why the signal is lost, with all that is known of others by now."""
+        if flight.interference >= DEAF:
+            return COLLISION
+        if self._settings.medium == "lora":
+            return self._judge_lora(flight)
+        if flight.is_settled or not flight.words:
+            return ""
+        clear = error_threshold(self._settings, flight, flight.snr_cdb)
+        flight.error_threshold = clear
+        word = flight.words[Slot.ERROR]
+        if word < clear:
+            return SNR
+        if flight.interference:
+            flight.error_threshold = error_threshold(self._settings, flight, self._budget.ratio_cdb(flight))
+        return COLLISION if word < flight.error_threshold else ""
+
+    def _judge_lora(self, flight: Flight) -> str:
+        """LoRa captures: a signal survives others that are weaker by the isolation of their spreading factors."""
+        factor = self._settings.spreading_factor
+        if flight.received_cdbm < LORA_SENSITIVITY_DBM[factor - 7] * 100:
+            flight.error_threshold = UNIT
+            return OUT_OF_RANGE
+        return COLLISION if flight.is_spoiled else ""
+

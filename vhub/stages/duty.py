@@ -1,0 +1,51 @@
+"""Duty cycle: how much of the time a radio may send, by law; a bucket of airtime that fills up again."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from foosim.vhub.packet import Flight
+from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
+from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.queue import is_shared
+
+DUTY_CYCLE: Final = "duty_cycle"
+
+
+class Duty:
+    """Takes a packet's airtime out of its sender's bucket, or drops it."""
+
+    def __init__(self, setup: LinkSetup) -> None:
+        self._settings, self._sender = setup.settings, setup.sender
+        self._share = setup.settings.duty_cycle
+        self._size_ns = int(self._share * setup.settings.duty_window_ns)
+        self._broadcasts = setup.settings.published == "broadcast"
+
+    @classmethod
+    def for_link(cls, setup: LinkSetup) -> Duty | None:
+        return cls(setup) if setup.is_radio and setup.settings.duty_cycle < 1.0 else None
+
+    def at_sending(self, flight: Flight) -> str:
+        sender = self._sender
+        if self._broadcasts and flight.published and is_shared(flight, sender):
+            return ""
+        if sender.tokens_ns < 0:
+            sender.tokens_ns = self._size_ns
+        filled_ns = int((flight.sent_ns - sender.tokens_at_ns) * self._share)
+        sender.tokens_ns = min(self._size_ns, sender.tokens_ns + filled_ns)
+        sender.tokens_at_ns = flight.sent_ns
+        airtime_ns = self._airtime_ns(len(flight.payload))
+        if airtime_ns > sender.tokens_ns:
+            return DUTY_CYCLE
+        sender.tokens_ns -= airtime_ns
+        return ""
+
+    def _airtime_ns(self, size: int) -> int:
+        settings = self._settings
+        if settings.medium == "lora":
+            bandwidth_hz = int(settings.bandwidth_hz)
+            return lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
+        return serialisation_ns(size + settings.overhead_bytes, settings.rate_bps or settings.fixed_rate_bps)
+
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        return ""

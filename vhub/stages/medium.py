@@ -1,0 +1,338 @@
+"""The medium: when a packet gets its turn, how long it takes, and what happens on the way, medium by medium.
+
+A wire serialises. On Wi-Fi a station waits for those that it hears, contends with them, and repeats what is not
+acknowledged: others appear as delay to unicasts, and as loss to broadcasts, which are sent once. IEEE 802.15.4 looks
+before it sends. LoRa sends at once. What is out of range is on air all the same.
+Neighbours: `queue` (what waits before), `air` (who is on air), `radio` (the formulas), `channel` (what gets through).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Final
+
+from foosim.protocol.draws import UNIT, Slot
+from foosim.protocol.radios import Radio
+from foosim.vhub.air import Air
+from foosim.vhub.budget import Budget
+from foosim.vhub.memory import RadioState, Sending, Transmission
+from foosim.vhub.packet import Flight
+from foosim.vhub.radio import errors
+from foosim.vhub.radio.airtime import (
+    LRWPAN_OVERHEAD_BYTES,
+    WIFI_OVERHEAD_BYTES,
+    lora_airtime_ns,
+    lrwpan_airtime_ns,
+    serialisation_ns,
+    wifi_ack_ns,
+    wifi_airtime_ns,
+)
+from foosim.vhub.radio.contention import Access, csma_access, wifi_access
+from foosim.vhub.radio.timings import (
+    CATEGORIES,
+    DOT11P,
+    DOT11P_CATEGORIES,
+    LRWPAN,
+    WIFI_2_4,
+    WIFI_5,
+    WifiTiming,
+    with_category,
+)
+from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.queue import is_shared
+
+COLLISION: Final = "collision"
+SNR: Final = "snr"
+ACCESS_BLOCK: Final = 16
+"""From here on the blocks of a packet's draws are those of its attempts."""
+BASE_STATION_DBM: Final = 30.0
+"""Who sends with at least this power over LTE is a base station, and sends down."""
+OPPORTUNITY_BYTES: Final = 1500
+"""What leaves at one line of a trace of capacity."""
+
+
+class Wire:
+    """Serialises at a rate, or at the opportunities of a trace."""
+
+    def __init__(self, setup: LinkSetup) -> None:
+        settings = setup.settings
+        self._sender: RadioState = setup.sender
+        self._rate_bps, self._overhead = settings.rate_bps, settings.overhead_bytes
+        self._trace, self._loops = setup.opportunities_ms, settings.trace is not None and settings.trace.loop
+
+    def at_sending(self, flight: Flight) -> str:
+        sender = self._sender
+        start_ns = max(flight.sent_ns, sender.free_ns)
+        size = len(flight.payload) + self._overhead
+        if self._trace:
+            end_ns = self._opportunity_ns(start_ns, size)
+        else:
+            assert self._rate_bps is not None
+            end_ns = start_ns + serialisation_ns(size, self._rate_bps)
+            flight.rate_bps = self._rate_bps
+        flight.airtime_ns = end_ns - start_ns
+        sender.free_ns = end_ns
+        sender.waiting.append((end_ns, size))
+        return ""
+
+    def _opportunity_ns(self, ready_ns: int, size: int) -> int:
+        """Return when the last byte leaves; what an opportunity has left is the next packet's."""
+        sender, trace = self._sender, self._trace
+        left = sender.opportunity_bytes
+        at_ns = max(ready_ns, self._time_ns(sender.opportunity - 1) if left else 0)
+        if left and self._time_ns(sender.opportunity - 1) < ready_ns:
+            left = 0
+        while left < size:
+            size -= left
+            while self._time_ns(sender.opportunity) < ready_ns:
+                sender.opportunity += self._skip(ready_ns)
+            at_ns = self._time_ns(sender.opportunity)
+            sender.opportunity += 1
+            left = OPPORTUNITY_BYTES
+        sender.opportunity_bytes = left - size
+        return at_ns
+
+    def _skip(self, ready_ns: int) -> int:
+        """Return how many opportunities can be passed over at once: whole rounds of the trace, or one."""
+        rounds = (ready_ns - self._time_ns(self._sender.opportunity)) // (self._trace[-1] * 1_000_000)
+        return max(1, rounds * len(self._trace)) if self._loops and rounds > 1 else 1
+
+    def _time_ns(self, number: int) -> int:
+        rounds, place = divmod(number, len(self._trace))
+        if rounds and not self._loops:
+            return 2**62
+        return (rounds * self._trace[-1] + self._trace[place]) * 1_000_000
+
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        return ""
+
+
+class OnAir:
+    """What all radios share: a broadcast is sent once for all its receivers; who is on air is known to the air."""
+
+    def __init__(self, setup: LinkSetup) -> None:
+        assert setup.budget is not None and setup.air is not None
+        self._setup, self._settings = setup, setup.settings
+        self._sender: RadioState = setup.sender
+        self._budget: Budget = setup.budget
+        self._air: Air = setup.air
+        self._once = setup.settings.published == "broadcast"
+
+    def at_sending(self, flight: Flight) -> str:
+        cause = self._budget.measure(flight)
+        broadcast = flight.published and self._once
+        last = self._sender.last
+        if broadcast and last is not None and last.is_ready and is_shared(flight, self._sender):
+            self._share(flight, last)
+        else:
+            flight.rate_bps = self.rate_bps(flight, broadcast)
+            self._transmit(flight, broadcast, cause)
+        if cause:
+            flight.outcome = cause
+        return COLLISION if flight.outcome == COLLISION else ""
+
+    def _share(self, flight: Flight, last: Sending) -> None:
+        """Take a broadcast's times from its first receiver."""
+        flight.access_ns, flight.airtime_ns = last.access_ns, last.airtime_ns
+        flight.air_start_ns, flight.air_end_ns = last.start_ns, last.end_ns
+        flight.contenders, flight.rate_bps, flight.outcome = last.contenders, last.rate_bps, last.outcome
+
+    def _transmit(self, flight: Flight, broadcast: bool, cause: str) -> None:
+        sender, air = self._sender, self._air
+        air.advance(flight.sent_ns)
+        ready_ns = max(flight.sent_ns, sender.free_ns)
+        start_ns, flight.contenders = self.turn(ready_ns)
+        access, airtime_ns = self.access(flight, broadcast, UNIT if cause else None)
+        end_ns, until_ns = start_ns + access.delay_ns, start_ns + access.occupancy_ns
+        flight.air_start_ns, flight.air_end_ns = end_ns - airtime_ns, end_ns
+        flight.airtime_ns = access.airtime_ns
+        flight.access_ns = end_ns - ready_ns - access.airtime_ns
+        flight.retries = access.retries
+        if access.outcome == "ok":
+            flight.is_settled = not broadcast and self.is_acknowledged
+        else:
+            flight.outcome = COLLISION if access.outcome in ("collision", "busy") else SNR
+        sender.free_ns = until_ns
+        sender.waiting.append((until_ns, len(flight.payload)))
+        last = sender.last
+        if last is not None:
+            last.access_ns, last.airtime_ns, last.start_ns = flight.access_ns, flight.airtime_ns, flight.air_start_ns
+            last.end_ns, last.contenders, last.rate_bps = end_ns, flight.contenders, flight.rate_bps
+            last.outcome, last.is_ready = flight.outcome, True
+        of = self._budget.propagation
+        place, power = of.antenna(flight.source), of.power_cdbm
+        times = flight.air_start_ns, end_ns, until_ns
+        factor = self._settings.spreading_factor
+        air.register(Transmission(flight.source, flight.sequence, flight.copy, *times, place, power, factor))
+
+    # --- what media differ in ----------------------------------------------------------------------------------------
+
+    is_acknowledged = False
+
+    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
+        """Return the bit rate of a packet; 0 where there is none."""
+        return self._settings.rate_bps or 0
+
+    def turn(self, ready_ns: int) -> tuple[int, int]:
+        """Return when the sender gets its turn, and how many contend."""
+        return ready_ns, 1
+
+    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
+        """Return what becomes of a packet on the medium, and how long it is on air once.
+
+        `lost` is the threshold for errors of a packet that cannot get through; None where the signal decides.
+        """
+        rate_bps = flight.rate_bps
+        airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, rate_bps) if rate_bps else 0
+        return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
+
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        return ""
+
+    def _words(self, flight: Flight, block: int) -> tuple[int, ...]:
+        return self._setup.words(flight, ACCESS_BLOCK + block)
+
+
+def wifi_modes(settings: Radio) -> tuple[str, ...]:
+    """Return the modulations of a Wi-Fi radio, in order of rising rate."""
+    return errors.DOT11P_MODES if settings.bandwidth_hz < 15e6 else errors.WIFI_MODES
+
+
+@lru_cache(maxsize=64)
+def _wifi_timing(bandwidth_hz: float, frequency_hz: float, access: str, retries: int) -> WifiTiming:
+    if bandwidth_hz < 15e6:
+        timing = with_category(DOT11P, DOT11P_CATEGORIES[access])
+    else:
+        timing = with_category(WIFI_2_4 if frequency_hz < 3e9 else WIFI_5, CATEGORIES[access])
+    return replace(timing, retries=retries)
+
+
+def wifi_timing(settings: Radio) -> WifiTiming:
+    """Return the timing of a Wi-Fi radio and its access category."""
+    return _wifi_timing(settings.bandwidth_hz, settings.frequency_hz, settings.access, settings.retries)
+
+
+@lru_cache(maxsize=256)
+def _mode_of(modes: tuple[str, ...], rate_bps: int) -> str:
+    return min(modes, key=lambda mode: (abs(errors.MODES[mode].rate_bps - rate_bps), mode))
+
+
+def error_threshold(settings: Radio, flight: Flight, snr_cdb: int) -> int:
+    """Return the packet error rate at a ratio, in units of 2^-64; 0 on media that have no curve."""
+    if settings.medium == "wifi":
+        mode = _mode_of(wifi_modes(settings), flight.rate_bps)
+        return errors.per_threshold(mode, snr_cdb, len(flight.payload) + WIFI_OVERHEAD_BYTES)
+    if settings.medium == "ieee802154":
+        return errors.per_threshold("oqpsk_250", snr_cdb, len(flight.payload) + LRWPAN_OVERHEAD_BYTES)
+    if settings.medium == "lte":
+        return UNIT if snr_cdb < errors.LTE_FLOOR_CENTI_DB else 0
+    return 0
+
+
+class WiFi(OnAir):
+    """IEEE 802.11 with the distributed coordination function and rate control."""
+
+    is_acknowledged = True
+
+    def __init__(self, setup: LinkSetup) -> None:
+        super().__init__(setup)
+        self._modes = wifi_modes(setup.settings)
+        self._timing = wifi_timing(setup.settings)
+
+    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
+        """The fixed rate; else a broadcast goes at the lowest, a unicast at the highest with few errors."""
+        settings = self._settings
+        if settings.rates == "fixed":
+            return errors.MODES[_mode_of(self._modes, settings.fixed_rate_bps)].rate_bps
+        if broadcast:
+            return errors.MODES[self._modes[0]].rate_bps
+        size = len(flight.payload) + WIFI_OVERHEAD_BYTES
+        return errors.MODES[errors.ideal_rate(self._modes, flight.snr_cdb, size)].rate_bps
+
+    def turn(self, ready_ns: int) -> tuple[int, int]:
+        return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
+
+    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
+        mode = _mode_of(self._modes, flight.rate_bps)
+        airtime_ns = wifi_airtime_ns(mode, len(flight.payload), self._timing)
+        ack_ns = 0 if broadcast else wifi_ack_ns(mode, self._timing)
+        threshold = 0 if broadcast else lost
+        if threshold is None:
+            threshold = error_threshold(self._settings, flight, flight.snr_cdb)
+            flight.error_threshold = threshold
+        words = lambda block: self._words(flight, block)  # noqa: E731
+        return wifi_access(words, flight.contenders, threshold, airtime_ns, ack_ns, self._timing), airtime_ns
+
+
+class LrWpan(OnAir):
+    """IEEE 802.15.4 at 2.4 GHz without beacons."""
+
+    is_acknowledged = True
+
+    def __init__(self, setup: LinkSetup) -> None:
+        super().__init__(setup)
+        self._timing = replace(LRWPAN, retries=setup.settings.retries)
+
+    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
+        return errors.MODES["oqpsk_250"].rate_bps
+
+    def turn(self, ready_ns: int) -> tuple[int, int]:
+        return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
+
+    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
+        airtime_ns = lrwpan_airtime_ns(len(flight.payload), self._timing)
+        threshold = 0 if broadcast else lost
+        if threshold is None:
+            threshold = error_threshold(self._settings, flight, flight.snr_cdb)
+            flight.error_threshold = threshold
+        words = lambda block: self._words(flight, block)  # noqa: E731
+        return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
+
+
+class LoRa(OnAir):
+    """LoRa: pure ALOHA."""
+
+    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
+        settings = self._settings
+        chips = settings.spreading_factor * 4 * int(settings.bandwidth_hz)
+        return chips // ((4 + settings.coding_rate) << settings.spreading_factor)
+
+    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
+        settings = self._settings
+        size, bandwidth_hz = len(flight.payload), int(settings.bandwidth_hz)
+        airtime_ns = lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
+        return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
+
+
+class Lte(OnAir):
+    """A link to or from a base station: a rate by the signal, repetitions that cost time."""
+
+    is_acknowledged = True
+
+    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
+        settings = self._settings
+        direction = "down" if settings.tx_power_dbm >= BASE_STATION_DBM else "up"
+        return errors.lte_rate_bps(flight.snr_cdb, int(settings.bandwidth_hz), direction)
+
+    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
+        if flight.rate_bps == 0:
+            return Access(0, 0, 0, 0, "error"), 0
+        airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, flight.rate_bps)
+        retries, is_lost = errors.lte_harq(flight.words[Slot.BACKOFF])
+        delay_ns = airtime_ns + retries * errors.HARQ_ROUND_NS
+        outcome = "error" if is_lost or lost is not None else "ok"
+        return Access(delay_ns, airtime_ns, retries, airtime_ns, outcome), airtime_ns
+
+
+_MEDIA: Final = {"radio": OnAir, "wifi": WiFi, "ieee802154": LrWpan, "lora": LoRa, "lte": Lte}
+
+
+def make_medium(setup: LinkSetup) -> Wire | OnAir | None:
+    """Return the stage of a link's medium; None where nothing takes time."""
+    settings = setup.settings
+    if setup.is_radio:
+        return _MEDIA[settings.medium](setup)
+    return Wire(setup) if settings.rate_bps is not None or setup.opportunities_ms else None
+
+

@@ -1,0 +1,43 @@
+"""Policy: partitions, filters, and how old a packet may be.
+
+A partition is looked at when a packet is sent and when it arrives, so that what is on its way when it begins is lost,
+unless the deployment says `in_flight_on_partition: deliver`.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from foosim.vhub.packet import Flight
+from foosim.vhub.setup import LinkSetup
+
+PARTITION: Final = "partition"
+FILTERED: Final = "filtered"
+EXPIRED: Final = "expired"
+
+
+class Policy:
+    """Knows when the link is cut, whether anything may pass, and what is too late."""
+
+    def __init__(self, setup: LinkSetup) -> None:
+        self._cuts, self._at_arrival = setup.cuts, setup.in_flight_dropped
+        self._allow, self._ttl_ns = setup.settings.allow, setup.settings.ttl_ns
+
+    @classmethod
+    def for_link(cls, setup: LinkSetup) -> Policy | None:
+        settings = setup.settings
+        return cls(setup) if setup.cuts or settings.ttl_ns is not None or not settings.allow else None
+
+    def _is_cut(self, time_ns: int) -> bool:
+        return any(start_ns <= time_ns < end_ns for start_ns, end_ns in self._cuts)
+
+    def at_sending(self, flight: Flight) -> str:
+        if self._is_cut(flight.sent_ns):
+            return PARTITION
+        return "" if self._allow else FILTERED
+
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        if self._at_arrival and self._is_cut(flight.due_ns):
+            return PARTITION
+        late = self._ttl_ns is not None and flight.due_ns - flight.sent_ns > self._ttl_ns
+        return EXPIRED if late else ""

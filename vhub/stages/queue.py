@@ -1,0 +1,111 @@
+"""The queue before a radio or a wire: bounded in packets, bytes and time; CoDel where it is asked for.
+
+A queue is served in order at a rate that is known when a packet comes, so its wait is known then, too: the time until
+the sender is free. CoDel's law (RFC 8289) is applied to that wait at the moment at which the packet would leave.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Final
+
+from foosim.vhub.memory import RadioState, Sending
+from foosim.vhub.packet import Flight
+from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.policy import EXPIRED
+
+QUEUE_FULL: Final = "queue_full"
+CODEL: Final = "queue_codel"
+
+
+def is_shared(flight: Flight, sender: RadioState) -> bool:
+    """Whether a broadcast's packet has been sent for another of its receivers."""
+    last = sender.last
+    return last is not None and (last.sequence, last.copy) == (flight.sequence, flight.copy)
+
+
+class Queue:
+    """Decides whether a packet may wait, and how long."""
+
+    def __init__(self, setup: LinkSetup) -> None:
+        queue = setup.settings.queue
+        self._sender = setup.sender
+        self._packets, self._bytes, self._wait_ns = queue.packets, queue.bytes_max, queue.wait_ns
+        self._codel = queue.drop == "codel"
+        self._target_ns, self._interval_ns = queue.codel_target_ns, queue.codel_interval_ns
+        self._overhead = setup.settings.overhead_bytes
+        self._broadcasts = setup.is_radio and setup.settings.published == "broadcast"
+
+    @classmethod
+    def for_link(cls, setup: LinkSetup) -> Queue | None:
+        settings = setup.settings
+        served = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
+        return cls(setup) if served else None
+
+    def at_sending(self, flight: Flight) -> str:
+        sender = self._sender
+        if self._broadcasts and flight.published and is_shared(flight, sender):
+            last = sender.last
+            assert last is not None
+            flight.queue_bytes, flight.queue_ns = last.queue_bytes, last.queue_ns
+            return last.cause
+        now_ns, waiting = flight.sent_ns, sender.waiting
+        gone = next((n for n, (departure_ns, _) in enumerate(waiting) if departure_ns > now_ns), len(waiting))
+        if gone:
+            del waiting[:gone]
+        queued = sum(size for _, size in waiting)
+        wait_ns = max(0, sender.free_ns - now_ns)
+        cause = self._judge(len(waiting), queued + len(flight.payload) + self._overhead, now_ns, wait_ns)
+        flight.queue_bytes, flight.queue_ns = queued, wait_ns
+        sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
+        return cause
+
+    def _judge(self, packets: int, size: int, now_ns: int, wait_ns: int) -> str:
+        if packets >= self._packets or size > self._bytes:
+            return QUEUE_FULL
+        if wait_ns > self._wait_ns:
+            return EXPIRED
+        return CODEL if self._codel and self._drops(now_ns + wait_ns, wait_ns, packets) else ""
+
+    def _drops(self, now_ns: int, wait_ns: int, packets: int) -> bool:
+        """Apply CoDel's law of control to a packet that leaves the queue at `now_ns` (RFC 8289, 5.5 and 5.6)."""
+        sender = self._sender
+        above = self._is_above(now_ns, wait_ns, packets)
+        if sender.is_dropping:
+            if not above:
+                sender.is_dropping = False
+                return False
+            if now_ns < sender.drop_next_ns:
+                return False
+            sender.drop_count += 1
+            sender.drop_next_ns = self._law(sender.drop_next_ns)
+            return True
+        if not above:
+            return False
+        sender.is_dropping = True
+        recent = now_ns - sender.drop_next_ns < 16 * self._interval_ns and sender.drop_count > 2
+        sender.drop_count = sender.drop_count - 2 if recent else 1
+        sender.drop_next_ns = self._law(now_ns)
+        return True
+
+    def _is_above(self, now_ns: int, wait_ns: int, packets: int) -> bool:
+        """Whether waits have been above the target for an interval; a queue of one packet never is."""
+        sender = self._sender
+        if wait_ns < self._target_ns or packets <= 1:
+            sender.first_above_ns = 0
+            return False
+        if sender.first_above_ns == 0:
+            sender.first_above_ns = now_ns + self._interval_ns
+            return False
+        return now_ns >= sender.first_above_ns
+
+    def _law(self, time_ns: int) -> int:
+        return time_ns + int(self._interval_ns / sqrt(sender_count(self._sender)))
+
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        return ""
+
+
+def sender_count(sender: RadioState) -> int:
+    """Return CoDel's count, at least 1."""
+    return max(1, sender.drop_count)

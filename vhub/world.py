@@ -1,0 +1,95 @@
+"""Where endpoints are and what stands between them, as of the newest committed frame.
+
+Neighbours: `geometry` (rays), `propagation` asks, `state` turns it to the frame of each closing.
+"""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout
+from foosim.protocol.network import Network
+from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate
+from foosim.protocol.world_scene import build_scene
+from foosim.vhub.geometry import Crossing, LineOfSight, Sight
+
+
+class World:
+    """Antennas and lines of sight. Nothing is computed before somebody asks."""
+
+    def __init__(self, deployment: Deployment, network: Network) -> None:
+        self._deployment, self._places = deployment, network.places
+        self._carriers = deployment.carriers()
+        self._sights: LineOfSight | None = None
+        self._sight: Sight | None = None
+        self._frame: Frame | None = None
+        self._layout: Layout | None = None
+        self._bodies: dict[str, Body] = {}
+        self._poses: dict[str, Pose | None] = {}
+        self._antennas: dict[tuple[str, Vector], Vector] = {}
+        self.turns = 0
+        """Grows with every frame."""
+
+    def turn_to(self, frame: Frame) -> None:
+        """Take the newest committed frame."""
+        if frame is not self._frame:
+            self._frame, self._sight = frame, None
+            self._poses.clear()
+            self._antennas.clear()
+            self.turns += 1
+
+    def body(self, endpoint: str) -> str:
+        """Return the robot that an endpoint is or is on board of; its own name where it is on none."""
+        return self._carriers.get(endpoint, endpoint)
+
+    def is_down(self, endpoint: str) -> bool:
+        """Whether the robot that an endpoint is, or is on board of, is out of service."""
+        frame, body = self._frame, self.body(endpoint)
+        return frame is not None and body in frame.layout and frame.at(body, "down") != 0.0
+
+    def antenna(self, endpoint: str, mount: Vector) -> Vector:
+        """Return the place (m, world frame) of an antenna that is mounted at `mount` in its body's frame."""
+        key = endpoint, mount
+        found = self._antennas.get(key)
+        if found is None:
+            pose = self._pose(self.body(endpoint))
+            if pose is None:
+                _, position, orientation = "", self._place(endpoint), UPRIGHT
+            else:
+                _, position, orientation = pose
+            x, y, z = rotate(orientation, mount)
+            found = self._antennas[key] = position[0] + x, position[1] + y, position[2] + z
+        return found
+
+    def _pose(self, robot: str) -> Pose | None:
+        """Return the pose of a robot's first link; None for what has no body."""
+        frame = self._frame
+        if frame is None:
+            return None
+        if frame.layout is not self._layout:
+            self._layout, self._bodies = frame.layout, dict(build_scene(self._deployment, frame.layout).bodies)
+        if robot not in self._poses:
+            body = self._bodies.get(robot)
+            self._poses[robot] = (
+                None if body is None else forward_kinematics(body, frame.layout[robot], frame.numbers)[0]
+            )
+        return self._poses[robot]
+
+    def _place(self, endpoint: str) -> Vector:
+        """Return where the deployment says that an endpoint without a body is."""
+        for glob, (x, y, z) in self._places.items():
+            if fnmatchcase(endpoint, glob):
+                return x, y, z
+        return ORIGIN
+
+    def crossings(self, a: Vector, b: Vector, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
+        """Return what the line between two places crosses, some bodies aside."""
+        if self._frame is None:
+            return ()
+        if self._sight is None:
+            if self._sights is None:
+                self._sights = LineOfSight(self._deployment)
+            self._sight = self._sights.at(self._frame)
+        return self._sight.between(a, b, ignoring)
