@@ -1,0 +1,319 @@
+"""Medium access (T16): Bianchi's table, and n saturated stations in a closed loop that use the access alone."""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from math import sqrt
+from typing import NamedTuple
+
+import pytest
+
+from foosim.protocol.draws import UNIT, chance_threshold, draw_key, draw_words
+from foosim.vhub.radio.airtime import lrwpan_airtime_ns, lrwpan_exchange_ns, wifi_ack_ns, wifi_airtime_ns
+from foosim.vhub.radio.contention import (
+    CONTENDERS_MAX,
+    Access,
+    Words,
+    contention,
+    csma_access,
+    saturation_rate_hz,
+    sensing,
+    wifi_access,
+)
+from foosim.vhub.radio.timings import CATEGORIES, LRWPAN, WIFI_5, with_category
+from tests.links.statistics import Z_ALPHA, binomial_z
+
+AIRTIME_NS = wifi_airtime_ns("ofdm_24", 300, WIFI_5)
+ACK_NS = wifi_ack_ns("ofdm_24", WIFI_5)
+EXCHANGE_NS = 34_000 + 136_000 + 16_000 + 28_000
+# 300 bytes at 24 Mb/s, W = 16, m = 6: collision probability, packets a second in all, mean access delay in ms, loss.
+BIANCHI = {
+    1: (0.0, 3552, 0.28, 0.0),
+    2: (0.105, 3773, 0.53, 1e-8),
+    5: (0.272, 3648, 1.4, 3e-5),
+    10: (0.384, 3421, 2.9, 5e-4),
+    20: (0.481, 3167, 6.3, 3e-3),
+    50: (0.595, 2792, 17.9, 1.6e-2),
+}
+
+
+def words_of(counter: int, seed: int = 1) -> Words:
+    key = draw_key(seed, "contention")
+    return lambda block: draw_words(key, counter, block)
+
+
+class Loop(NamedTuple):
+    """What n saturated stations got."""
+
+    rate_hz: float
+    delay_ms: float
+    outcomes: Counter[str]
+    retries: int
+    packets: int
+
+
+def saturated(stations: int, packets: int, access: Callable[[Words, int], Access]) -> Loop:
+    """Serve stations that always have a frame through one horizon, as the pipeline does.
+
+    A station sends its next when its last is done. Delays count once every station has been served.
+    """
+    ready = [(0, station) for station in range(stations)]
+    free_ns = waited_ns = retries = 0
+    outcomes: Counter[str] = Counter()
+    for packet in range(packets):
+        sent_ns, station = heapq.heappop(ready)
+        got = access(words_of(packet), stations)
+        free_ns = max(sent_ns, free_ns) + got.occupancy_ns
+        waited_ns += free_ns - sent_ns if packet >= stations else 0
+        outcomes[got.outcome] += 1
+        retries += got.retries
+        heapq.heappush(ready, (free_ns, station))
+    return Loop(outcomes["ok"] / free_ns * 1e9, waited_ns / (packets - stations) / 1e6, outcomes, retries, packets)
+
+
+# --- Wi-Fi -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", BIANCHI)
+def test_the_fixed_point(n: int) -> None:
+    p, rate, delay_ms, lost = BIANCHI[n]
+    point = contention(n, 16, 6)
+    assert point.p == pytest.approx(p, abs=0.0006)
+    assert point.p**8 == pytest.approx(lost, rel=0.5, abs=1e-9)
+    assert saturation_rate_hz(n, AIRTIME_NS, ACK_NS, WIFI_5) == pytest.approx(rate, abs=0.6)
+    assert n / saturation_rate_hz(n, AIRTIME_NS, ACK_NS, WIFI_5) * 1e3 == pytest.approx(delay_ms, rel=0.025)
+
+
+@pytest.mark.parametrize("n", [2, 3, 7, 30, 200])
+@pytest.mark.parametrize(("window", "doublings"), [(16, 6), (4, 1), (32, 5), (16, 0)])
+def test_the_fixed_point_solves_both_equations(n: int, window: int, doublings: int) -> None:
+    point = contention(n, window, doublings)
+    p, tau = point.p, point.tau
+    assert 1 - (1 - tau) ** (n - 1) == pytest.approx(p, abs=1e-9)
+    if abs(p - 0.5) > 1e-6:
+        numerator = 2 * (1 - 2 * p)
+        bianchi = numerator / ((1 - 2 * p) * (window + 1) + p * window * (1 - (2 * p) ** doublings))
+        assert tau == pytest.approx(bianchi, abs=1e-9)
+    assert point.threshold == chance_threshold(p)
+
+
+@pytest.mark.parametrize("n", BIANCHI)
+def test_saturated_stations_in_a_closed_loop(n: int) -> None:
+    """Throughput and mean delay within 3 % of the table, and the loss that is left after seven retries."""
+    p, rate, delay_ms, _ = BIANCHI[n]
+    loop = saturated(n, 5_000, lambda words, k: wifi_access(words, k, 0, AIRTIME_NS, ACK_NS, WIFI_5))
+    assert loop.rate_hz == pytest.approx(rate, rel=0.03)
+    assert loop.delay_ms == pytest.approx(n / rate * 1e3, rel=0.03)
+    assert loop.delay_ms == pytest.approx(delay_ms, rel=0.04)
+    assert loop.outcomes["collision"] + loop.outcomes["ok"] == loop.packets
+    if n > 1:
+        assert abs(binomial_z(loop.outcomes["collision"], loop.packets, p**8)) < Z_ALPHA
+        spread = sqrt(p / loop.packets) / (1 - p)
+        assert abs(loop.retries / loop.packets - p * (1 - p**7) / (1 - p)) < Z_ALPHA * spread
+
+
+def test_alone_it_takes_the_time_of_the_standard() -> None:
+    """DIFS, backoff of 0 to 15 slots, frame, SIFS, ACK: nothing is shared."""
+    got = [wifi_access(words_of(n), 1, 0, AIRTIME_NS, ACK_NS, WIFI_5) for n in range(2_000)]
+    slots = Counter((access.occupancy_ns - EXCHANGE_NS) / 9_000 for access in got)
+    assert sorted(slots) == list(range(16))
+    assert all(access.delay_ns == access.occupancy_ns - 44_000 and access.retries == 0 for access in got)
+    assert {access.outcome for access in got} == {"ok"} and {access.airtime_ns for access in got} == {AIRTIME_NS}
+
+
+@pytest.mark.parametrize("per", [0.1, 0.5])
+@pytest.mark.parametrize("n", [1, 10])
+def test_an_attempt_fails_by_collision_or_error(per: float, n: int) -> None:
+    """With 1 - (1 - p)(1 - PER), each time anew; what is left after eight attempts is lost."""
+    p = contention(n, 16, 6).p
+    fails = 1 - (1 - p) * (1 - per)
+    count = 4_000
+    got = [wifi_access(words_of(k), n, chance_threshold(per), AIRTIME_NS, ACK_NS, WIFI_5) for k in range(count)]
+    lost = sum(access.outcome != "ok" for access in got)
+    assert abs(binomial_z(lost, count, fails**8)) < Z_ALPHA
+    assert abs(binomial_z(sum(access.retries == 0 for access in got), count, 1 - fails)) < Z_ALPHA
+    assert all(
+        access.retries == 7 and access.delay_ns == access.occupancy_ns for access in got if access.outcome != "ok"
+    )
+    assert all(access.airtime_ns == (access.retries + 1) * AIRTIME_NS for access in got)
+
+
+def test_broadcast_is_lost_where_unicast_is_late() -> None:
+    """One attempt without acknowledgement, at the window that never doubles."""
+    n, count = 10, 4_000
+    p = contention(n, 16, 0).p
+    got = [wifi_access(words_of(k), n, 0, AIRTIME_NS, 0, WIFI_5) for k in range(count)]
+    assert abs(binomial_z(sum(access.outcome == "collision" for access in got), count, p)) < Z_ALPHA
+    assert all(access.retries == 0 and access.airtime_ns == AIRTIME_NS for access in got)
+    assert all(access.delay_ns == access.occupancy_ns for access in got)
+    unicast = [wifi_access(words_of(k), n, 0, AIRTIME_NS, ACK_NS, WIFI_5) for k in range(count)]
+    assert sum(access.outcome != "ok" for access in unicast) < 10
+    assert sum(access.outcome != "ok" for access in got) > 1000
+    loop = saturated(n, 3_000, lambda words, k: wifi_access(words, k, 0, AIRTIME_NS, 0, WIFI_5))
+    assert loop.rate_hz == pytest.approx(saturation_rate_hz(n, AIRTIME_NS, 0, WIFI_5), rel=0.06)
+
+
+def test_priority_and_retries_are_the_timings() -> None:
+    voice = with_category(WIFI_5, CATEGORIES["voice"])
+    slots = {
+        (wifi_access(words_of(k), 1, 0, AIRTIME_NS, ACK_NS, voice).occupancy_ns - EXCHANGE_NS) // 9_000
+        for k in range(200)
+    }
+    assert slots == {0, 1, 2, 3}
+    once = wifi_access(words_of(0), 1, UNIT, AIRTIME_NS, ACK_NS, replace(WIFI_5, retries=1))
+    assert (once.outcome, once.retries) == ("error", 1)
+
+
+def test_attempts_have_their_own_words() -> None:
+    """Raising the error rate leaves what the first attempts drew alone: paired experiments stay paired."""
+    for k in range(300):
+        few = wifi_access(words_of(k), 5, chance_threshold(0.2), AIRTIME_NS, ACK_NS, WIFI_5)
+        many = wifi_access(words_of(k), 5, chance_threshold(0.6), AIRTIME_NS, ACK_NS, WIFI_5)
+        assert few.retries <= many.retries and (few.retries < many.retries or few.outcome == "ok" or few.retries == 7)
+    asked: list[int] = []
+
+    def words(block: int) -> Sequence[int]:
+        asked.append(block)
+        return (0, UNIT - 1, 0, 0, UNIT // 2, UNIT - 1, 0, 0)
+
+    failed = wifi_access(words, 1, 1, 1_000, 1_000, WIFI_5)
+    assert failed.outcome == "error" and asked == [0, 1, 2, 3]
+    windows = sum((16 << min(attempt, 6)) // 2 for attempt in (1, 3, 5, 7))
+    assert failed.occupancy_ns == 8 * (34_000 + 1_000 + 16_000 + 1_000) + windows * 9_000
+
+
+def test_more_contenders_collide_more_and_none_are_too_many() -> None:
+    points = [contention(n, 16, 6) for n in range(1, CONTENDERS_MAX + 1)]
+    assert all(few.p < many.p and few.tau > many.tau for few, many in pairwise(points))
+    assert contention(10_000, 16, 6) == points[-1] and contention(0, 16, 6) == points[0]
+    assert all(0.0 <= point.collision_share <= 0.5 for point in points)
+
+
+# --- 802.15.4 --------------------------------------------------------------------------------------------------------
+
+
+class Motes:
+    """The standard's stations themselves, event by event: each senses, backs off, sends and waits for its ACK."""
+
+    UNIT_US, CCA_US, TURN_US, ACK_US, WAIT_US = 320, 128, 192, 352, 864
+
+    def __init__(self, stations: int, frame_us: int, seed: int) -> None:
+        self.frame_us = frame_us
+        self.draws = 0
+        self.key = draw_key(seed, "motes")
+        self.events: list[tuple[int, int, str]] = []
+        self.exponent, self.busy_looks = [3] * stations, [0] * stations
+        self.tries, self.since, self.until = [0] * stations, [0] * stations, [0] * stations
+        self.hit = [False] * stations
+        self.air: list[tuple[int, int]] = []
+        self.count: Counter[str] = Counter()
+        self.delay_us = 0
+        for station in range(stations):
+            self.back_off(station, self.draw(5_000))
+
+    def draw(self, below: int) -> int:
+        self.draws += 1
+        return draw_words(self.key, self.draws)[0] * below >> 64
+
+    def back_off(self, station: int, at: int) -> None:
+        slots = self.draw(1 << self.exponent[station])
+        heapq.heappush(self.events, (at + slots * self.UNIT_US + self.CCA_US, station, "look"))
+
+    def anew(self, station: int, at: int, outcome: str) -> None:
+        self.count[outcome] += 1
+        self.delay_us += at - self.since[station]
+        self.exponent[station], self.busy_looks[station], self.tries[station] = 3, 0, 0
+        self.since[station] = at
+        self.back_off(station, at)
+
+    def look(self, station: int, at: int) -> None:
+        self.air = [(begin, end) for begin, end in self.air if end > at - 200]
+        if not any(begin < at and end > at - self.CCA_US for begin, end in self.air):
+            self.count["sent"] += 1
+            heapq.heappush(self.events, (at + self.TURN_US, station, "send"))
+            return
+        self.exponent[station] = min(self.exponent[station] + 1, 5)
+        self.busy_looks[station] += 1
+        if self.busy_looks[station] > 4:
+            self.anew(station, at, "busy")
+        else:
+            self.back_off(station, at)
+
+    def send(self, station: int, at: int) -> None:
+        self.hit[station] = False
+        for other, until in enumerate(self.until):
+            if until > at:
+                self.hit[other] = self.hit[station] = True
+        self.until[station] = at + self.frame_us
+        self.air.append((at, at + self.frame_us))
+        heapq.heappush(self.events, (at + self.frame_us, station, "sent"))
+
+    def sent(self, station: int, at: int) -> None:
+        if not self.hit[station]:
+            heard = at + self.TURN_US + self.ACK_US
+            self.air.append((at + self.TURN_US, heard))
+            heapq.heappush(self.events, (heard, station, "ok"))
+            return
+        self.count["hit"] += 1
+        self.tries[station] += 1
+        self.exponent[station], self.busy_looks[station] = 3, 0
+        if self.tries[station] > 3:
+            heapq.heappush(self.events, (at + self.WAIT_US, station, "collision"))
+        else:
+            self.back_off(station, at + self.WAIT_US)
+
+    def run(self, until_us: int) -> None:
+        while self.events[0][0] < until_us:
+            at, station, what = heapq.heappop(self.events)
+            if what in ("ok", "collision"):
+                self.anew(station, at, what)
+            else:
+                getattr(self, what)(station, at)
+
+
+@pytest.mark.parametrize("size", [20, 50, 100])
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 10])
+def test_802154_against_its_stations(n: int, size: int) -> None:
+    """The closed loop through the access function against the stations: throughput, delay, and what is lost and why."""
+    airtime_ns = lrwpan_airtime_ns(size)
+    motes = Motes(n, airtime_ns // 1_000, seed=3)
+    motes.run(10_000_000)
+    done = motes.count["ok"] + motes.count["collision"] + motes.count["busy"]
+    loop = saturated(n, 2_500, lambda words, k: csma_access(words, k, 0, airtime_ns))
+    assert loop.rate_hz == pytest.approx(motes.count["ok"] / 10, rel=0.12)
+    assert loop.delay_ms == pytest.approx(motes.delay_us / done / 1e3, rel=0.17)
+    assert sensing(n, airtime_ns, True).p == pytest.approx(motes.count["hit"] / motes.count["sent"], abs=0.08)
+    assert loop.outcomes["busy"] / loop.packets == pytest.approx(motes.count["busy"] / done, abs=0.07)
+
+
+def test_802154_alone() -> None:
+    """Backoff of 0 to 7 periods, sensing, turnaround, frame, turnaround, ACK: nothing is shared."""
+    airtime_ns = lrwpan_airtime_ns(50)
+    got = [csma_access(words_of(n), 1, 0, airtime_ns) for n in range(500)]
+    periods = {(access.occupancy_ns - lrwpan_exchange_ns(50)) / LRWPAN.unit_backoff_ns for access in got}
+    assert periods == set(range(8))
+    assert all(access.outcome == "ok" and access.occupancy_ns - access.delay_ns == 192_000 + 352_000 for access in got)
+    shout = csma_access(words_of(0), 1, 0, airtime_ns, unicast=False)
+    assert shout.delay_ns == shout.occupancy_ns == got[0].delay_ns
+
+
+def test_802154_errors_are_repeated_three_times() -> None:
+    airtime_ns, count = lrwpan_airtime_ns(50), 4_000
+    got = [csma_access(words_of(k), 1, chance_threshold(0.5), airtime_ns) for k in range(count)]
+    assert abs(binomial_z(sum(access.outcome == "error" for access in got), count, 0.5**4)) < Z_ALPHA
+    assert {access.retries for access in got} == {0, 1, 2, 3}
+    once = csma_access(words_of(0), 1, UNIT, airtime_ns, unicast=False)
+    assert (once.outcome, once.retries) == ("error", 0)
+
+
+@pytest.mark.parametrize("unicast", [False, True])
+def test_802154_shares_are_shares(unicast: bool) -> None:
+    points = [sensing(n, lrwpan_airtime_ns(50), unicast) for n in range(1, CONTENDERS_MAX + 1)]
+    assert points[0].busy == points[0].p == 0.0 and points[0].idle_share == pytest.approx(1.0)
+    assert all(few.p < many.p and few.busy < many.busy for few, many in pairwise(points))
+    assert all(0.0 <= point.collision_share <= 0.5 for point in points)
+    assert points[-1].p < 1.0 and points[-1].access_threshold < UNIT

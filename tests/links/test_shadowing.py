@@ -1,0 +1,115 @@
+"""Shadowing (T20): normal, correlated over distance as configured, the same both ways, on every visit, in any order."""
+
+from __future__ import annotations
+
+from math import cos, exp, pi, sin, sqrt
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foosim.protocol.draws import draw_key, draw_words, unit_interval
+from foosim.vhub.radio import shadowing
+from foosim.vhub.radio.shadowing import field, shadowing_db
+from tests.links.statistics import ALPHA, Z_ALPHA, correlation, ks_normal, mean_and_deviation
+
+KEY = draw_key(1, "shadowing")
+D_CORR = 10.0
+SITES = 10_000
+
+
+def places(count: int, span_m: float, seed: int = 1) -> list[tuple[float, float]]:
+    key = draw_key(seed, "places")
+    drawn = [draw_words(key, n) for n in range(count)]
+    return [(span_m * (unit_interval(w[0]) - 0.5), span_m * (unit_interval(w[1]) - 0.5)) for w in drawn]
+
+
+def test_it_is_normal_over_independent_sites() -> None:
+    """Kolmogorov's test over 10,000 links between places that are far apart."""
+    ends = places(2 * SITES, 1e7)
+    values = [shadowing_db(KEY, a, b, 4.0, D_CORR) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+    assert ks_normal(values, 0.0, 4.0) > ALPHA
+
+
+@pytest.mark.parametrize("apart_m", [0.0, 0.3 * D_CORR, D_CORR, 3 * D_CORR])
+def test_its_deviation_does_not_depend_on_the_length_of_the_link(apart_m: float) -> None:
+    """Both ends of a short link stand in the same shadow: their sum would be wider than that of a long one."""
+    values = [shadowing_db(KEY, (x, y), (x + apart_m, y), 4.0, D_CORR) for x, y in places(3_000, 1e7)]
+    mean, deviation = mean_and_deviation(values)
+    assert abs(mean) < Z_ALPHA * 4.0 / sqrt(len(values))
+    assert deviation == pytest.approx(4.0, rel=0.05)
+
+
+def test_correlation_over_distance() -> None:
+    """Along straight lines of 10,000 correlation distances in all, at lags of 0.25 to 3 of them: within 0.05."""
+    products = dict.fromkeys((1, 2, 3, 4, 6, 8, 10, 12), 0.0)
+    squares, count = 0.0, 0
+    for line in range(10):
+        step_x, step_y = D_CORR / 4 * cos(2 * pi * line / 10 + 0.1), D_CORR / 4 * sin(2 * pi * line / 10 + 0.1)
+        along = [field(KEY, 1e5 * line + k * step_x, 0.37 * line + k * step_y, D_CORR) for k in range(4_000)]
+        for lag in products:
+            products[lag] += sum(a * b for a, b in zip(along[:-lag], along[lag:], strict=True)) * 4_000 / (4_000 - lag)
+        squares += sum(a * a for a in along)
+        count += len(along)
+    assert squares / count == pytest.approx(1.0, abs=0.05)
+    for lag, product in products.items():
+        assert product / count == pytest.approx(exp(-lag / 4), abs=0.05), f"{lag / 4} correlation distances"
+
+
+def test_links_that_share_an_end_correlate_by_half() -> None:
+    hub, one, other = (places(2_500, 1e7, seed) for seed in (2, 3, 4))
+    first = [shadowing_db(KEY, a, b, 1.0, D_CORR) for a, b in zip(hub, one, strict=True)]
+    second = [shadowing_db(KEY, a, b, 1.0, D_CORR) for a, b in zip(hub, other, strict=True)]
+    apart = [shadowing_db(KEY, a, b, 1.0, D_CORR) for a, b in zip(one, other[1:] + other[:1], strict=True)]
+    assert correlation(first, second) == pytest.approx(0.5, abs=0.05)
+    assert abs(correlation(first, apart[1:] + apart[:1])) < 0.05
+
+
+@given(
+    a=st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(-50, 50)),
+    b=st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(-50, 50)),
+    sigma=st.floats(0.1, 12.0),
+    d_corr=st.floats(1.0, 200.0),
+)
+def test_it_is_the_same_both_ways_to_the_last_bit(
+    a: tuple[float, float, float], b: tuple[float, float, float], sigma: float, d_corr: float
+) -> None:
+    there = shadowing_db(KEY, a, b, sigma, d_corr)
+    assert there == shadowing_db(KEY, b, a, sigma, d_corr)
+    assert there == shadowing_db(KEY, (a[0], a[1], 0.0), b, sigma, d_corr), "the height does not enter"
+    assert abs(there) < 12 * sigma
+
+
+def test_it_is_the_same_on_every_visit_in_any_order() -> None:
+    links = [(a, b) for a in places(15, 60.0) for b in places(15, 60.0, 2)]
+
+    def asked(order: list[int]) -> list[float]:
+        for cache in (shadowing.field, shadowing._cell, shadowing._node):
+            cache.cache_clear()
+        found = {n: shadowing_db(KEY, *links[n], 8.03, 6.0) for n in order}
+        return [found[n] for n in sorted(found)]
+
+    forward = asked(list(range(len(links))))
+    assert asked(list(reversed(range(len(links))))) == forward
+    assert asked(sorted(range(len(links)), key=lambda n: draw_words(KEY, n))) == forward
+    assert [shadowing_db(KEY, *link, 8.03, 6.0) for link in links] == forward
+    assert [shadowing_db(draw_key(2, "shadowing"), *link, 8.03, 6.0) for link in links] != forward
+
+
+def test_it_is_continuous() -> None:
+    """Across the borders of cells, of all three lattices, on either side of 0."""
+    for x in (-28.0, -10.0, -2.5, 0.0, 2.5, 10.0, 28.0, 70.0):
+        for y in (-7.5, 0.0, 3.3):
+            assert field(KEY, x - 1e-9, y, D_CORR) == pytest.approx(field(KEY, x, y, D_CORR), abs=1e-6)
+            assert field(KEY, y, x - 1e-9, D_CORR) == pytest.approx(field(KEY, y, x, D_CORR), abs=1e-6)
+
+
+def test_no_deviation_no_shadow() -> None:
+    assert shadowing_db(KEY, (1.0, 2.0), (3.0, 4.0), 0.0, 10.0) == 0.0
+
+
+def test_values_are_the_same_in_every_version() -> None:
+    """A capture's fates follow from them."""
+    assert shadowing_db(KEY, (1.5, -2.0, 0.4), (12.0, 7.0, 2.0), 3.0, 10.0) == pytest.approx(
+        2.406614773540525, abs=1e-12
+    )
