@@ -27,7 +27,9 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 13,
-    "HubState.links": limits.CLIENTS_MAX,
+    "Fabric.states": limits.CLIENTS_MAX,
+    "Fabric._links": limits.CLIENTS_MAX,
+    "Fabric.radios": limits.CLIENTS_MAX,
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers of something else than ticks."""

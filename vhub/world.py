@@ -12,7 +12,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.network import Network
 from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate
-from foosim.protocol.world_scene import build_scene
+from foosim.protocol.table_scene import build_scene
 from foosim.vhub.geometry import Crossing, LineOfSight, Sight
 
 

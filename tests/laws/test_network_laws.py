@@ -69,11 +69,11 @@ def test_accounts_balance_on_every_link_at_every_tick() -> None:
             state = system.hub.state
             assert state is not None
             flying = Counter((flight.source, flight.destination) for flight in state.in_flight())
-            for pair, link in state.links.items():
-                account = link.state
-                assert account.offered == account.delivered + account.dropped + flying[pair], (closing.frame.tick, pair)
+            for (source, destination, _), account in state.fabric.states.items():
+                left = account.offered - account.delivered - account.dropped
+                assert left == flying[source, destination], (closing.frame.tick, source, destination)
             totals = [
-                sum(getattr(link.state, name) for link in state.links.values())
+                sum(getattr(link, name) for link in state.fabric.states.values())
                 for name in ("offered", "delivered", "dropped")
             ]
             packets = state.packets

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
-from foosim.vhub import jitter
+from foosim.vhub import jitter, numbers
 from foosim.vhub.jitter import CELLS, gamma_quantiles_ns, interpolate_ns
 
 S: Final = 1_000_000_000
@@ -135,8 +135,9 @@ def test_drawn_jitter_has_the_distribution() -> None:
 
 def test_nothing_of_the_mathematical_library_decides() -> None:
     """Its last bits differ between machines: only exact operations (and splitting a float) may be used."""
-    used = {node.attr for node in ast.walk(ast.parse(inspect.getsource(jitter))) if isinstance(node, ast.Attribute)}
-    assert used & set(dir(__import__("math"))) == {"frexp", "inf"}
+    trees = [ast.parse(inspect.getsource(module)) for module in (jitter, numbers)]
+    used = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    assert used & set(dir(__import__("math"))) == {"frexp", "inf", "sqrt"}
     assert "**" not in inspect.getsource(jitter._Gamma) and "pow" not in used
 
 

@@ -172,10 +172,10 @@ class Ledger(RuleBasedStateMachine):
     @invariant()
     def every_link_balances(self) -> None:
         offered = Counter((source, destination) for source, destination, _ in self.offered)
-        assert {pair: link.state.offered for pair, link in self.state.links.items()} == dict(offered)
-        for pair, link in self.state.links.items():
-            causes = [cause for packet, cause in self.fates.items() if packet[:2] == pair]
-            assert (link.state.delivered, link.state.dropped) == (causes.count(""), len(causes) - causes.count(""))
+        assert {key[:2]: link.offered for key, link in self.state.fabric.states.items()} == dict(offered)
+        for key, link in self.state.fabric.states.items():
+            causes = [cause for packet, cause in self.fates.items() if packet[:2] == key[:2]]
+            assert (link.delivered, link.dropped) == (causes.count(""), len(causes) - causes.count(""))
 
     @invariant()
     def refusals_stand_apart(self) -> None:
