@@ -162,6 +162,7 @@ def _resolve(schema: Mapping[str, Any]) -> Mapping[str, Any]:
         if "$ref" in schema:
             schema = _root()["$defs"][schema["$ref"].removeprefix("#/$defs/")]
         elif "anyOf" in schema:
-            schema = next((s for s in schema["anyOf"] if "$ref" in s or s.get("type") in ("array", "object")), {})
+            inner = [s for s in schema["anyOf"] if "$ref" in s or s.get("type") in ("array", "object")]
+            schema = next(iter(inner or [s for s in schema["anyOf"] if s.get("type") != "null"]), {})
         else:
             return schema
