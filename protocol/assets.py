@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from foosim.protocol import limits
-from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.deployment_file import apply_sets, check_open_meshes, load_deployment
 from foosim.protocol.mesh import AssetError, digest_of
 from foosim.protocol.scenery import SceneryMesh, mesh_files, path_problem
 
@@ -27,15 +27,16 @@ _FILE = _COMPONENT | os.O_NONBLOCK  # a pipe that nobody writes to would be wait
 def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes]]:
     """The text with the digest of each file that its scenery names, and the contents of these by path.
 
-    `folder` is the one that the deployment's file is in. Raises DeploymentError, and AssetError for a file that is not
-    acceptable: the contents are read once, and what the digests name is what was checked.
+    `folder` is the one that the deployment's file is in. Raises DeploymentError, also for a wall without a thickness,
+    and AssetError for a file that is not acceptable: the contents are read once, and what the digests name is what was
+    checked.
     """
     deployment = load_deployment(text, name)
     wanted = mesh_files(deployment.scenery)
     if not wanted:
         return text, {}
     files = read_files(folder, deployment.assets, wanted)
-    deployment.with_assets(files)
+    check_open_meshes(text, name, deployment.with_assets(files))
     sets = [
         f'scenery.{thing}.digest="{digest_of(files[spec.file])}"'
         for thing, spec in deployment.scenery.items()

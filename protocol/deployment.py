@@ -21,7 +21,15 @@ from foosim.protocol.hosts import Host, Listen, Name, Placed
 from foosim.protocol.names import LineName, Team
 from foosim.protocol.network import LinkRule, Network, Selector
 from foosim.protocol.scene import Shape
-from foosim.protocol.scenery import SCENERY_MAX, AssetFolder, Contents, Scenery, read_contents, scenery_shape
+from foosim.protocol.scenery import (
+    SCENERY_MAX,
+    AssetFolder,
+    Contents,
+    Scenery,
+    open_meshes,
+    read_contents,
+    scenery_shape,
+)
 from foosim.protocol.table import Part, Table
 from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks
 
@@ -214,6 +222,10 @@ class Deployment(Part):
         """The scenery beside the table, in name order; files that its meshes are in were given."""
         meshes = self._contents.meshes
         return [scenery_shape(name, thing, meshes.get(name)) for name, thing in sorted(self.scenery.items())]
+
+    def open_meshes(self) -> list[str]:
+        """The things of the scenery that are walls without a thickness; files that its meshes are in were given."""
+        return open_meshes(self.scenery, self._contents.meshes)
 
     def endpoints(self) -> list[str]:
         """The names that packets go from and to, sorted: robots, players and clients."""

@@ -80,6 +80,20 @@ def apply_sets(text: str, name: str, sets: Sequence[str]) -> str:
     return canonical
 
 
+def check_open_meshes(text: str, name: str, deployment: Deployment) -> None:
+    """Refuse walls without a thickness: meshes that are not closed, of a material of which it is not said how thick.
+
+    `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
+    """
+    found = deployment.open_meshes()
+    if found:
+        tree, _ = read_tree(text, locate_in(name))
+        assert tree is not None, "it was loaded"
+        what = "a wall without a thickness: the mesh is not closed, so its radio needs thickness or loss"
+        findings = [Finding(("scenery", thing, "radio"), what, deployment.scenery[thing].radio) for thing in found]
+        raise DeploymentError(_report([_problem(tree, finding) for finding in findings]))
+
+
 def read_deployment_text(path: Path) -> str:
     """The text of a deployment file, bounded before it is read; raises DeploymentError."""
     place = Place(0, 1, 1, str(path))

@@ -304,11 +304,22 @@ def _shapes(view: View) -> Iterator[Finding]:
 
 
 def _scenery(view: View) -> Iterator[Finding]:
-    """The pure engine has no meshes."""
+    """The pure engine has no meshes; what waves cross is of a material, or has a loss."""
     for name in view.mapping("scenery"):
         if view.get("engine") == "pure" and view.get("scenery", name, "shape") == "mesh":
-            what = "the engine pure has no meshes (boxes it has, and the engine bullet has both)"
+            what = "the engine pure has no meshes (boxes and cylinders it has, and the engine bullet has all)"
             yield Finding(("scenery", name, "shape"), what, "mesh", "'box'")
+        yield from _radio(view, ("scenery", name, "radio"))
+
+
+def _radio(view: View, radio: Location) -> Iterator[Finding]:
+    """Waves cross a material, or have a fixed loss: one of both is said."""
+    given = {key: value for key, value in view.mapping(*radio).items() if value is not None}
+    if isinstance(view.get(*radio), dict) and not given.keys() & {"is", "loss"}:
+        yield Finding((*radio, "is"), "missing key of a material, unless it has a loss", "is", at="missing")
+    for key in ("is", "thickness"):
+        if key in given and "loss" in given:
+            yield Finding((*radio, key), "a loss holds whatever it is made of: not beside one", key, at="key")
 
 
 def _millimetres(length: Fraction) -> str | None:

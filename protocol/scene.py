@@ -14,6 +14,7 @@ from math import cos, sin, sqrt
 from typing import TYPE_CHECKING, Final, Literal
 
 from foosim.protocol.mesh import Mesh
+from foosim.protocol.radio_materials import UNKNOWN, RadioMaterial
 
 if TYPE_CHECKING:
     from foosim.protocol.layout import Entity
@@ -52,13 +53,18 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A geometry at a pose in its link (in the world for scenery), its surface (a key of the table's) and colour."""
+    """A geometry at a pose in its link (in the world for scenery), its surface (a key of the table's) and colour.
+
+    `radio` is what waves lose in it; `name` is that of the scenery it belongs to, empty in a body, which has its own.
+    """
 
     geometry: Box | Sphere | Cylinder | Mesh
     surface: str
     colour: Colour
     position: Vector = ORIGIN
     orientation: Quaternion = UPRIGHT
+    radio: RadioMaterial = UNKNOWN
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Fixed things that a deployment puts into its world beside the table: boxes, and meshes from files.
+"""Fixed things that a deployment puts into its world beside the table: boxes, cylinders, and meshes from files.
 
 This is their schema, and how they become shapes of the scene. A mesh's file is named by a path inside the deployment's
 asset folder; its digest is written beside it when a run is planned, so that the deployment's text alone says which
@@ -17,8 +17,9 @@ from pydantic import AfterValidator, Field
 
 from foosim.protocol import limits, units
 from foosim.protocol.errors import BadValue
-from foosim.protocol.mesh import MESH_READERS, AssetError, Mesh, check_digest, digest_of, read_mesh
-from foosim.protocol.scene import Box, Colour, Quaternion, Shape, Vector, multiply, turn
+from foosim.protocol.mesh import MESH_READERS, AssetError, Mesh, check_digest, digest_of, is_closed, read_mesh
+from foosim.protocol.radio_materials import UNKNOWN, Radio
+from foosim.protocol.scene import Box, Colour, Cylinder, Quaternion, Shape, Vector, multiply, turn
 from foosim.protocol.table import Length, Part, Position
 from foosim.protocol.units import Quantity, custom_error
 
@@ -98,7 +99,10 @@ class Material(Part):
 
 
 class Placed(Part):
-    """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw)."""
+    """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw).
+
+    `radio` is what waves that cross it lose: 5 dB if it is not said.
+    """
 
     x: Position = _default("0 m")
     y: Position = _default("0 m")
@@ -108,6 +112,7 @@ class Placed(Part):
     yaw: Turn = _default("0 deg")
     surface: SurfaceName
     material: Material = Field(default_factory=Material)
+    radio: Radio | None = None
 
     @property
     def position(self) -> Vector:
@@ -128,6 +133,14 @@ class SceneryBox(Placed):
     height: Length
 
 
+class SceneryCylinder(Placed):
+    """A cylinder, its origin in its middle, its axis its own z: an upright column unless it is turned."""
+
+    shape: Literal["cylinder"]
+    radius: Length
+    length: Length
+
+
 class SceneryMesh(Placed):
     """The triangles of a file. `scale` is metres per unit of the file; `digest` (BLAKE2b) says which file is meant."""
 
@@ -137,7 +150,8 @@ class SceneryMesh(Placed):
     digest: Digest | None = None
 
 
-Scenery = Annotated[SceneryBox | SceneryMesh, Field(discriminator="shape")]
+SceneryThing = SceneryBox | SceneryCylinder | SceneryMesh
+Scenery = Annotated[SceneryThing, Field(discriminator="shape")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +163,7 @@ class Contents:
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
 
 
-def read_contents(scenery: Mapping[str, SceneryBox | SceneryMesh], files: Mapping[str, bytes]) -> Contents:
+def read_contents(scenery: Mapping[str, SceneryThing], files: Mapping[str, bytes]) -> Contents:
     """Read the files of all meshes; raises AssetError for one that is missing, not the one meant or not acceptable."""
     meshes: dict[str, Mesh] = {}
     known: dict[tuple[str, float], Mesh] = {}
@@ -173,17 +187,29 @@ def read_contents(scenery: Mapping[str, SceneryBox | SceneryMesh], files: Mappin
     return Contents(used, {digest_of(content): content for content in used.values()}, meshes)
 
 
-def scenery_shape(name: str, thing: SceneryBox | SceneryMesh, mesh: Mesh | None) -> Shape:
+def scenery_shape(name: str, thing: SceneryThing, mesh: Mesh | None) -> Shape:
     """Return a thing as a shape in the world; a mesh's triangles are given, scaled."""
     if isinstance(thing, SceneryBox):
-        geometry: Box | Mesh = Box((thing.length / 2, thing.width / 2, thing.height / 2))
+        geometry: Box | Cylinder | Mesh = Box((thing.length / 2, thing.width / 2, thing.height / 2))
+    elif isinstance(thing, SceneryCylinder):
+        geometry = Cylinder(thing.radius, thing.length)
     else:
         assert mesh is not None, f"the deployment was not given the file of scenery.{name}"
         geometry = mesh
-    return Shape(geometry, thing.surface, thing.material.colour, thing.position, thing.orientation)
+    colour, radio = thing.material.colour, thing.radio or UNKNOWN
+    return Shape(geometry, thing.surface, colour, thing.position, thing.orientation, radio, name)
 
 
-def mesh_files(scenery: Mapping[str, SceneryBox | SceneryMesh]) -> dict[str, str | None]:
+def open_meshes(scenery: Mapping[str, SceneryThing], meshes: Mapping[str, Mesh]) -> list[str]:
+    """Return the things whose material needs a way through them that their mesh, which is not closed, does not have."""
+    return [
+        name
+        for name, thing in scenery.items()
+        if name in meshes and thing.radio is not None and thing.radio.needs_chord and not is_closed(meshes[name])
+    ]
+
+
+def mesh_files(scenery: Mapping[str, SceneryThing]) -> dict[str, str | None]:
     """Return the files that scenery is made of, in name order, each with the digest that is written beside it."""
     meshes = [thing for thing in scenery.values() if isinstance(thing, SceneryMesh)]
     return {mesh.file: mesh.digest for mesh in sorted(meshes, key=lambda mesh: mesh.file)}

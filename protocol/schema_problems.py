@@ -163,7 +163,8 @@ def _resolve(schema: Mapping[str, Any]) -> Mapping[str, Any]:
         if "$ref" in schema:
             schema = _root()["$defs"][schema["$ref"].removeprefix("#/$defs/")]
         elif "anyOf" in schema:
-            schema = next((s for s in schema["anyOf"] if _has_parts(s)), {})
+            inner = [s for s in schema["anyOf"] if _has_parts(s)]
+            schema = next(iter(inner or [s for s in schema["anyOf"] if s.get("type") != "null"]), {})
         else:
             return schema
 

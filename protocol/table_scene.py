@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Final
 
+from foosim.protocol import radio_materials
 from foosim.protocol.assign import line_x_m
 from foosim.protocol.deployment import Deployment, RodRobot
 from foosim.protocol.layout import Layout
@@ -27,6 +28,9 @@ TEAM_COLOURS: Final[dict[str, Colour]] = {"red": (0.80, 0.10, 0.10, 1.0), "blue"
 ALONG_Y: Final[Quaternion] = (-sqrt(0.5), 0.0, 0.0, sqrt(0.5))
 """Turns a cylinder's axis from z to y."""
 Y_AXIS: Final[Vector] = (0.0, 1.0, 0.0)
+
+TABLE: Final = "table"
+"""What its floor, walls, goals and ramps are called, all together, where waves cross them."""
 
 _COS_EIGHTH: Final = sqrt((1.0 + sqrt(0.5)) / 2.0)
 _SIN_EIGHTH: Final = sqrt((1.0 - sqrt(0.5)) / 2.0)
@@ -57,7 +61,7 @@ def ball_body(table: Table, name: str) -> Body:
     """Return a ball: a solid sphere, I = 2/5 m r^2."""
     ball = table.ball
     inertia = 0.4 * ball.mass * ball.radius * ball.radius
-    shape = Shape(Sphere(ball.radius), "ball", ORANGE)
+    shape = Shape(Sphere(ball.radius), "ball", ORANGE, radio=radio_materials.PLASTIC)
     return Body(name, "ball", (0.0, 0.0, 0.0), (Link(name, "free", (shape,), ball.mass, (inertia, inertia, inertia)),))
 
 
@@ -68,7 +72,7 @@ def _rod_body(table: Table, name: str, robot: RodRobot, x: float) -> Body:
     of a step. So a ball that flies against the tube does not feel it spin; the tube's inertia turns with the figures.
     """
     rod, line = table.rod, table.lines[robot.line]
-    tube = Shape(Cylinder(rod.radius, rod.length), "rods", STEEL, orientation=ALONG_Y)
+    tube = Shape(Cylinder(rod.radius, rod.length), "rods", STEEL, orientation=ALONG_Y, radio=radio_materials.METAL)
     thin = rod.carriage_mass * rod.length * rod.length / 12.0
     mass, centre, inertia = _spin_mass(table, line)
     slide = Link(
@@ -99,8 +103,8 @@ def _figures(table: Table, line: Line, colour: Colour) -> tuple[Shape, ...]:
     body_z = rod.foot.height + rod.body.height / 2 - rod.foot_radius
     shapes = []
     for y in figure_ys(line):
-        shapes.append(Shape(foot, "figures", colour, (0.0, y, foot_z)))
-        shapes.append(Shape(body, "figures", colour, (0.0, y, body_z)))
+        shapes.append(Shape(foot, "figures", colour, (0.0, y, foot_z), radio=radio_materials.PLASTIC))
+        shapes.append(Shape(body, "figures", colour, (0.0, y, body_z), radio=radio_materials.PLASTIC))
     return tuple(shapes)
 
 
@@ -148,7 +152,7 @@ def table_scenery(table: Table) -> tuple[Shape, ...]:
 def _box(low: Vector, high: Vector, surface: str, colour: Colour) -> Shape:
     half = ((high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2)
     middle = ((high[0] + low[0]) / 2, (high[1] + low[1]) / 2, (high[2] + low[2]) / 2)
-    return Shape(Box(half), surface, colour, middle)
+    return Shape(Box(half), surface, colour, middle, radio=radio_materials.WOOD, name=TABLE)
 
 
 def _mirrored(low: Vector, high: Vector, surface: str, colour: Colour) -> tuple[Shape, Shape]:
@@ -224,4 +228,5 @@ def _ramp(table: Table, side_x: float, side_y: float) -> Shape:
         side_y * (table.field.width / 2 + outwards * sqrt(0.5)),
         slope / 2.0 * rise - thick / 2.0 * level,
     )
-    return Shape(Box((slope / 2.0, run, thick / 2.0)), "ramps", DARK_GREEN, middle, orientation)
+    box = Box((slope / 2.0, run, thick / 2.0))
+    return Shape(box, "ramps", DARK_GREEN, middle, orientation, radio_materials.WOOD, TABLE)

@@ -74,6 +74,7 @@ ACCELERATION: Final = Dimension("acceleration", {"m/s2": Fraction(1), "mm/s2": F
 FORCE: Final = Dimension("force", _sizes(N="1", mN="1e-3", kN="1e3"))
 TORQUE: Final = Dimension("torque", {"N m": Fraction(1), "mN m": Fraction(1, 1000)})
 IMPULSE: Final = Dimension("impulse", {"N s": Fraction(1), "mN s": Fraction(1, 1000)})
+LEVEL: Final = Dimension("level", _sizes(dB="1"))
 PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)})
 FREQUENCY: Final = Dimension("frequency", _sizes(Hz="1", kHz="1e3", MHz="1e6", GHz="1e9"))
 BITRATE: Final = Dimension(

@@ -138,12 +138,12 @@ class PureEngine:
 
         What a rod pushes against the scenery does not bounce off it, else a pinned ball would hammer on both.
         """
-        boxes = self._scenery.near(ball.x, ball.y)
-        rounds = 1 if len(boxes) == 1 else CONTACTS_MAX
+        things = self._scenery.near(ball.x, ball.y)
+        rounds = 1 if len(things) == 1 else CONTACTS_MAX
         for _ in range(rounds):
             deepest: Contact | None = None
-            for box in boxes:
-                contact = box.contact(ball)
+            for thing in things:
+                contact = thing.contact(ball)
                 if contact[0] > (deepest[0] if deepest else DEPTH_MIN):
                     deepest = contact
             if deepest is None:

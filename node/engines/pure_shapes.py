@@ -1,7 +1,8 @@
-"""What touches a ball in the pure engine: the scenery's boxes, a rod's tube and the boxes of its figures.
+"""What touches a ball in the pure engine: the scenery's boxes and cylinders, a rod's tube and its figures' boxes.
 
 Distances are from the ball's centre to the nearest point of a box (Ericson, "Real-Time Collision Detection", section
-5.1.3); inside a box, to the nearest face. Neighbours: `pure` (the engine), `pure_bodies` (what a contact does).
+5.1.3) or cylinder; inside of one, to the nearest face. Neighbours: `pure` (the engine), `pure_bodies` (what a contact
+does).
 """
 
 from __future__ import annotations
@@ -41,14 +42,35 @@ def distance_to_box(x: float, y: float, z: float, half: Vector) -> tuple[float, 
     return distance, ex / distance, ey / distance, ez / distance
 
 
-class StillBox:
-    """One box of the scenery, upright or tilted."""
+def distance_to_cylinder(x: float, y: float, z: float, half: Vector) -> tuple[float, float, float, float]:
+    """Return distance and outward normal from a cylinder, centred on the z axis, to a point; negative inside.
 
-    __slots__ = ("axes", "half", "high", "low", "middle", "pair")
+    `half` is its radius twice, and half of its length.
+    """
+    from_axis = sqrt(x * x + y * y)
+    out, over = from_axis - half[0], abs(z) - half[2]
+    up = 1.0 if z > 0.0 else -1.0
+    # On the axis every direction is as near as any other.
+    nx, ny = (x / from_axis, y / from_axis) if from_axis > 0.0 else (1.0, 0.0)
+    if out > 0.0 and over > 0.0:
+        distance = sqrt(out * out + over * over)
+        return distance, out / distance * nx, out / distance * ny, over / distance * up
+    return (over, 0.0, 0.0, up) if over >= out else (out, nx, ny, 0.0)
+
+
+class Still:
+    """One box or cylinder of the scenery, upright or tilted."""
+
+    __slots__ = ("axes", "distance", "half", "high", "low", "middle", "pair")
 
     def __init__(self, shape: Shape, pair: Pair) -> None:
-        assert isinstance(shape.geometry, Box), shape
-        self.half, self.middle, self.pair = shape.geometry.half, shape.position, pair
+        geometry = shape.geometry
+        assert isinstance(geometry, Box | Cylinder), shape
+        if isinstance(geometry, Box):
+            self.half, self.distance = geometry.half, distance_to_box
+        else:
+            self.half, self.distance = (geometry.radius, geometry.radius, geometry.length / 2), distance_to_cylinder
+        self.middle, self.pair = shape.position, pair
         self.low, self.high = shape_box(shape)
         turned = shape.orientation
         self.axes: tuple[Vector, Vector, Vector] | None = None
@@ -64,10 +86,10 @@ class StillBox:
         mx, my, mz = self.middle
         x, y, z = ball.x - mx, ball.y - my, ball.z - mz
         if self.axes is None:
-            distance, nx, ny, nz = distance_to_box(x, y, z, self.half)
+            distance, nx, ny, nz = self.distance(x, y, z, self.half)
             return ball.radius - distance, (nx, ny, nz), self.pair
         (ax, ay, az), (bx, by, bz), (cx, cy, cz) = self.axes
-        distance, p, q, r = distance_to_box(
+        distance, p, q, r = self.distance(
             x * ax + y * ay + z * az, x * bx + y * by + z * bz, x * cx + y * cy + z * cz, self.half
         )
         normal = (p * ax + q * bx + r * cx, p * ay + q * by + r * cy, p * az + q * bz + r * cz)
@@ -75,27 +97,27 @@ class StillBox:
 
 
 class Scenery:
-    """All boxes of the scenery, found by where a ball is."""
+    """All boxes and cylinders of the scenery, found by where a ball is."""
 
     def __init__(self, shapes: Sequence[Shape], pairs: Mapping[str, Pair], radius: float) -> None:
-        self._boxes = tuple(StillBox(shape, pairs[shape.surface]) for shape in shapes)
+        self._things = tuple(Still(shape, pairs[shape.surface]) for shape in shapes)
         self._radius = radius
-        self._cells: dict[tuple[float, float], tuple[StillBox, ...]] = {}
+        self._cells: dict[tuple[float, float], tuple[Still, ...]] = {}
 
-    def near(self, x: float, y: float) -> tuple[StillBox, ...]:
-        """Return the boxes that a ball with its centre over this spot could touch."""
+    def near(self, x: float, y: float) -> tuple[Still, ...]:
+        """Return the things that a ball with its centre over this spot could touch."""
         key = x // CELL_M, y // CELL_M
-        boxes = self._cells.get(key)
-        if boxes is None:
-            boxes = self._cells[key] = self._near(key[0] * CELL_M, key[1] * CELL_M)
-        return boxes
+        things = self._cells.get(key)
+        if things is None:
+            things = self._cells[key] = self._near(key[0] * CELL_M, key[1] * CELL_M)
+        return things
 
-    def _near(self, x: float, y: float) -> tuple[StillBox, ...]:
+    def _near(self, x: float, y: float) -> tuple[Still, ...]:
         reach, far = self._radius + 1e-6, self._radius + CELL_M + 1e-6
         return tuple(
-            box
-            for box in self._boxes
-            if box.low[0] - far <= x <= box.high[0] + reach and box.low[1] - far <= y <= box.high[1] + reach
+            thing
+            for thing in self._things
+            if thing.low[0] - far <= x <= thing.high[0] + reach and thing.low[1] - far <= y <= thing.high[1] + reach
         )
 
 

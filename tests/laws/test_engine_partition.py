@@ -213,6 +213,17 @@ DOMES = (
 """Domes between the rods, as meshes."""
 
 
+POSTS = (
+    "scenery={"
+    + ", ".join(
+        f"p{x}{y}: {{shape: cylinder, radius: 2 cm, length: 8 cm, x: {x * 149 - 75} mm, y: {y * 180} mm, z: 1 cm, "
+        f"roll: {20 * y} deg, pitch: {15 * x} deg, surface: walls}}"
+        for x, y in product(range(-1, 3), range(-1, 2))
+    )
+    + "}"
+)
+"""Posts between the rods, most of them aslant."""
+
 PILE = ("tick=0.5 ms", "substeps=1", "table.ball.speed_limit=5 m/s")
 
 
@@ -241,6 +252,14 @@ def test_meshes_change_nothing() -> None:
     assert outcome.differing == []
     assert outcome.rod_touches >= 20 and outcome.ball_touches >= 60, outcome
     assert outcome.handovers >= 100 and outcome.rebuilt >= 30, outcome
+
+
+@pytest.mark.parametrize("factory", [BulletEngine, PureEngine])
+def test_cylinders_change_nothing(factory: EngineFactory) -> None:
+    outcome = compare(factory, 1500, (POSTS,))
+    assert outcome.differing == []
+    assert outcome.rod_touches >= 10 and outcome.ball_touches >= 25, outcome
+    assert outcome.handovers >= 50 and outcome.rebuilt >= 15, outcome
 
 
 @pytest.mark.parametrize("factory", [BulletEngine, PureEngine])

@@ -1,6 +1,8 @@
 """What both engines promise to a node, beyond physics: the contact log, motors, and independence of what is parked."""
 
 from collections.abc import Iterator
+from math import sqrt
+from operator import mul
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,7 @@ from foosim.node.engines import ENGINES
 from foosim.node.engines.interface import Engine
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.scene import Vector
 from foosim.protocol.start import initial_numbers, place_ball
 
 TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
@@ -162,3 +165,36 @@ def test_what_balls_feel_of_one_another_changes_nothing_else(kind: str) -> None:
         engine.close()
         speeds.append(numbers[BALL.offsets["linear_velocity"] : BALL.offsets["linear_velocity"] + 3])
     assert speeds[0][1] < -1.0 and speeds[1] == pytest.approx(speeds[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", sorted(ENGINES))
+@pytest.mark.parametrize(
+    ("turned", "start", "velocity", "normal"),
+    [
+        ("", (-0.15, 0.2, 0.06), (8.0, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+        ("", (-0.15, 0.2 - 0.045 * sqrt(0.5), 0.06), (8.0, 0.0, 0.0), (-sqrt(0.5), -sqrt(0.5), 0.0)),
+        ("", (0.01, 0.21, 0.3), (0.0, 0.0, -8.0), (0.0, 0.0, 1.0)),
+        ("pitch: 90 deg,", (0.02, 0.2, 0.3), (0.0, 0.0, -8.0), (0.0, 0.0, 1.0)),
+    ],
+    ids=["side", "slanting", "upper face", "lying"],
+)
+def test_balls_bounce_off_cylinders(kind: str, turned: str, start: Vector, velocity: Vector, normal: Vector) -> None:
+    """A post, of 27.5 mm radius, with the ball's makes 45 mm: the ball leaves along the normal, and never gets in."""
+    size = "radius: 27.5 mm, length: 12 cm, y: 20 cm, z: 6 cm"
+    post = f"scenery={{post: {{shape: cylinder, {size}, {turned} surface: walls}}}}"
+    sets = [f"engine={kind}", "table.contact_erp=0", "table.gravity=0 m/s2", post, "table.surfaces.walls.friction=0"]
+    deployment = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+    numbers = initial_numbers(deployment, LAYOUT)
+    place_ball(numbers, BALL, start, velocity)
+    engine = ENGINES[kind](deployment, LAYOUT)
+    at, speed = BALL.offsets["position"], BALL.offsets["linear_velocity"]
+    for _ in range(25):
+        tick(engine, LAYOUT, numbers)
+        x, y, z = numbers[at], numbers[at + 1] - 0.2, numbers[at + 2] - 0.06
+        across, along = (sqrt(y * y + z * z), x) if turned else (sqrt(x * x + y * y), z)
+        assert across > 0.0275 + 0.0170 or abs(along) > 0.06 + 0.0170, "the ball is in the post"
+    engine.close()
+    change = [after - before for after, before in zip(numbers[speed : speed + 3], velocity, strict=True)]
+    bounce = (1 + deployment.table.surfaces.walls.restitution) * abs(sum(map(mul, normal, velocity)))
+    # Within what the way of a substep, 4 mm, turns the normal by.
+    assert change == pytest.approx([bounce * part for part in normal], abs=0.09 * bounce)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pytest
@@ -72,16 +71,16 @@ def test_a_world_with_meshes_is_one_world_on_any_number_of_nodes(folder: Path, m
     assert found.equal and found.ticks == TICKS
     with pytest.raises(AssetError, match=r"wedge\.obj: another file than the digest names"):
         verify(capture.about.deployment_text, "t", capture.captured_ticks(), files={"wedge.obj": WEDGE + b"\n"})
-    assert drawn(path) == 2 * 8
+    assert sum(len(part.indices) // 3 for part in scenery_in(path).triangles) == 2 * 8
 
 
-def drawn(path: Path) -> int:
-    """How many triangles of the scenery a viewer is told of."""
+def scenery_in(path: Path) -> Any:
+    """What a viewer is told of the scenery."""
     with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         _, _, _, scene = next(reader.iter_decoded_messages(topics=["/scene"]))
     (scenery,) = [entity for entity in scene.entities if entity.id == "scenery"]
-    return sum(len(part.indices) // 3 for part in scenery.triangles)
+    return scenery
 
 
 def test_a_bad_file_ends_nothing_but_the_start(folder: Path) -> None:
@@ -90,12 +89,20 @@ def test_a_bad_file_ends_nothing_but_the_start(folder: Path) -> None:
         rehearse(TEXT, "table.yaml", TICKS, 1, SETS, folder=folder)
 
 
-def test_boxes_are_scenery_on_both_engines(folder: Path) -> None:
-    box = json.dumps({"shape": "box", "length": "2 cm", "width": "40 cm", "height": "6 cm", "surface": "walls"})
-    walls = f"scenery={{left: {box[:-1]}, x: -20 cm}}, right: {box[:-1]}, x: 20 cm}}}}"
+SOLIDS: Final = {
+    "cubes": "shape: box, length: 2 cm, width: 40 cm, height: 6 cm, surface: walls",
+    "cylinders": "shape: cylinder, radius: 3 cm, length: 40 cm, roll: 90 deg, surface: walls, radio: metal",
+}
+
+
+@pytest.mark.parametrize("drawn_as", SOLIDS)
+def test_boxes_and_cylinders_are_scenery_on_both_engines(folder: Path, drawn_as: str) -> None:
+    """A wall, or a tube that lies across, on either side; a viewer is told of both."""
+    walls = f"scenery={{left: {{{SOLIDS[drawn_as]}, x: -20 cm}}, right: {{{SOLIDS[drawn_as]}, x: 20 cm}}}}"
     for engine in ("bullet", "pure"):
-        sets = (*SETS[:-1], walls, f"engine={engine}")
         path = folder / f"{engine}.mcap"
-        rehearse(TEXT, "table.yaml", TICKS, 1, sets, capture=path)
+        rehearse(TEXT, "table.yaml", TICKS, 1, (*SETS[:-1], walls, f"engine={engine}"), capture=path)
         along = open_capture(path).frames.column("ball", "position", 3)[:, 0]
         assert np.max(np.abs(along)) < 0.2 and np.max(np.abs(along)) > 0.1, engine
+        table = 0 if drawn_as == "cylinders" else 21
+        assert len(getattr(scenery_in(path), drawn_as)) == table + 2

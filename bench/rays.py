@@ -1,0 +1,130 @@
+"""What a line of sight costs: a hall of 50 shelves and walls, 20 vehicles that drive, 200 pairs that talk in each tick.
+
+Each way of asking by itself: pair by pair, many at once (the receivers of a broadcast), pairs of fixed antennas, whose
+scenery is remembered, and pairs that were asked for in the same tick before. Neighbour: `hub`, the whole of the vHub.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import cos, sin, tau
+from typing import Final
+
+from foosim.protocol.layout import Layout
+from foosim.protocol.scene import Body, Box, Cylinder, Link, Scene, Shape, Vector, turn
+from foosim.vhub.geometry import Geometry, Sight
+
+SHELVES: Final = 50
+VEHICLES: Final = 20
+PAIRS: Final = 200
+TICKS_PER_S: Final = 100
+LIMIT_US: Final = 30.0
+LIMIT_AGAIN_US: Final = 2.0
+GREY: Final = (0.5, 0.5, 0.5, 1.0)
+Pair = tuple[Vector, Vector, tuple[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Rays:
+    """Means, in us for each pair."""
+
+    one_by_one_us: float
+    at_once_us: float
+    fixed_us: float
+    again_us: float
+    placing_us: float
+    """What the first line of a tick costs more, for all bodies together: part of the first two."""
+    crossings: float
+    """Things that a line crosses, in the mean."""
+
+
+def hall() -> tuple[Scene, Layout]:
+    """Return the world: shelves in rows, and vehicles of a cylinder each."""
+    shelves = [
+        Shape(
+            Box((1.5, 0.3, 1.0)), "walls", GREY, (4.0 * (n % 10) - 18.0, 4.0 * (n // 10) - 8.0, 1.0), name=f"shelf{n}"
+        )
+        for n in range(SHELVES)
+    ]
+    chassis = Shape(Cylinder(0.25, 0.3), "walls", GREY)
+    names = [f"rover{n:02}" for n in range(VEHICLES)]
+    links = {name: (Link(name, "free", (chassis,), 1.0, (1.0, 1.0, 1.0)),) for name in names}
+    bodies = {name: Body(name, "ball", (0.0, 0.0, 0.0), links[name]) for name in names}
+    return Scene(bodies, tuple(shelves)), Layout(dict.fromkeys(names, "ball"), {})
+
+
+def numbers_at(layout: Layout, tick: int) -> list[float]:
+    """Return a frame in which every vehicle is on its circle."""
+    numbers = [0.0] * layout.size
+    for index, entity in enumerate(layout.entities):
+        at, turned = entity.offsets["position"], entity.offsets["orientation"]
+        angle = tau * (tick / 1000.0 + index / VEHICLES)
+        numbers[at : at + 3] = (15.0 + index / 10) * cos(angle), 9.0 * sin(angle), 0.15
+        numbers[turned : turned + 4] = turn((0.0, 0.0, 1.0), angle)
+    return numbers
+
+
+def pairs_at(layout: Layout, numbers: list[float], rng: random.Random) -> list[Pair]:
+    """Return pairs of antennas on vehicles."""
+    pairs = []
+    for _ in range(PAIRS):
+        one, other = rng.sample(layout.entities, 2)
+        (ax, ay, az), (bx, by, bz) = (
+            numbers[entity.offsets["position"] : entity.offsets["position"] + 3] for entity in (one, other)
+        )
+        mast = rng.uniform(0.3, 0.5)  # so that no two pairs are the same
+        pairs.append(((ax, ay, az + mast), (bx, by, bz + mast), (one.name, other.name)))
+    return pairs
+
+
+def rays(seconds: float = 3.0) -> Rays:
+    """Ask in as many ticks as a hundredth of the seconds, each way on sights of its own."""
+    scene, layout = hall()
+    geometry, rng = Geometry(scene), random.Random(1)
+    fixed: list[Pair] = [
+        ((rng.uniform(-20, 20), rng.uniform(-10, 10), 0.5), (rng.uniform(-20, 20), rng.uniform(-10, 10), 0.5), ("", ""))
+        for _ in range(PAIRS)
+    ]
+    spent = dict.fromkeys(("one_by_one", "at_once", "fixed", "again", "placing"), 0.0)
+    ticks, found = max(1, round(seconds * TICKS_PER_S)), 0
+    for tick in range(ticks):
+        numbers = numbers_at(layout, tick)
+        pairs = pairs_at(layout, numbers, rng)
+        elsewhere = pairs_at(layout, numbers, rng)
+        sight, another, third = (geometry.sight(layout, numbers) for _ in range(3))
+        spent["one_by_one"] += _spent(_each, sight, pairs)
+        spent["again"] += _spent(_each, sight, pairs)
+        spent["at_once"] += _spent(Sight.between_many, another, elsewhere)
+        spent["placing"] += _spent(_each, third, fixed[:1])
+        spent["fixed"] += _spent(_each, third, fixed)
+        found += sum(len(sight.between(*pair)) for pair in pairs)
+    each = {name: round(1e6 * total / ticks / PAIRS, 2) for name, total in spent.items()}
+    return Rays(
+        each["one_by_one"], each["at_once"], each["fixed"], each["again"], each["placing"], found / ticks / PAIRS
+    )
+
+
+def _each(sight: Sight, pairs: list[Pair]) -> None:
+    for a, b, names in pairs:
+        sight.between(a, b, names)
+
+
+def _spent(work: Callable[[Sight, list[Pair]], object], sight: Sight, pairs: list[Pair]) -> float:
+    """Return the processor time of asking (s): the machine may have other work."""
+    begun = time.process_time()
+    work(sight, pairs)
+    return time.process_time() - begun
+
+
+def lines(found: Rays) -> list[str]:
+    """Return the figures for people."""
+    return [
+        f"{SHELVES} shelves, {VEHICLES} vehicles, {PAIRS} pairs a tick, {found.crossings:.1f} crossings each",
+        f"pair by pair {found.one_by_one_us:.1f} us (to stay below {LIMIT_US:.0f}), at once {found.at_once_us:.1f} us",
+        f"of it for placing the vehicles {found.placing_us:.1f} us",
+        f"between fixed antennas {found.fixed_us:.1f} us",
+        f"again in the same tick {found.again_us:.2f} us (to stay below {LIMIT_AGAIN_US:.0f})",
+    ]

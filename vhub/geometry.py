@@ -1,0 +1,442 @@
+"""Line of sight: which things of the world a straight line between two antennas crosses, and how far inside of each.
+
+The things are those of the scene: the scenery, prepared once, and the bodies, placed by the one forward kinematics
+when somebody asks for a line in that frame. What is crossed is worked out from the lesser of the two ends, so both
+directions of a pair have the same crossings to the last bit. Boxes around things say in one pass for many lines where
+to look; what is said then comes from one spelling of plain floats, so it does not matter in which company or order a
+line is asked for. Neighbours: `rays` (lines and shapes), `protocol.scene` (what there is), `protocol.radio_materials`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout
+from foosim.protocol.radio_materials import RadioMaterial
+from foosim.protocol.scene import (
+    ORIGIN,
+    UPRIGHT,
+    Box,
+    Cylinder,
+    Link,
+    Quaternion,
+    Scene,
+    Shape,
+    Sphere,
+    Vector,
+    enclosing,
+    forward_kinematics,
+    place,
+    rotate,
+    shape_box,
+)
+from foosim.protocol.table_scene import build_scene
+from foosim.vhub.rays import (
+    Floats,
+    Span,
+    Triangles,
+    box_span,
+    boxes_around,
+    boxes_met,
+    boxes_met_by,
+    cylinder_span,
+    sphere_span,
+)
+
+TOUCH_M: Final = 1e-9
+"""A way through something that is no longer than this is a touch; shapes of one thing this close are one."""
+PAIRS_KEPT: Final = 4096
+"""Pairs of ends of which it is remembered what of the scenery is between them, at least."""
+LINES_AT_ONCE: Final = 2_000
+"""Lines times things that are looked at in one pass: what is computed meanwhile stays in the processor's cache."""
+
+Line = tuple[Vector, Vector]
+"""Two ends in the world frame (m)."""
+Key = tuple[Line, frozenset[str]]
+"""A line from its lesser end, and the bodies that are ignored."""
+Piece = list[Span]
+"""Where a line is inside of something that counts as one, in order."""
+
+
+class Crossing(NamedTuple):
+    """A thing that a line crosses: its name (of the scenery, or the entity's), what it is made of, the way through it.
+
+    `chord_m` is how far the line is inside of it, 0 for a wall without a thickness of its own. `entry_m` and `exit_m`
+    are the distances from the lesser end at which it begins and ends.
+    """
+
+    name: str
+    material: RadioMaterial
+    chord_m: float
+    entry_m: float = 0.0
+    exit_m: float = 0.0
+
+
+class _Ray(NamedTuple):
+    """A line from its lesser end: start, unit direction, length."""
+
+    start: Vector
+    way: Vector
+    length: float
+
+
+def _ray(line: Line) -> _Ray:
+    """Return a line as a ray; one without a length has no direction."""
+    (ax, ay, az), (bx, by, bz) = line
+    x, y, z = bx - ax, by - ay, bz - az
+    length = sqrt(x * x + y * y + z * z)
+    way = (x / length, y / length, z / length) if length > 0.0 else ORIGIN
+    return _Ray(line[0], way, length)
+
+
+class _Solid:
+    """A shape as rays meet it, in the world or in its link; `group` is the number of its name and material."""
+
+    __slots__ = ("back", "group", "position", "shape", "triangles")
+
+    def __init__(
+        self, shape: Shape, group: int, triangles: Triangles | None, position: Vector, orientation: Quaternion
+    ) -> None:
+        self.shape, self.group, self.triangles, self.position = shape, group, triangles, position
+        x, y, z, w = orientation
+        self.back = None if orientation == UPRIGHT else (-x, -y, -z, w)
+
+    def placed(self, position: Vector, orientation: Quaternion) -> _Solid:
+        """Return it in the world, where its link has this pose."""
+        return _Solid(self.shape, self.group, self.triangles, *place(self.shape, position, orientation))
+
+    def pieces(self, ray: _Ray) -> Sequence[Piece]:
+        """Return where a ray is inside of it; of a mesh that is not closed, each wall that it passes is a piece."""
+        (x, y, z), way, length = ray
+        px, py, pz = self.position
+        start = (x - px, y - py, z - pz)
+        if self.back is not None:
+            start, way = rotate(self.back, start), rotate(self.back, way)
+        if self.triangles is not None:
+            return self._through_mesh(self.triangles, start, way, length)
+        geometry = self.shape.geometry
+        span: Span | None
+        if isinstance(geometry, Box):
+            span = box_span(start, way, geometry.half)
+        elif isinstance(geometry, Cylinder):
+            span = cylinder_span(start, way, geometry.radius, geometry.length / 2)
+        else:
+            assert isinstance(geometry, Sphere), geometry
+            span = sphere_span(start, way, geometry.radius)
+        inside = None if span is None else _within(span, length)
+        return () if inside is None else ([inside],)
+
+    @staticmethod
+    def _through_mesh(triangles: Triangles, start: Vector, way: Vector, length: float) -> list[Piece]:
+        hits = triangles.hits(start, way)
+        if not triangles.is_closed:
+            return [[(hit, hit)] for hit in hits if 0.0 < hit < length]
+        spans = (_within(span, length) for span in zip(hits[::2], hits[1::2], strict=False))
+        inside = [span for span in spans if span is not None]
+        return [inside] if inside else []
+
+
+def _within(span: Span, length: float) -> Span | None:
+    """Return the part of a span that lies between the two ends."""
+    enter, leave = span
+    enter = max(enter, 0.0)
+    leave = min(leave, length)
+    return (enter, leave) if leave - enter > TOUCH_M else None
+
+
+class _Groups:
+    """Names and materials of which shapes that overlap count as one."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, RadioMaterial], int] = {}
+        self._named: list[tuple[str, RadioMaterial]] = []
+        self._meshes: dict[bytes, Triangles] = {}
+
+    def solids(self, shapes: Iterable[Shape], body: str | None = None) -> list[_Solid]:
+        """Return shapes of a body, or of the scenery, as solids; what is transparent is none."""
+        return [
+            _Solid(shape, self._number(shape, body), self._prepared(shape), shape.position, shape.orientation)
+            for shape in shapes
+            if not shape.radio.is_transparent
+        ]
+
+    def _number(self, shape: Shape, body: str | None) -> int:
+        key = shape.name if body is None else body, shape.radio
+        number = self._known.setdefault(key, len(self._named))
+        if number == len(self._named):
+            self._named.append(key)
+        return number
+
+    def _prepared(self, shape: Shape) -> Triangles | None:
+        """Return the triangles of a mesh, those of equal ones once."""
+        mesh = shape.geometry
+        if isinstance(mesh, Box | Sphere | Cylinder):
+            return None
+        if mesh.digest not in self._meshes:
+            self._meshes[mesh.digest] = Triangles(mesh)
+        return self._meshes[mesh.digest]
+
+    def crossings(self, ray: _Ray, solids: Iterable[_Solid]) -> list[Crossing]:
+        """Return what a ray crosses of some solids, in no order that matters."""
+        if ray.length == 0.0:
+            return []
+        found: dict[int, Sequence[Piece]] = {}
+        for solid in solids:
+            pieces = solid.pieces(ray)
+            if pieces:
+                before = found.get(solid.group)
+                found[solid.group] = pieces if before is None else (*before, *pieces)
+        crossings = []
+        for group, pieces in found.items():
+            name, material = self._named[group]
+            for piece in _joined(pieces) if len(pieces) > 1 else pieces:
+                enter, leave = piece[0][0], piece[-1][1]
+                chord = leave - enter if len(piece) == 1 else _chord(piece)
+                crossings.append(Crossing(name, material, chord, enter, leave))
+        return crossings
+
+
+def _joined(pieces: Iterable[Piece]) -> list[Piece]:
+    """Return pieces that do not overlap: those that do, or touch, as one."""
+    joined: list[Piece] = []
+    end = 0.0
+    for piece in sorted(pieces):
+        if joined and piece[0][0] <= end + TOUCH_M:
+            joined[-1] = _united([*joined[-1], *piece])
+        else:
+            joined.append(piece)
+        end = joined[-1][-1][1]
+    return joined
+
+
+def _united(spans: Iterable[Span]) -> Piece:
+    """Return spans that cover the same and do not overlap."""
+    united: list[Span] = []
+    for enter, leave in sorted(spans):
+        if united and enter <= united[-1][1]:
+            united[-1] = (united[-1][0], max(united[-1][1], leave))
+        else:
+            united.append((enter, leave))
+    return united
+
+
+def _chord(piece: Piece) -> float:
+    chord = 0.0
+    for enter, leave in piece:
+        chord += leave - enter
+    return chord
+
+
+class Still:
+    """The scenery, and what of it lies between pairs of ends that were asked for lately."""
+
+    def __init__(self, shapes: Sequence[Shape]) -> None:
+        self.shapes = shapes
+        self.groups = _Groups()
+        self.solids = self.groups.solids(shapes)
+        boxes = [shape_box(solid.shape) for solid in self.solids]
+        self.boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes])
+        self._newer: dict[Line, tuple[Crossing, ...]] = {}
+        self._older: dict[Line, tuple[Crossing, ...]] = {}
+
+    def known(self, line: Line) -> tuple[Crossing, ...] | None:
+        """Return what a line crosses of the scenery, None if that is not remembered."""
+        found = self._newer.get(line)
+        if found is None:
+            found = self._older.get(line)
+            if found is not None:
+                self.keep(line, found)
+        return found
+
+    def keep(self, line: Line, crossings: tuple[Crossing, ...]) -> None:
+        """Remember; what nobody has asked for since as many others came is forgotten."""
+        if len(self._newer) >= PAIRS_KEPT:
+            self._older, self._newer = self._newer, {}
+        self._newer[line] = crossings
+
+
+class _Limb:
+    """A link as rays meet it: its solids, and the sphere around them in the link's frame."""
+
+    __slots__ = ("middle", "radius", "solids")
+
+    def __init__(self, body: str, link: Link, groups: _Groups) -> None:
+        self.solids = groups.solids(link.shapes, body)
+        low, high = enclosing([shape_box(solid.shape) for solid in self.solids] or [(ORIGIN, ORIGIN)])
+        x, y, z = high[0] - low[0], high[1] - low[1], high[2] - low[2]
+        self.middle = (low[0] + x / 2, low[1] + y / 2, low[2] + z / 2)
+        self.radius = sqrt(x * x + y * y + z * z) / 2
+
+
+class Geometry:
+    """A scene as rays meet it: scenery that stands, and the links of bodies, to be placed for each frame."""
+
+    def __init__(self, scene: Scene, still: Still | None = None) -> None:
+        """`still` is the same scenery, prepared before."""
+        self.scene = scene
+        self.still = Still(scene.scenery) if still is None else still
+        self.groups = _Groups()
+        self.limbs = {
+            body.name: [_Limb(body.name, link, self.groups) for link in body.links] for body in scene.bodies.values()
+        }
+
+    def sight(self, layout: Layout, numbers: Sequence[float]) -> Sight:
+        """Return what there is to see at a frame: `numbers` are its values, `layout` has the scene's bodies."""
+        return Sight(self, layout, numbers)
+
+
+@dataclass(slots=True)
+class _Placed:
+    """A link at its pose in one frame."""
+
+    body: str
+    limb: _Limb
+    position: Vector
+    orientation: Quaternion
+    solids: list[_Solid] | None = None
+
+    def in_world(self) -> list[_Solid]:
+        if self.solids is None:
+            self.solids = [solid.placed(self.position, self.orientation) for solid in self.limb.solids]
+        return self.solids
+
+
+class Sight:
+    """Lines of sight in one frame, each worked out once."""
+
+    def __init__(self, geometry: Geometry, layout: Layout, numbers: Sequence[float]) -> None:
+        self._geometry, self._layout, self._numbers = geometry, layout, numbers
+        self._found: dict[Key, tuple[Crossing, ...]] = {}
+        self._placed: list[_Placed] = []
+        self._is_placed = False
+        self._boxes = geometry.still.boxes
+
+    def between(self, a: Vector, b: Vector, ignoring: Collection[str] = ()) -> tuple[Crossing, ...]:
+        """Return what the line between two points (m, world frame) crosses, the bodies `ignoring` (entities) aside.
+
+        In the order of their distance from the lesser end, then of their names: the same for both directions. Shapes
+        of one body, or of scenery with one name, that overlap and are of the same material count as one. A closed mesh
+        counts as one however often the line enters it: its chords add up. Of a mesh that is not closed each wall that
+        the line passes counts. An end that is inside of something is where its chord begins or ends. What is
+        transparent is left out.
+        """
+        key = ((a, b) if a <= b else (b, a)), frozenset(ignoring)
+        found = self._found.get(key)
+        if found is None:
+            self._look((key,))
+            found = self._found[key]
+        return found
+
+    def between_many(self, pairs: Iterable[tuple[Vector, Vector, Collection[str]]]) -> list[tuple[Crossing, ...]]:
+        """Return `between` of many pairs with what each ignores, which is three times as fast as one by one."""
+        keys = [(((a, b) if a <= b else (b, a)), frozenset(ignoring)) for a, b, ignoring in pairs]
+        self._look([key for key in dict.fromkeys(keys) if key not in self._found])
+        return [self._found[key] for key in keys]
+
+    # --- looking -----------------------------------------------------------------------------------------------------
+
+    def _look(self, keys: Iterable[Key]) -> None:
+        """Work out what these lines cross; what of the scenery is remembered is not looked at again."""
+        self._place()
+        still, count = self._geometry.still, len(self._geometry.still.solids)
+        whole: list[Key] = []
+        bodies_alone: list[Key] = []
+        standing: list[tuple[Crossing, ...]] = []
+        for key in keys:
+            known = still.known(key[0])
+            if known is None:
+                whole.append(key)
+            else:
+                bodies_alone.append(key)
+                standing.append(known)
+        for key, near in zip(whole, _near(self._boxes, whole), strict=True):
+            line, ray = key[0], _ray(key[0])
+            solids = [still.solids[index] for index in near if index < count]
+            known = tuple(sorted(still.groups.crossings(ray, solids), key=_by_distance)) if solids else ()
+            still.keep(line, known)
+            self._found[key] = self._with_bodies(ray, known, [index - count for index in near[len(solids) :]], key[1])
+        boxes = self._boxes[:, :, count:]
+        for key, known, near in zip(bodies_alone, standing, _near(boxes, bodies_alone), strict=True):
+            self._found[key] = self._with_bodies(_ray(key[0]), known, near, key[1])
+
+    def _with_bodies(
+        self, ray: _Ray, standing: tuple[Crossing, ...], near: Sequence[int], ignoring: frozenset[str]
+    ) -> tuple[Crossing, ...]:
+        """Return what a ray crosses of the scenery, which is known, and of the links with these numbers."""
+        solids: list[_Solid] = []
+        for index in near:
+            placed = self._placed[index]
+            if placed.body not in ignoring:
+                solids += placed.in_world()
+        moving = self._geometry.groups.crossings(ray, solids) if solids else ()
+        return tuple(sorted((*standing, *moving), key=_by_distance)) if moving else standing
+
+    def _place(self) -> None:
+        """Place all links, once."""
+        if self._is_placed:
+            return
+        self._is_placed = True
+        geometry = self._geometry
+        lows: list[Vector] = []
+        highs: list[Vector] = []
+        for name, body in geometry.scene.bodies.items():
+            poses = forward_kinematics(body, self._layout[name], self._numbers)
+            for limb, (_, position, orientation) in zip(geometry.limbs[name], poses, strict=True):
+                if not limb.solids:
+                    continue
+                x, y, z = rotate(orientation, limb.middle)
+                x, y, z, reach = x + position[0], y + position[1], z + position[2], limb.radius
+                lows.append((x - reach, y - reach, z - reach))
+                highs.append((x + reach, y + reach, z + reach))
+                self._placed.append(_Placed(name, limb, position, orientation))
+        self._boxes = np.concatenate((geometry.still.boxes, boxes_around(lows, highs)), axis=2)
+
+
+def _by_distance(crossing: Crossing) -> tuple[float, str]:
+    return crossing.entry_m, crossing.name
+
+
+def _near(boxes: Floats, keys: Sequence[Key]) -> list[list[int]]:
+    """Return for each line the boxes (2, 3, m) that it comes near to, in their order."""
+    if len(keys) == 1:
+        return [boxes_met_by(boxes, keys[0][0])]
+    at_once = max(1, LINES_AT_ONCE // max(1, boxes.shape[2]))
+    near: list[list[int]] = [[] for _ in keys]
+    for begin in range(0, len(keys), at_once):
+        ends = np.array([line for line, _ in keys[begin : begin + at_once]]).transpose(1, 2, 0)
+        for line, thing in zip(*boxes_met(boxes, ends[0], ends[1]), strict=True):
+            near[begin + line].append(thing)
+    return near
+
+
+class LineOfSight:
+    """Lines of sight in the frames of a run. It remembers the scene of the newest layout, and the newest frame's."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._deployment = deployment
+        self._geometry = Geometry(Scene({}, ()))
+        self._layout = Layout({}, {})
+        self._frame: Frame | None = None
+        self._sight = self._geometry.sight(self._layout, ())
+
+    def at(self, frame: Frame) -> Sight:
+        """Return the sight in a frame; nothing is worked out before somebody asks it for a line."""
+        if frame is not self._frame:
+            if frame.layout.digest != self._layout.digest:
+                self._turn_to(frame.layout)
+            self._frame = frame
+            self._sight = self._geometry.sight(frame.layout, frame.numbers)
+        return self._sight
+
+    def _turn_to(self, layout: Layout) -> None:
+        scene = build_scene(self._deployment, layout)
+        still = self._geometry.still
+        self._geometry = Geometry(scene, still if tuple(still.shapes) == tuple(scene.scenery) else None)
+        self._layout = layout
