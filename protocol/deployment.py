@@ -233,8 +233,9 @@ class Deployment(Part):
 
     def carriers(self) -> dict[str, str]:
         """The robot on whose board each player and client is that is on one."""
-        boarded = {**self.players, **self.clients}
-        return {name: spec.on for name, spec in boarded.items() if spec.on is not None}
+        on_board = [(name, player.on) for name, player in self.players.items()]
+        on_board += [(name, client.on) for name, client in self.clients.items()]
+        return {name: robot for name, robot in on_board if robot is not None}
 
     def heard_by(self, name: str) -> list[tuple[str, str]]:
         """The (endpoint, channel) that a player subscribes to, sorted: its robots' and what `hears` selects."""

@@ -170,4 +170,4 @@ def _resolve(schema: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _has_parts(schema: Mapping[str, Any]) -> bool:
-    return not schema.keys().isdisjoint({"$ref", "discriminator", "enum"}) or schema.get("type") in ("array", "object")
+    return not schema.keys().isdisjoint({"$ref", "discriminator"}) or schema.get("type") in ("array", "object")

@@ -80,7 +80,6 @@ FREQUENCY: Final = Dimension("frequency", _sizes(Hz="1", kHz="1e3", MHz="1e6", G
 BITRATE: Final = Dimension(
     "bit rate", _sizes(**{"bit/s": "1", "kbit/s": "1e3", "Mbit/s": "1e6", "Gbit/s": "1e9"}), "int"
 )
-LEVEL: Final = Dimension("level", _sizes(dB="1"))
 POWER: Final = Dimension("power level", _sizes(dBm="1"))
 GAIN: Final = Dimension("antenna gain", _sizes(dBi="1"))
 

@@ -93,8 +93,8 @@ class Recovery:
         if self._freezes:
             frozen: list[Edit] = [Freeze(robot) for robot in sorted(away)]
             core.requests.order(core.frame.tick, [] if core.members else frozen)
-            thawed: list[Edit] = [Thaw(robot) for robot in sorted(owners) if owners[robot] == name]
-            core.requests.order(core.released, [edit for edit in thawed if edit.name not in away])
+            back = [robot for robot in sorted(owners) if owners[robot] == name and robot not in away]
+            core.requests.order(core.released, [Thaw(robot) for robot in back])
         self.open(owners, [*core.members, name], now_ns)
         self.returns = away
         core.actions.append(Journal(encode(core.control())))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from foosim.protocol.draws import draw_key
 from foosim.protocol.radios import Fading
 from foosim.vhub.packet import Flight
-from foosim.vhub.propagation import OUT_OF_RANGE, Path, Propagation, level_of, centi, zeptowatt
+from foosim.vhub.propagation import OUT_OF_RANGE, Path, Propagation, centi, level_of, zeptowatt
 from foosim.vhub.radio.fading import block_of, fading_db, nakagami_m
 
 

@@ -75,8 +75,7 @@ class Episodes:
 
 
 def episodes_of_burst(key: bytes, burst: Burst) -> Episodes:
-    """Return the times of a burst model in seconds: bad ones are so frequent that the mean loss is the configured one.
-    """
+    """Return the times of a burst model in seconds, bad ones as frequent as its mean loss wants."""
     assert burst.mean_bad_ns is not None
     share = burst.loss / burst.bad_loss
     dwell = None if burst.dwell is None else pareto_with_mean(burst.mean_bad_ns, burst.dwell)

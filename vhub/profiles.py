@@ -85,5 +85,5 @@ def over(base: Radio, changes: LinkRule | Impairments) -> Radio:
     """Return a radio's settings with those that a rule writes; a model of bursts replaces another one."""
     written = {key: getattr(changes, key) for key in changes.model_fields_set if key in Impairments.model_fields}
     if any(key in written for key in BURSTS):
-        written = {key: None for key in BURSTS} | written
+        written = dict.fromkeys(BURSTS) | written
     return base.model_copy(update=written)

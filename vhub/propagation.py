@@ -91,9 +91,7 @@ class Propagation:
         self._range_m, self._strict = path_loss.range_m, path_loss.strict_los
         x, y, z = settings.antenna.mount
         self._mount = x, y, z
-        self.noise_cdbm = centi(
-            THERMAL_NOISE_DBM_HZ + 10.0 * log10(settings.bandwidth_hz) + settings.noise_figure_db
-        )
+        self.noise_cdbm = centi(THERMAL_NOISE_DBM_HZ + 10.0 * log10(settings.bandwidth_hz) + settings.noise_figure_db)
         self.power_cdbm = centi(settings.tx_power_dbm + settings.antenna.gain_dbi)
         self.gain_cdb = centi(settings.antenna.gain_dbi)
         self.sense_cdbm = centi(settings.sense_dbm)

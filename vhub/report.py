@@ -59,7 +59,14 @@ def report(core: HubCore) -> bytes:
             "refused": refused,
             "refusals": state.refusals,
             "links": [
-                [source, destination, s.offered, s.delivered, s.dropped, s.delay_ns // s.delivered if s.delivered else 0]
+                [
+                    source,
+                    destination,
+                    s.offered,
+                    s.delivered,
+                    s.dropped,
+                    s.delay_ns // s.delivered if s.delivered else 0,
+                ]
                 for (source, destination, _), s in sorted(state.fabric.states.items(), key=lambda item: item[0])
             ],
             "clients": sorted(state.members),

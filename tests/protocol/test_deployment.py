@@ -18,6 +18,7 @@ from foosim.protocol.deployment import (
     deployment_schema_text,
 )
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.impairments import GammaJitter
 from foosim.protocol.names import LINE_NAMES, TEAMS
 from foosim.protocol.units import Pace
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree
@@ -73,7 +74,7 @@ def test_quantities_are_si_numbers_and_times_are_nanoseconds(table: Deployment) 
     assert (encoder.position_noise, encoder.angle_noise) == (0.0002, math.radians(0.5))
     rule = table.network.rule_for("player-red", "red.goal")
     assert rule is not None
-    assert rule.jitter is not None
+    assert isinstance(rule.jitter, GammaJitter)
     assert (rule.delay_ns, rule.jitter.mean_ns, rule.jitter.sd_ns) == (1_000_000, 300_000, 300_000)
     assert (rule.loss, rule.order) == (0.005, "fifo")
     assert (table.capture.frames_every, table.capture.poses_hz, table.capture.flush_ns) == (
@@ -100,7 +101,7 @@ def test_what_is_left_out_has_its_default(table: Deployment) -> None:
 def test_a_jitters_mean_is_its_spread_unless_said_otherwise() -> None:
     text = apply_sets(TABLE_TEXT, "f", ["network.links.everything.jitter={shape: gamma, sd: 0.2 ms}"])
     jitter = load_deployment(text, "f").network.links[0].jitter
-    assert jitter is not None
+    assert isinstance(jitter, GammaJitter)
     assert (jitter.mean_ns, jitter.sd_ns) == (200_000, 200_000)
 
 

@@ -60,7 +60,7 @@ def test_a_setting_takes_what_a_file_takes() -> None:
         ("5 dB", f"radio: not one of {NAMES}, none, and no mapping with is or loss, '5 dB'"),
         ("{is: glas}", f"radio.is: not one of {NAMES}, 'glas', nearest is 'glass'"),
         ("{is: glass, thick: 6 mm}", "radio: unknown key, 'thick', nearest is 'thickness'"),
-        ("{is: glass, thickness: 6}", "radio.thickness: not a length (a number and one of m, cm, mm, um), 6"),
+        ("{is: glass, thickness: 6}", "radio.thickness: not a length (a number and one of m, cm, mm, um, km), 6"),
         ("{loss: 5}", "radio.loss: not a level (a number and one of dB), 5"),
         ("{loss: -1 dB}", "radio.loss: out of range 0 dB to 200 dB, '-1 dB'"),
         ("{thickness: 6 mm}", "radio: missing key of a material, unless it has a loss, 'is'"),

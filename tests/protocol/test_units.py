@@ -61,7 +61,11 @@ def test_a_time_is_a_whole_number_of_nanoseconds(text: str, time_ns: int) -> Non
     [
         (17.5, units.LENGTH, "not a length (a number and one of m, cm, mm, um, km), 17.5"),
         ("17.5", units.LENGTH, "not a length (a number and one of m, cm, mm, um, km), '17.5'"),
-        ("17.5 ms", units.LENGTH, "not a length (a number and one of m, cm, mm, um, km), '17.5 ms', nearest is '17.5 mm'"),
+        (
+            "17.5 ms",
+            units.LENGTH,
+            "not a length (a number and one of m, cm, mm, um, km), '17.5 ms', nearest is '17.5 mm'",
+        ),
         ("1 furlong", units.LENGTH, "not a length (a number and one of m, cm, mm, um, km), '1 furlong'"),
         ("1 hz", units.RATE, "not a rate (a number and one of Hz, kHz, mHz), '1 hz', nearest is '1 Hz'"),
         ("2 m/s^2", units.ACCELERATION,

@@ -1,7 +1,7 @@
 """The channel: whether a signal that was sent is strong enough at its receiver, and clear of the others'.
 
-At sending it says what the medium has found out for a unicast, and judges the rest by the draw for errors; at arrival it
-judges again what others spoiled that began later: broadcasts, and whatever is not sent again.
+At sending it says what the medium has found out for a unicast, and judges the rest by the draw for errors; at arrival
+it judges again what others spoiled that began later: broadcasts, and whatever is not sent again.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from foosim.vhub.propagation import OUT_OF_RANGE
 from foosim.vhub.radio.errors import LORA_SENSITIVITY_DBM
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.medium import COLLISION, SNR, error_threshold
-
 
 
 class Channel:
@@ -64,4 +63,3 @@ class Channel:
             flight.error_threshold = UNIT
             return OUT_OF_RANGE
         return COLLISION if flight.is_spoiled else ""
-

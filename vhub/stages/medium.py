@@ -28,7 +28,7 @@ from foosim.vhub.radio.airtime import (
     wifi_ack_ns,
     wifi_airtime_ns,
 )
-from foosim.vhub.radio.contention import Access, csma_access, wifi_access
+from foosim.vhub.radio.contention import Access, Outcome, csma_access, wifi_access
 from foosim.vhub.radio.timings import (
     CATEGORIES,
     DOT11P,
@@ -78,7 +78,7 @@ class Wire:
 
     def _opportunity_ns(self, ready_ns: int, size: int) -> int:
         """Return when the last byte leaves; what an opportunity has left is the next packet's."""
-        sender, trace = self._sender, self._trace
+        sender, _trace = self._sender, self._trace
         left = sender.opportunity_bytes
         at_ns = max(ready_ns, self._time_ns(sender.opportunity - 1) if left else 0)
         if left and self._time_ns(sender.opportunity - 1) < ready_ns:
@@ -321,7 +321,7 @@ class Lte(OnAir):
         airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, flight.rate_bps)
         retries, is_lost = errors.lte_harq(flight.words[Slot.BACKOFF])
         delay_ns = airtime_ns + retries * errors.HARQ_ROUND_NS
-        outcome = "error" if is_lost or lost is not None else "ok"
+        outcome: Outcome = "error" if is_lost or lost is not None else "ok"
         return Access(delay_ns, airtime_ns, retries, airtime_ns, outcome), airtime_ns
 
 
@@ -334,5 +334,3 @@ def make_medium(setup: LinkSetup) -> Wire | OnAir | None:
     if setup.is_radio:
         return _MEDIA[settings.medium](setup)
     return Wire(setup) if settings.rate_bps is not None or setup.opportunities_ms else None
-
-

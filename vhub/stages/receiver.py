@@ -13,8 +13,7 @@ RECEIVER_FULL: Final = "rx_full"
 
 
 class Receiver:
-    """Is told of a robot's flag `down` in the newest frame before arrival, of clients that have left, of full messages.
-    """
+    """Is told of a robot's flag `down` in the newest frame, of clients that have left, of full messages."""
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Receiver:

@@ -54,7 +54,7 @@ class InTime(Residual):
         self._episodes = episodes
 
     def is_bad(self, flight: Flight) -> bool:
-        return any([episodes.is_bad(flight.sent_ns) for episodes in self._episodes])
+        return any(episodes.is_bad(flight.sent_ns) for episodes in self._episodes)
 
 
 class ByPacket(Residual):
