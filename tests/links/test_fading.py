@@ -137,5 +137,6 @@ def test_m_by_distance() -> None:
 
 def test_tables_are_the_same_in_every_version() -> None:
     """A capture's fates follow from them."""
+    assert fading_db(KEY, 0, "rayleigh") == pytest.approx(2.2070694196331173, abs=1e-12)
     assert gain_quantiles("rician", 8.0)[2048] == 932508478
     assert gain_quantiles("nakagami", 1.5)[::1024] == (78094, 404177634, 788657961, 1369448312, 10254237490)

@@ -194,4 +194,7 @@ def test_lte_repeats() -> None:
     for repeats, share in ((0, 0.9), (1, 0.09), (2, 0.009)):
         count = sum(again == repeats for again, _ in outcomes)
         assert abs(binomial_z(count, len(words), share)) < Z_ALPHA
+    for failures, one_in in ((1, 10), (2, 100), (3, 1_000)):
+        assert lte_harq(UNIT // one_in) == (failures - 1, False)
+        assert lte_harq(UNIT // one_in - 1) == (failures, False)
     assert lte_harq(0) == (3, True) and lte_harq(UNIT - 1) == (0, False)

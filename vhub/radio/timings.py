@@ -31,6 +31,10 @@ class WifiTiming:
     cw_max: int = 1023
     retries: int = 7
 
+    def __hash__(self) -> int:
+        """Of two fields: tables are keyed by it for every frame."""
+        return self.slot_ns + self.aifsn
+
     @property
     def difs_ns(self) -> int:
         """The silence before backoff: SIFS and `aifsn` slots."""
@@ -108,6 +112,10 @@ class LrwpanTiming:
     backoffs: int = 4
     """Busy channels after the first that are put up with before access fails."""
     retries: int = 3
+
+    def __hash__(self) -> int:
+        """Of one field: tables are keyed by it for every frame."""
+        return self.byte_ns
 
 
 LRWPAN: Final = LrwpanTiming()
