@@ -18,21 +18,22 @@ from pathlib import Path
 from foosim.protocol import limits
 from foosim.protocol.deployment_file import apply_sets, check_open_meshes, load_deployment
 from foosim.protocol.mesh import AssetError, digest_of
-from foosim.protocol.scenery import SceneryMesh, mesh_files, path_problem
+from foosim.protocol.scenery import SceneryMesh, path_problem
+from foosim.protocol.traces import file_settings
 
 _COMPONENT = os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC
 _FILE = _COMPONENT | os.O_NONBLOCK  # a pipe that nobody writes to would be waited for
 
 
 def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes]]:
-    """The text with the digest of each file that its scenery names, and the contents of these by path.
+    """The text with the digest of each file that it names, and the contents of these by path.
 
     `folder` is the one that the deployment's file is in. Raises DeploymentError, also for a wall without a thickness,
     and AssetError for a file that is not acceptable: the contents are read once, and what the digests name is what was
     checked.
     """
     deployment = load_deployment(text, name)
-    wanted = mesh_files(deployment.scenery)
+    wanted = deployment.files()
     if not wanted:
         return text, {}
     files = read_files(folder, deployment.assets, wanted)
@@ -41,6 +42,9 @@ def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes
         f'scenery.{thing}.digest="{digest_of(files[spec.file])}"'
         for thing, spec in deployment.scenery.items()
         if isinstance(spec, SceneryMesh)
+    ]
+    sets += [
+        f'{place}.digest="{digest_of(files[setting.file])}"' for place, setting in file_settings(deployment.network)
     ]
     return apply_sets(text, name, sets), files
 

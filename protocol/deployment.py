@@ -26,11 +26,13 @@ from foosim.protocol.scenery import (
     AssetFolder,
     Contents,
     Scenery,
+    mesh_files,
     open_meshes,
     read_contents,
     scenery_shape,
 )
 from foosim.protocol.table import Part, Table
+from foosim.protocol.traces import check_files, network_files
 from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks
 
 __all__ = [
@@ -206,8 +208,13 @@ class Deployment(Part):
     def with_assets(self, files: Mapping[str, bytes]) -> "Deployment":
         """The same with the contents of the files that its scenery names; raises AssetError."""
         deployment = self.model_copy()
-        deployment._contents = read_contents(self.scenery, files)
+        deployment._contents = read_contents(self.scenery, files, network_files(self.network))
+        check_files(self.network, files)
         return deployment
+
+    def files(self) -> dict[str, str | None]:
+        """The files that it names, by path, each with the digest that is written beside it."""
+        return mesh_files(self.scenery) | network_files(self.network)
 
     @property
     def asset_files(self) -> Mapping[str, bytes]:

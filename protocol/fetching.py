@@ -3,7 +3,7 @@
 The deployment's text names each file by its digest. Who lacks one asks for it piece by piece, each as soon as the one
 before has come, and again after a while; so there is one piece on its way at a time, whatever the link, and nobody has
 to remember how far anybody is. What has come is taken if its digest is the one in the text.
-Neighbours: `member` asks, `supervisor.handshake` answers, `scenery` says which files there are.
+Neighbours: `member` asks, `supervisor.handshake` answers, `deployment` says which files there are.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.mesh import digest_of
-from foosim.protocol.scenery import mesh_files
 
 
 class Fetching:
@@ -24,7 +23,7 @@ class Fetching:
     def __init__(self, deployment: Deployment, files: Mapping[str, bytes]) -> None:
         """`files` are those, by digest, that an earlier build brought. Raises Malformed for one without a digest."""
         self._digests: dict[str, str] = {}
-        for path, digest in mesh_files(deployment.scenery).items():
+        for path, digest in deployment.files().items():
             if digest is None:
                 raise Malformed(f"a build whose file {path} has no digest")
             self._digests[path] = digest

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field
 
 from foosim.protocol import units
+from foosim.protocol.scenery import AssetPath, Digest
 from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity
 
@@ -19,7 +20,6 @@ Probability = Annotated[float, Quantity(units.PROBABILITY, "0 %", "100 %")]
 Share = Annotated[float, Quantity(units.PROBABILITY, "0.000001 %", "99 %")]
 Bitrate = Annotated[int, Quantity(units.BITRATE, "1 bit/s", "1000 Gbit/s")]
 Bytes = Annotated[int, Quantity(units.SIZE, "0 B", "1 GiB")]
-FileName = Annotated[str, Field(min_length=1, max_length=200)]
 ErrorRate = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
 
 
@@ -94,9 +94,10 @@ class TableJitter(Part):
     """Quantiles from a file in netem's form: whitespace separated integers, 8192 a standard deviation; below 0 is 0."""
 
     shape: Literal["table"]
-    file: FileName
+    file: AssetPath
     mean_ns: Spread = Field(alias="mean")
     sd_ns: Spread = Field(alias="sd")
+    digest: Digest | None = None
 
 
 Jitter = Annotated[
@@ -193,8 +194,9 @@ class Reorder(Part):
 class Trace(Part):
     """The link's capacity from a file in mahimahi's form: each line a time in ms at which 1500 bytes can leave."""
 
-    file: FileName
+    file: AssetPath
     loop: bool = True
+    digest: Digest | None = None
 
 
 class Impairments(Part):

@@ -13,9 +13,12 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.impairments import BURSTS
 from foosim.protocol.names import nearest_name
 from foosim.protocol.network import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_MAX, REST
+from foosim.protocol.presets import PRESETS, preset_settings
 from foosim.protocol.references import Finding, Location, View, quoted
 
 JITTER_RATIO_MAX: Final = 100
+BODILESS: Final = "camera"
+"""The model of robots that have no body."""
 _LASTING: Final = ("partition", "clog", "chaos")
 
 
@@ -27,6 +30,7 @@ def check_network(data: object) -> Iterator[Finding]:
         return
     yield from _radios(view)
     yield from _carriers(view, endpoints)
+    yield from _placeless(view, endpoints)
     yield from _links(view, endpoints)
     yield from _events(view, endpoints)
 
@@ -63,6 +67,35 @@ def _carriers(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
         if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
             nearest = quoted(nearest_name(glob, endpoints))
             yield Finding(("network", "places", glob), "a selector that matches no endpoint", glob, nearest, at="key")
+
+
+def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
+    """Who carries a radio is somewhere: it has a body, is on board of one, or has a place."""
+    carried = [glob for glob in view.mapping("network", "robots") if names.is_selector(glob)]
+    places = view.mapping("network", "places")
+    for endpoint in endpoints:
+        glob = next((glob for glob in carried if fnmatchcase(endpoint, glob)), None)
+        on_air = [radio for _, radio in view.texts("network", "robots", glob or "") if _is_on_air(view, radio)]
+        if not on_air or any(fnmatchcase(endpoint, place) for place in places):
+            continue
+        section = next(one for one in ("players", "clients", "robots") if endpoint in view.mapping(one))
+        robot = endpoint if section == "robots" else view.get(section, endpoint, "on")
+        if isinstance(robot, str) and view.get("robots", robot, "model") != BODILESS:
+            continue
+        what = f"carries the radio {on_air[0]}, but is nowhere: write network.places.{endpoint}"
+        yield Finding(
+            ("network", "robots", glob or ""),
+            what + (" or its `on`" if section != "robots" else ""),
+            endpoint,
+            at="key",
+        )
+
+
+def _is_on_air(view: View, radio: str) -> bool:
+    written = view.mapping("network", "radios", radio)
+    preset = written.get("preset", "perfect")
+    inherited = preset_settings(preset).get("medium") if preset in PRESETS else None
+    return written.get("medium", inherited) not in (None, "none", "wired")
 
 
 def _links(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:

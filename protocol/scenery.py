@@ -9,7 +9,7 @@ is in them), `table_scene` (adds the shapes to the scene).
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final, Literal
 
@@ -74,6 +74,7 @@ def _digest(text: str) -> str:
 
 
 AssetFolder = Annotated[str, AfterValidator(_folder)]
+AssetPath = Annotated[str, AfterValidator(_asset_path)]
 MeshPath = Annotated[str, AfterValidator(_mesh_path)]
 Digest = Annotated[str, AfterValidator(_digest)]
 Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
@@ -163,8 +164,13 @@ class Contents:
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
 
 
-def read_contents(scenery: Mapping[str, SceneryThing], files: Mapping[str, bytes]) -> Contents:
-    """Read the files of all meshes; raises AssetError for one that is missing, not the one meant or not acceptable."""
+def read_contents(
+    scenery: Mapping[str, SceneryThing], files: Mapping[str, bytes], others: Iterable[str] = ()
+) -> Contents:
+    """Read the files of all meshes, and keep `others`.
+
+    Raises AssetError for one that is missing, not the one meant or not acceptable.
+    """
     meshes: dict[str, Mesh] = {}
     known: dict[tuple[str, float], Mesh] = {}
     triangles = 0
@@ -183,7 +189,7 @@ def read_contents(scenery: Mapping[str, SceneryThing], files: Mapping[str, bytes
         if triangles > limits.SCENERY_TRIANGLES_MAX:
             what = f"{triangles} triangles in the meshes up to scenery.{name}"
             raise AssetError(f"{thing.file}: {what}, at most {limits.SCENERY_TRIANGLES_MAX} are allowed")
-    used = {path: files[path] for path in mesh_files(scenery)}
+    used = {path: files[path] for path in (*mesh_files(scenery), *others) if path in files}
     return Contents(used, {digest_of(content): content for content in used.values()}, meshes)
 
 

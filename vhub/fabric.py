@@ -15,17 +15,17 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.impairments import Impairments, TableJitter
 from foosim.protocol.network import Network, event_of
 from foosim.protocol.radios import Radio
+from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
 from foosim.vhub.events import Timeline
-from foosim.vhub.jitter import quantiles_ns, read_table
+from foosim.vhub.jitter import quantiles_ns
 from foosim.vhub.links import Link
 from foosim.vhub.memory import AirState, LinkState, RadioState
 from foosim.vhub.packet import Flight
 from foosim.vhub.profiles import NO_RADIO, Profile, Profiles
 from foosim.vhub.propagation import Propagation
 from foosim.vhub.setup import LinkSetup
-from foosim.vhub.traces import read_opportunities
 from foosim.vhub.world import World
 
 LinkKey = tuple[str, str, str]

@@ -160,15 +160,6 @@ TABLE_SCALE: Final = 8192
 """netem writes a standard deviation as this number."""
 
 
-def read_table(text: str) -> tuple[int, ...]:
-    """Return the numbers of a file in netem's form, sorted; raises ValueError when it is none."""
-    lines = (line.partition("#")[0] for line in text.splitlines())
-    numbers = sorted(int(word) for line in lines for word in line.split())
-    if len(numbers) < 2:
-        raise ValueError("fewer than two numbers")
-    return tuple(numbers)
-
-
 def _from_table(jitter: TableJitter, table: tuple[int, ...]) -> tuple[int, ...]:
     """Return mean + sd x entry / 8192 at each quantile, at least 0; between entries it is linear."""
     assert table, "the jitter's file was given"
