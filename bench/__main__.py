@@ -24,6 +24,7 @@ from bench import (
     realtime,
     swarm,
     table_one_process,
+    verdict,
     vhub_loss,
 )
 from bench.runs import BenchError
@@ -83,6 +84,7 @@ BENCHES: Final = (
         with_default(packets.packets),
         packets.lines,
     ),
+    Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),
     Bench("rays", "lines of sight through a hall of shelves and vehicles", with_default(rays.rays), rays.lines),
     Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
     Bench("swarm", "rehearsals under random faults, by seed", swarm.swarm, swarm.lines),
