@@ -392,16 +392,19 @@ def test_a_body_is_crossed_as_scenery_in_its_place_is() -> None:
     """However it is turned: nothing of it is overlooked."""
     rng = random.Random(25)
     geometry, layout, numbers = rovers((0.0, 0.0, 0.0))
-    links, found = geometry.scene.bodies["rover0"].links, 0
+    (rover,), found = geometry.scene.bodies.values(), 0
+    boom = Shape(Box((1.0, 0.05, 0.05)), "walls", GREY, radio=METAL)
+    link = replace(rover.links[0], shapes=(*rover.links[0].shapes, boom))
+    geometry = Geometry(Scene({"rover0": replace(rover, links=(link,))}, ()))
     for _ in range(40):
         position, orientation = at_random(rng, 0.2), turned(rng)
         place_ball(numbers, layout["rover0"], position)
         start = layout["rover0"].offsets["orientation"]
         numbers[start : start + 4] = orientation
-        placed = (replace(shape, name="rover0") for shape in links[0].shapes)
+        placed = (replace(shape, name="rover0") for shape in link.shapes)
         there = [(one, *place(one, position, orientation)) for one in placed]
         still = sight_of(*(replace(one, position=at, orientation=turn) for one, at, turn in there))
-        sight = Geometry(Scene(geometry.scene.bodies, ())).sight(layout, numbers)
+        sight = geometry.sight(layout, numbers)
         for a, b in (line_through(rng, 2.0, 0.5) for _ in range(40)):
             assert sight.between(a, b) == still.between(a, b)
             found += len(sight.between(a, b))
