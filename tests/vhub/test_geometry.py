@@ -405,7 +405,9 @@ def test_a_body_is_crossed_as_scenery_in_its_place_is() -> None:
         there = [(one, *place(one, position, orientation)) for one in placed]
         still = sight_of(*(replace(one, position=at, orientation=turn) for one, at, turn in there))
         sight = geometry.sight(layout, numbers)
-        for a, b in (line_through(rng, 2.0, 0.5) for _ in range(40)):
+        tip = moved((position, position), rotate(orientation, (0.99, 0.0, 0.0)))[0]
+        lines = [line_through(rng, 2.0, 0.5) for _ in range(40)]
+        for a, b in [*lines, *(moved(line_through(rng, 2.0, 0.0), tip) for _ in range(10))]:
             assert sight.between(a, b) == still.between(a, b)
             found += len(sight.between(a, b))
     assert found > 300
