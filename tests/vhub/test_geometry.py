@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, dist, pi, sin, sqrt
 from pathlib import Path
 from typing import Any, Final
@@ -28,6 +28,7 @@ from foosim.protocol.scene import (
     Shape,
     Sphere,
     Vector,
+    place,
     rotate,
 )
 from foosim.protocol.start import initial_numbers, place_ball
@@ -232,10 +233,10 @@ def test_round_things_begin_and_end_on_their_surface() -> None:
             for way in (crossing.entry_m, crossing.exit_m):
                 share = way / dist(a, b)
                 x, y, z, w = shape.orientation
-                place = tuple(
+                spot = tuple(
                     one + share * (other - one) - at for one, other, at in zip(a, b, shape.position, strict=True)
                 )
-                x, y, z = rotate((-x, -y, -z, w), place)  # type: ignore[arg-type]
+                x, y, z = rotate((-x, -y, -z, w), spot)  # type: ignore[arg-type]
                 if isinstance(shape.geometry, Sphere):
                     off = sqrt(x * x + y * y + z * z) - shape.geometry.radius
                 else:
@@ -368,8 +369,8 @@ def rovers(*places: Vector) -> tuple[Geometry, Layout, list[float]]:
     bodies = {name: Body(name, "ball", (0.0, 0.0, 0.0), links[name]) for name in names}
     layout = Layout(dict.fromkeys(names, "ball"), {})
     numbers = [0.0] * layout.size
-    for name, place in zip(names, places, strict=True):
-        place_ball(numbers, layout[name], place)
+    for name, spot in zip(names, places, strict=True):
+        place_ball(numbers, layout[name], spot)
     return Geometry(Scene(bodies, (thing(WALL),))), layout, numbers
 
 
@@ -385,6 +386,31 @@ def test_a_rover_between_two_others_shadows_them_and_their_own_bodies_do_not() -
     place_ball(numbers, layout["rover2"], (2.0, 0.5, 0.1))
     later = geometry.sight(layout, numbers)
     assert [c.name for c in later.between(a, b, ("rover1", "rover0"))] == ["thing"]
+
+
+def test_a_body_is_crossed_as_scenery_in_its_place_is() -> None:
+    """However it is turned: nothing of it is overlooked."""
+    rng = random.Random(25)
+    geometry, layout, numbers = rovers((0.0, 0.0, 0.0))
+    (rover,), found = geometry.scene.bodies.values(), 0
+    boom = Shape(Box((1.0, 0.05, 0.05)), "walls", GREY, radio=METAL)
+    link = replace(rover.links[0], shapes=(*rover.links[0].shapes, boom))
+    geometry = Geometry(Scene({"rover0": replace(rover, links=(link,))}, ()))
+    for _ in range(40):
+        position, orientation = at_random(rng, 0.2), turned(rng)
+        place_ball(numbers, layout["rover0"], position)
+        start = layout["rover0"].offsets["orientation"]
+        numbers[start : start + 4] = orientation
+        placed = (replace(shape, name="rover0") for shape in link.shapes)
+        there = [(one, *place(one, position, orientation)) for one in placed]
+        still = sight_of(*(replace(one, position=at, orientation=turn) for one, at, turn in there))
+        sight = geometry.sight(layout, numbers)
+        tip = moved((position, position), rotate(orientation, (0.99, 0.0, 0.0)))[0]
+        lines = [line_through(rng, 2.0, 0.5) for _ in range(40)]
+        for a, b in [*lines, *(moved(line_through(rng, 2.0, 0.0), tip) for _ in range(10))]:
+            assert sight.between(a, b) == still.between(a, b)
+            found += len(sight.between(a, b))
+    assert found > 300
 
 
 def test_both_directions_have_the_same_crossings_to_the_last_bit() -> None:
@@ -405,6 +431,9 @@ def test_neither_company_nor_order_nor_memory_changes_anything(monkeypatch: pyte
     def fresh() -> Sight:
         return Geometry(geometry.scene).sight(layout, numbers)
 
+    for way in (at_random(rng, 2.0) for _ in range(10)):  # along an axis, whichever
+        pairs += [(*moved((LEFT, RIGHT), way), []), (*moved(((0.0, -5.0, 0.0), (0.0, 5.0, 0.0)), way), [])]
+        pairs += [(*moved(((0.0, 0.0, -5.0), (0.0, 0.0, 5.0)), way), [])]
     alone = [repr(fresh().between(*pair)) for pair in pairs]
     assert len(set(alone)) > 50
     assert [repr(found) for found in fresh().between_many(pairs)] == alone
