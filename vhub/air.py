@@ -50,13 +50,15 @@ class Air:
 
         It waits for all that it hears; who has something queued or on air when it is ready contends.
         """
-        place, sense_cdbm = of.antenna(source), of.sense_cdbm
+        place = of.antenna(source)
         start_ns = ready_ns
         heard: set[str] = set()
         for known in self.state.on_air:
             if known.source == source or known.until_ns <= ready_ns:
                 continue
-            if known.source not in heard and _power_cdbm(known, source, place, of) < sense_cdbm:
+            if known.source not in heard and not of.hears(
+                known.position, place, known.source, source, known.power_cdbm
+            ):
                 continue
             heard.add(known.source)
             start_ns = max(start_ns, known.until_ns)

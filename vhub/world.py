@@ -28,6 +28,7 @@ class World:
         self._layout: Layout | None = None
         self._bodies: dict[str, Body] = {}
         self._poses: dict[str, Pose | None] = {}
+        self._standing: dict[str, Vector] = {}
         self._antennas: dict[tuple[str, Vector], Vector] = {}
         self.turns = 0
         """Grows with every frame."""
@@ -79,10 +80,12 @@ class World:
 
     def _place(self, endpoint: str) -> Vector:
         """Return where the deployment says that an endpoint without a body is."""
-        for glob, (x, y, z) in self._places.items():
-            if fnmatchcase(endpoint, glob):
-                return x, y, z
-        return ORIGIN
+        found = self._standing.get(endpoint)
+        if found is None:
+            places = (place for glob, place in self._places.items() if fnmatchcase(endpoint, glob))
+            x, y, z = next(places, ORIGIN)
+            found = self._standing[endpoint] = x, y, z
+        return found
 
     def crossings(self, a: Vector, b: Vector, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
         """Return what the line between two places crosses, some bodies aside."""
