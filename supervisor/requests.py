@@ -169,8 +169,9 @@ class Requests:
         return [edit for tick in sorted(self._edits) for edit in self._edits[tick]]
 
     def resume(self, edits: dict[int, list[Edit]], answers: dict[tuple[str, str], Answer], issued: Issued) -> None:
-        """Take what a journal says of requests."""
-        self._edits, self._answers, self.issued = edits, answers, issued
+        """Take what a journal says of requests; of answers the last ones, as many as are kept."""
+        self._edits, self.issued = edits, issued
+        self._answers = dict(list(answers.items())[-ANSWERS_KEPT:])
 
     def set_back(self, tick: int) -> None:
         """The last commit is that of another tick now: what was issued from there on is to come (again)."""
