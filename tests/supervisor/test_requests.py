@@ -21,7 +21,9 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.system import OPERATOR, Settings, System
+from foosim.supervisor.issued import Issued
 from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.requests import ANSWERS_KEPT
 from foosim.vhub.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -495,3 +497,11 @@ def test_no_more_wait_for_engines_than_a_limit() -> None:
     texts = [answer.text for answer in run.answers]
     assert texts.count("the run has ended") == 256
     assert texts[256:] == ["256 additions and removals wait for engines already"] * 2
+
+
+def test_after_a_take_over_no_more_answers_are_kept_than_before() -> None:
+    requests = Run().system.supervisor.requests
+    answers = {("one", f"r{n}"): Answer("one", f"r{n}", True, n, "", b"") for n in range(ANSWERS_KEPT + 50)}
+    requests.resume({}, answers, Issued())
+    kept = requests.journalled()[1]
+    assert kept == list(answers.values())[-ANSWERS_KEPT:]
