@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
 from foosim.protocol.radios import Radio
+from foosim.vhub.events import FOREVER_NS
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.profiles import Profile, over
@@ -31,7 +32,7 @@ class Link:
         via = (profile.radio,) if profile.radio else ()
         self._key = draw_key(fabric.seed, "link", source, destination, *via)
         self._version = -1
-        self._until_ns = -1
+        self._from_ns = self._until_ns = -1
         self._stages: list[Stage] = []
         self._draws = False
         self._slots = 0
@@ -40,19 +41,24 @@ class Link:
     def rule(self) -> str:
         return self.profile.rule
 
-    def settings_at(self, time_ns: int) -> tuple[Radio, int]:
-        """Return the link's settings at a time, and until when they hold."""
-        settings, until_ns = self.profile.settings, 2**62
+    def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
+        """Return the link's settings at a time, from when on, and until when they hold."""
+        settings, from_ns, until_ns = self.profile.settings, 0, FOREVER_NS
         for change in self._fabric.timeline.changes_of(self.rule, self.source, self.destination):
             if change.start_ns <= time_ns < change.end_ns:
                 settings = over(settings, change.changes)
-                until_ns = min(until_ns, change.end_ns)
-            elif change.start_ns > time_ns:
-                until_ns = min(until_ns, change.start_ns)
-        return settings, until_ns
+            for edge_ns in (change.start_ns, change.end_ns):
+                if edge_ns <= time_ns:
+                    from_ns = max(from_ns, edge_ns)
+                else:
+                    until_ns = min(until_ns, edge_ns)
+        return settings, from_ns, until_ns
 
-    def _renew(self, time_ns: int) -> None:
-        settings, self._until_ns = self.settings_at(time_ns)
+    def _turn_to(self, time_ns: int) -> None:
+        """Have the stages of a time: who judges then depends on nothing that happened on the link before."""
+        if self._version == self._fabric.timeline.version and self._from_ns <= time_ns < self._until_ns:
+            return
+        settings, self._from_ns, self._until_ns = self.settings_at(time_ns)
         self._version = self._fabric.timeline.version
         setup = self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
@@ -62,8 +68,7 @@ class Link:
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
         state = self.state
-        if flight.sent_ns >= self._until_ns or self._version != self._fabric.timeline.version:
-            self._renew(flight.sent_ns)
+        self._turn_to(flight.sent_ns)
         is_offered = flight.copy == 0
         state.offered += is_offered
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
@@ -80,12 +85,11 @@ class Link:
         return True
 
     def arrive(self, flight: Flight, hindered: str) -> bool:
-        """Judge a packet at arrival: True when it is delivered, False when it is dropped.
+        """Judge a packet at arrival by the settings of when it is due: True when it is delivered, False when dropped.
 
         `hindered` is why its receiver does not take it; empty when it does.
         """
-        if self._version != self._fabric.timeline.version:
-            self._renew(flight.sent_ns)
+        self._turn_to(flight.due_ns)
         state, is_offered = self.state, flight.copy == 0
         for stage in self._stages:
             cause = stage.at_arrival(flight, hindered)

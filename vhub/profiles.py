@@ -60,12 +60,13 @@ class Profiles:
         network = self._network
         rule = network.rule_for(source, destination, channel)
         via = None if rule is None else rule.via
-        if via is None and (rule is not None or self.body(source) != self.body(destination)):
+        is_on_board = self.body(source) == self.body(destination)
+        if via is None and not is_on_board:
             common = self._common(source, destination)
             if common == "" and rule is None:
                 return Profile(NO_RADIO, "", _preset(PERFECT))
             via = common or None
-        if via is None and rule is None and self.body(source) == self.body(destination):
+        if via is None and rule is None and is_on_board:
             return Profile(ON_BOARD, "", _preset(PERFECT))
         base = _preset(network.defaults.preset) if via is None else network.radios[via]
         if rule is None:

@@ -18,12 +18,6 @@ QUEUE_FULL: Final = "queue_full"
 CODEL: Final = "queue_codel"
 
 
-def is_shared(flight: Flight, sender: RadioState) -> bool:
-    """Whether a broadcast's packet has been sent for another of its receivers."""
-    last = sender.last
-    return last is not None and (last.sequence, last.copy) == (flight.sequence, flight.copy)
-
-
 class Queue:
     """Decides whether a packet may wait, and how long."""
 
@@ -44,11 +38,11 @@ class Queue:
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
-        if self._broadcasts and flight.published and is_shared(flight, sender):
-            last = sender.last
-            assert last is not None
-            flight.queue_bytes, flight.queue_ns = last.queue_bytes, last.queue_ns
-            return last.cause
+        if self._broadcasts and flight.published:
+            shared = sender.sending(flight.sequence, flight.copy)
+            if shared is not None:
+                flight.queue_bytes, flight.queue_ns = shared.queue_bytes, shared.queue_ns
+                return shared.cause
         now_ns, waiting = flight.sent_ns, sender.waiting
         gone = next((n for n, (departure_ns, _) in enumerate(waiting) if departure_ns > now_ns), len(waiting))
         if gone:
@@ -57,7 +51,7 @@ class Queue:
         wait_ns = max(0, sender.free_ns - now_ns)
         cause = self._judge(len(waiting), queued + len(flight.payload) + self._overhead, now_ns, wait_ns)
         flight.queue_bytes, flight.queue_ns = queued, wait_ns
-        sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
+        sender.keep(Sending(flight.sequence, flight.copy, cause, queued, wait_ns))
         return cause
 
     def _judge(self, packets: int, size: int, now_ns: int, wait_ns: int) -> str:
