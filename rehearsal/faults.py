@@ -235,12 +235,12 @@ def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
 
     def do(system: System) -> None:
         asked = [ask(system, "pause"), ask(system, "step", count=ticks)]
-        system.later(for_ms * MS, partial(_when_answered, system, asked, go_on))
+        system.later(for_ms * MS, partial(when_answered, system, asked, go_on))
 
     def go_on(system: System) -> None:
         asked = [] if system.healed else [ask(system, "rate", pace=pace)]
         asked.append(ask(system, "resume"))
-        system.later(300 * MS, partial(_when_answered, system, asked, be_fast))
+        system.later(300 * MS, partial(when_answered, system, asked, be_fast))
 
     def be_fast(system: System) -> None:
         if not system.healed:
@@ -249,12 +249,12 @@ def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "tempo", f"pause for {for_ms} ms, step {ticks}, then {pace}", do)
 
 
-def _when_answered(system: System, asked: Sequence[str], do: Callable[[System], None]) -> None:
+def when_answered(system: System, asked: Sequence[str], do: Callable[[System], None]) -> None:
     """Go on when all that was asked for before is answered: what comes late would undo what comes after."""
     if all(identity in system.answers for identity in asked):
         do(system)
     else:
-        system.later(ASK_AGAIN_NS, partial(_when_answered, system, asked, do))
+        system.later(ASK_AGAIN_NS, partial(when_answered, system, asked, do))
 
 
 # --- supervisor and vHub ----------------------------------------------------------------------------------------------

@@ -61,7 +61,10 @@ class Laws:
         """By tick, over all frames up to it."""
         self._frames = {0: initial_frame(deployment)}
         """Those of the last ticks that are captured."""
-        self._branch = 0
+        self._branch = 0, 0
+        """Number and tick of the last branch."""
+        self._is_begun = False
+        """Whether no epoch is in it yet."""
         self._digests = {0: initial_frame(deployment).digest}
         self._rosters: dict[int, list[str]] = {}
         self._epochs: set[bytes] = set()
@@ -116,7 +119,7 @@ class Laws:
             self._commits_one(record.commit, decode(Commit, record.commit))
         elif isinstance(record, Epoch):
             self._begins(record, traced.payload)
-        elif isinstance(record, HeadRecord) and record.branch[0] > self._branch:
+        elif isinstance(record, HeadRecord) and record.branch[0] >= self._branch[0] and record.branch != self._branch:
             self._branches(*record.branch)
             self._tells_again([entry.message() for entry in record.recovered if entry.outage_ns < 0])
         elif isinstance(record, OrderedRecord):
@@ -187,17 +190,21 @@ class Laws:
         hold(owners.keys() == self._deployment.robots.keys(), f"epoch {epoch.epoch} has not all robots")
         hold(not {*epoch.roster} & {*self._stopped}, f"epoch {epoch.epoch} is with a node that is stopped")
         hold({*owners.values()} <= {*epoch.roster}, f"epoch {epoch.epoch}: an owner takes no part")
+        branch = (epoch.epoch if self._is_begun else self._branch[0]), self._branch[1]
+        hold((epoch.branch, epoch.branch_tick) == branch, f"epoch {epoch.epoch} is not of branch {branch}")
+        if self._is_begun:
+            self._branch, self._is_begun = branch, False
+            self.packets.branch(epoch.branch)
         self.epoch = epoch.epoch
         self._rosters[epoch.epoch] = sorted(epoch.roster)
         self._epochs.add(raw)
 
     def _branches(self, number: int, tick: int) -> None:
         """A branch begins where the vHub stands; all behind is void, but for what was asked for at its tick."""
-        hold(number > self.epoch, f"branch {number} in epoch {self.epoch}")
         hold(
             tick == self.packets.closed, f"branch {number} from tick {tick}, the vHub has closed {self.packets.closed}"
         )
-        self._branch = number
+        self._branch, self._is_begun = (number, tick), True
         for known in (self._commits, self._digests, self._chains):
             for behind in [each for each in known if each > tick]:
                 known.pop(behind)
@@ -241,7 +248,7 @@ class Laws:
         hold(part.node in self._rosters.get(part.epoch, ()), f"{part.node} has no part in epoch {part.epoch}")
         hold(part.epoch >= self._said_epoch.get(part.node, 0), f"{part.node} goes back to epoch {part.epoch}")
         self._said_epoch[part.node] = part.epoch
-        if part.tick <= self.committed or part.epoch < self._branch:
+        if part.tick <= self.committed or part.epoch < self._branch[0]:
             return
         said = self._parts.setdefault((part.epoch, part.tick), {}).setdefault(part.node, (traced.payload, part))
         hold(said[0] == traced.payload, f"{part.node} has two parts {part.tick} in epoch {part.epoch}")

@@ -36,6 +36,7 @@ from foosim.rehearsal.faults import (
     Fault,
     ask,
     revive,
+    when_answered,
 )
 from foosim.rehearsal.laws import Laws
 from foosim.rehearsal.packet_laws import Broken, hold
@@ -279,6 +280,10 @@ class Flight:
         for name, process in list(system.processes.items()):
             process.slow_ns = 0
             system.resume(name)
+        stops = [identity for identity, verb in system.asked.items() if verb == "stop"]
+        when_answered(system, stops, self._start_all)
+
+    def _start_all(self, system: System) -> None:
         for number in range(1, self.plan.nodes + 1):
             ask(system, "start", node=f"n{number}")
             revive(system, f"n{number}")

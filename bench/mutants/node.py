@@ -30,7 +30,7 @@ def _old_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 111)
+@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 280)
 def _new_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch <= self.epoch and bool(before(self, channel, message, payload))
@@ -48,7 +48,7 @@ def _epochs_fall(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_on_epoch", on_epoch)
 
 
-@register("node does not compare bases", "a node collects parts with its own basis only", 58)
+@register("node does not compare bases", "a node collects parts with its own basis only", 217)
 def _any_basis(planting: Planting) -> None:
     planting.swap(NodeCore, "_take_part", lambda self, barrier, part: barrier.add(part))
 
