@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from foosim.protocol.messages import Epoch
 from foosim.vhub.commits import Commits, Committed
 from foosim.vhub.packet import IN_FLIGHT
@@ -66,11 +68,8 @@ def last_closings(
     closed = commits.get(state.closed)
     if not closings and closed is not None:
         closings.append(_unjudged(state, closed, now_ns))
-    flights = state.in_flight()
-    for flight in flights:
-        flight.cause = IN_FLIGHT
     for closing in closings[-1:]:
-        closing.fates += flights
+        closing.fates += [replace(flight, cause=IN_FLIGHT) for flight in state.in_flight()]
     return closings
 
 
