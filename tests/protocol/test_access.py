@@ -69,10 +69,10 @@ def keys(plane: Plane, names: list[str]) -> list[tuple[str, zenoh.KeyExpr]]:
 def test_rules_say_what_the_predicate_says(nodes: list[str], clients: list[str], operators: list[str]) -> None:
     clients = [f"c{name}" for name in clients]
     made = deployment(nodes, clients, operators)
-    names = [*nodes, *clients, "vhub", "supervisor", "nobody", *(f"{name}.x1" for name in [*operators, *nodes])]
+    names = [*nodes, *clients, "vhub", "supervisor", "replay", "nobody", *(f"{name}.x1" for name in [*operators, *nodes])]
     for plane in Plane:
         control = access_control(access_to(plane, made))
-        here = "client." if plane is Plane.RADIO else ("vhub", "node.", "operator.")
+        here = {Plane.RADIO: "client.", Plane.REPLAY: "operator."}.get(plane, ("vhub", "node.", "operator."))
         for identity in [*identities_of(made), "node.nobody", "client.nobody", "operator.nobody"]:
             is_known = identity.startswith(here) and not identity.endswith("nobody")
             passes = Allowed(control, identity)
