@@ -278,9 +278,9 @@ class Replay:
             self._read(left_s)
         return self._answers.pop(identity, None)
 
-    def learn(self) -> None:
+    def learn(self, timeout_s: float) -> None:
         """Ask what is played, which is needed to know what payloads mean; `hear_replay` does."""
-        status = self.ask("status")
+        status = self.ask("status", timeout_s)
         try:
             deployment, name = str(status["deployment"]), str(status["deployment_name"])
             self._old_names = {str(new): str(old) for old, new in status["names"].items()}
@@ -306,12 +306,14 @@ def hear_replay(
     streams: Sequence[str] = STREAMS,
     timeout_s: float = CONNECT_S,
     pki: str | os.PathLike[str] | None = None,
+    answer_s: float = ANSWER_S,
 ) -> Replay:
     """Connect to the replay that listens at `address`, `tcp/HOST:PORT`, and hear some of its streams.
 
     `streams` are of `packets`, `poses`, `rows` and `clock`; none is enough to ask. Where the replay has certificates
     the address is `tls/HOST:PORT`, and `pki` the folder with an operator's. Raises BadValue for an unknown stream or an
-    address that is none, CertificateError, ConnectionFailed when nobody listens, ReplayGone when no replay answers.
+    address that is none, CertificateError, ConnectionFailed when nobody listens within `timeout_s`, ReplayGone when no
+    replay answers within `answer_s`, which is also how one looks that does not know this operator.
     """
     from foosim.protocol.session import ConnectError, Session
     from foosim.protocol.session_settings import Security
@@ -332,7 +334,7 @@ def hear_replay(
         raise ConnectionFailed(error.what) from None
     try:
         replay = Replay(session, name, streams)
-        replay.learn()
+        replay.learn(answer_s)
     except BaseException:
         session.close()
         raise

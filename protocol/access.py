@@ -2,9 +2,9 @@
 table of channels, which alone spells the keys.
 
 A node writes and hears what nodes do, under its own name; a client writes its own transmit key and hears its own
-receive key; an operator writes requests and hears their answers. What is not granted is denied. The routers of the two
-planes enforce it, each for those who connect to it, so it says nothing of a router's own messages. Zenoh tells nobody
-what it denies. Neighbours: `identity`, `channels`, `session_settings` (hands it to Zenoh).
+receive key; an operator writes requests and hears their answers, and hears replays. What is not granted is denied.
+The routers of the planes enforce it, each for those who connect to it, so it says nothing of a router's own messages.
+Zenoh tells nobody what it denies. Neighbours: `identity`, `channels`, `session_settings` (hands it to Zenoh).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ _READS: Final[dict[str, Reads]] = {
     VHUB: channels.VHUB_READS,
     SUPERVISOR: channels.SUPERVISOR_READS,
     "client": channels.CLIENT_READS,
+    REPLAY: channels.REPLAY_READS,
     "operator": (*channels.OPERATOR_READS, *channels.LISTENER_READS),
 }
 _PLANES: Final = {

@@ -106,7 +106,8 @@ class Requests:
     def status(self, now_ns: int) -> dict[str, Any]:
         """Return where the replay is, and what it plays."""
         clock = self._playback.clock(now_ns)
-        place = {"time_ns": self._playback.goal_ns(now_ns), "rate": clock.rate, "state": clock.state, "jumps": clock.jumps}
+        goal_ns = self._playback.goal_ns(now_ns)
+        place = {"time_ns": goal_ns, "rate": clock.rate, "state": clock.state, "jumps": clock.jumps}
         return {**place, "published": self._playback.statistics().published, **self._description}
 
     def key(self, key: str, now_ns: int) -> None:

@@ -164,8 +164,7 @@ class Playback:
     def _end_round(self) -> None:
         self._rounds += 1
         self._anchor_ns = None
-        if not self._problem:
-            self._time_ns = self.span.last_ns
+        self._time_ns = max(self._time_ns, self._last_ns) if self._problem else self.span.last_ns
         if self._problem or not self._loop or not self._of_round:
             self.ended = True
             self.failure = self._problem

@@ -17,6 +17,7 @@ from foosim.protocol import limits
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue, Failed
+from foosim.protocol.journal import JournalError
 from foosim.rehearsal import capture_commands, play_command
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture
@@ -146,7 +147,7 @@ def recover(
     """
     try:
         found = recover_capture(capture, journals)
-    except CaptureError as error:
+    except (CaptureError, JournalError) as error:
         raise Failed(str(error)) from None
     if json:
         content = {
