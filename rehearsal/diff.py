@@ -128,7 +128,7 @@ def _closings(scan: Scan) -> Iterator[list[Message]]:
     """Yield messages in the order of the file, cut before each row of /tick."""
     messages: list[Message] = []
     for message in scan.messages():
-        if message.topic == TICK and messages:
+        if (message.topic == TICK and messages) or len(messages) >= AHEAD_MAX:
             yield messages
             messages = []
         messages.append(message)

@@ -43,6 +43,9 @@ TOPICS: Final = (*ROW_TYPES, TF)
 BIG: Final = frozenset({TICK, FRAME})
 """What only a re-simulation is fed with; it is played when it is asked for."""
 
+WAITING_MAX: Final = 100_000
+"""How many entries are held to be put in order: more than two ticks bring, whatever a file holds."""
+
 Decode = Callable[[msgspec.json.Decoder[Any], Message], Any]
 """Gives the row that a message holds, or says which message of which file is damaged."""
 
@@ -157,6 +160,8 @@ class Entries:
         """As declared, until a row of /clients says how it took part."""
         self._decoders = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
         self._poses = selection.has(TF)
+        named = [topic for topic in selection.topics if topic.startswith(capture_rows.PACKETS)]
+        self._packets = bool(named or selection.regexes or not selection.topics)
         self._topics = {topic for topic in ROW_TYPES if topic != capture_rows.PACKETS and selection.has(topic)}
         self._links: dict[str, str] = {}
 
@@ -168,6 +173,8 @@ class Entries:
             if message.topic == TICK:
                 while waiting and waiting[0][0] <= message.log_ns - self._tick_ns:
                     yield heappop(waiting)[2]
+            if len(waiting) >= WAITING_MAX:
+                yield heappop(waiting)[2]
             entry = self._entry(message, decode)
             if entry is not None:
                 number += 1
@@ -178,7 +185,7 @@ class Entries:
     def _entry(self, message: Message, decode: Decode) -> Entry | None:
         topic = message.topic
         if topic == capture_rows.PACKETS:
-            return self._packet(decode(self._decoders[topic], message))
+            return self._packet(decode(self._decoders[topic], message)) if self._packets else None
         if topic == TF:
             return self._pose(message) if self._poses else None
         if topic == CLIENTS:

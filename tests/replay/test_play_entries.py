@@ -67,6 +67,19 @@ def test_a_free_running_client_hears_between_ticks(run: Path, tmp_path: Path) ->
     assert len(blue) > 100 and all(packet.time_ns % TICK_NS == 0 < packet.time_ns - packet.due_ns for packet in blue)
 
 
+def test_packets_are_put_in_order_over_the_rows_of_two_ticks(run: Path) -> None:
+    """A robot's packet of the next tick has its row before a client's that is due earlier."""
+    messages = messages_of(run)
+    ticks = [message for message in messages if message.topic == "/tick"]
+    packet = next(message for message in messages if b'"fate":"delivered"' in message.data)
+    to_robot = with_row(packet, destination="red.goal", due_ns=11 * MS, arrival_tick=6)
+    to_client = with_row(packet, destination="hand", due_ns=11_500_000, arrival_tick=6)
+    scan = Scan(run)
+    entries = Entries(deployment_of(read_about(run)), Selection())
+    stream = [ticks[5], to_robot, ticks[6], to_client, ticks[7], ticks[8]]
+    assert [entry.time_ns for entry in entries.of(stream, scan.decode)] == [11_500_000, 12 * MS]
+
+
 def test_poses_and_rows_are_played_as_they_stand(run: Path) -> None:
     entries = played(run)
     capture = open_capture(run)
