@@ -50,7 +50,7 @@ PRESENT: Final = {Plane.REPLAY: "replay"}
 NAMES: Final = {
     Plane.SIMULATION: ("red", "blue", "nobody", "vhub", "supervisor", "admin.x1", "nobody.x1"),
     Plane.RADIO: ("hand", "other", "nobody", "vhub", "red"),
-    Plane.REPLAY: ("packets", "poses", "rows", "clock", "replay", "admin.x1", "nobody.x1"),
+    Plane.REPLAY: ("packets", "poses", "rows", "clock", "replay", "red", "admin.x1", "nobody.x1"),
 }
 BYTES_MAX: Final = 1 << 20
 
