@@ -20,9 +20,9 @@ import numpy as np
 
 from foosim.protocol.errors import BadValue, show
 from foosim.protocol.names import nearest_name
-from foosim.vhub.capture_reader import About, Scan, deployment_of
+from foosim.vhub.capture_reader import DECODERS, About, Scan, deployment_of
 from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import FRAME, ROW_TYPES, TICK, CaptureError, FrameRow
+from foosim.vhub.rows import ROW_TYPES, TICK, CaptureError, FrameRow
 from foosim.vhub.transforms import read_poses
 from foosim.vhub.viewing import LOG, POSES, VIEW_TYPES
 
@@ -220,13 +220,24 @@ def _content(message: Message) -> Any:
     if message.topic in VIEW_TYPES:
         return {"content": message.data.hex()}
     try:
-        if message.topic == FRAME:
-            frame = msgspec.json.decode(message.data, type=FrameRow)
-            values = np.frombuffer(frame.values, dtype="<f8").tolist()
-            return {**msgspec.to_builtins(frame), "values": values}
-        return msgspec.json.decode(message.data)
-    except (msgspec.DecodeError, ValueError, RecursionError) as error:
+        row = DECODERS[message.topic].decode(message.data)
+    except KeyError:
+        return {"content": message.data.hex()}
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise CaptureError(f"{message.topic} at {message.log_ns} ns: {error}") from None
+    content = _plain(row)
+    if isinstance(row, FrameRow) and len(row.values) % 8 == 0:
+        content["values"] = np.frombuffer(row.values, dtype="<f8").tolist()
+    return content
+
+
+def _plain(value: Any) -> Any:
+    """Return a row as plain values with all its fields: a file may leave out those that have their default."""
+    if isinstance(value, msgspec.Struct):
+        return {name: _plain(getattr(value, name)) for name in value.__struct_fields__}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value.hex() if isinstance(value, bytes) else value
 
 
 def first_difference(a: Any, b: Any, ignored: frozenset[str], path: str = "") -> tuple[str, Any, Any] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
@@ -84,6 +85,15 @@ def with_row(message: Message, **fields: Any) -> Message:
     """A message whose row has other fields."""
     row = {**msgspec.json.decode(message.data), **fields}
     return Message(message.topic, message.log_ns, message.publish_ns, message.sequence, msgspec.json.encode(row))
+
+
+def damaged(path: Path, out: Path) -> Path:
+    """Write a capture with one wrong bit within the compressed data of a chunk in the middle."""
+    content = bytearray(path.read_bytes())
+    chunks = [found.start() for found in re.finditer(re.escape(b"\x28\xb5\x2f\xfd"), content)]
+    content[chunks[len(chunks) // 2] + 40] ^= 1
+    out.write_bytes(content)
+    return out
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, TICK, CaptureError
 from foosim.vhub.viewing import POSES, SCENE
-from tests.replay.conftest import ADDED_AT, TICK_NS, contents_of, messages_of, replay
+from tests.replay.conftest import ADDED_AT, TICK_NS, contents_of, damaged, messages_of, replay
 
 MS = 1_000_000
 
@@ -141,9 +141,7 @@ def test_a_part_before_the_first_frame_of_a_cut_is_refused(part: Path, tmp_path:
 
 
 def test_a_damaged_capture_leaves_no_half_a_cut(run: Path, tmp_path: Path) -> None:
-    content = bytearray(run.read_bytes())
-    content[len(content) * 2 // 3] ^= 0xFF
-    (tmp_path / "damaged.mcap").write_bytes(content)
+    damaged(run, tmp_path / "damaged.mcap")
     with pytest.raises(CaptureError, match="damaged"):
         cut_capture(tmp_path / "damaged.mcap", tmp_path / "o.mcap")
     assert not (tmp_path / "o.mcap").exists()

@@ -19,7 +19,7 @@ from foosim.rehearsal import export as export_module
 from foosim.rehearsal.export import export_capture
 from foosim.rehearsal.tables import table_names
 from foosim.vhub.capture_reader import open_capture
-from tests.replay.conftest import TICK_NS, messages_of, replay, rewritten, with_row
+from tests.replay.conftest import TICK_NS, damaged, messages_of, replay, rewritten, with_row
 
 
 def lines_of(path: Path) -> list[dict[str, str]]:
@@ -154,10 +154,7 @@ def test_bad_input_is_named_and_leaves_no_file(run: Path, tmp_path: Path, bad_fi
     for bad in bad_files:
         done = replay("export", bad, "-o", tmp_path / "o.csv")
         assert done.code == 2 and str(bad) in done.err
-    cut = tmp_path / "damaged.mcap"
-    content = bytearray(run.read_bytes())
-    content[len(content) // 2] ^= 0xFF
-    cut.write_bytes(content)
+    cut = damaged(run, tmp_path / "damaged.mcap")
     done = replay("export", cut, "-o", tmp_path / "o.csv")
     assert done.code == 2 and "damaged" in done.err
     assert sorted(tmp_path.iterdir()) == sorted([*before, cut]), "half a table does not stay"

@@ -15,7 +15,7 @@ from foosim.rehearsal.system import Settings
 from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
-from tests.replay.conftest import TABLE, messages_of, replay
+from tests.replay.conftest import TABLE, damaged, messages_of, replay
 
 
 def test_info_counts_what_the_capture_has(run: Path) -> None:
@@ -93,9 +93,8 @@ def test_what_cannot_be_recovered_fails_and_stays_as_it_is(run: Path, tmp_path: 
         done = replay("recover", bad)
         assert done.code == 1 and str(bad) in done.err, done
         assert not bad.is_file() or bad.read_bytes() == before
-    content = bytearray(run.read_bytes()[:-100])
-    content[len(content) // 2] ^= 0xFF
-    damaged = tmp_path / "damaged.mcap"
-    damaged.write_bytes(content)
-    done = replay("recover", damaged)
-    assert done.code == 1 and "would be lost" in done.err and damaged.read_bytes() == bytes(content)
+    torn = damaged(run, tmp_path / "torn.mcap")
+    torn.write_bytes(torn.read_bytes()[:-100])
+    before = torn.read_bytes()
+    done = replay("recover", torn)
+    assert done.code == 1 and "would be lost" in done.err and torn.read_bytes() == before

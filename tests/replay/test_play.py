@@ -42,7 +42,7 @@ from foosim.rehearsal.play_terminal import Lines
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor import pki
 from foosim.vhub.capture_reader import open_capture
-from tests.replay.conftest import TABLE, TICK_NS, TICKS, replay
+from tests.replay.conftest import TABLE, TICK_NS, TICKS, damaged, replay
 
 MS = 1_000_000
 LIMIT_S = 60.0
@@ -187,9 +187,7 @@ def test_what_a_killed_writer_left_plays_up_to_its_last_chunk(run: Path, tmp_pat
 
 
 def test_a_damaged_one_plays_up_to_there_and_fails(run: Path, tmp_path: Path) -> None:
-    content = bytearray(run.read_bytes())
-    content[len(content) // 2] ^= 0xFF
-    (tmp_path / "damaged.mcap").write_bytes(content)
+    damaged(run, tmp_path / "damaged.mcap")
     with playing(tmp_path / "damaged.mcap", pace=FAST, loop=True) as play:
         result = play.result()
         assert result.failed and "damaged.mcap: byte " in result.reason and result.published > 100

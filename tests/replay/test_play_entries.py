@@ -18,7 +18,7 @@ from foosim.rehearsal.play_reader import Read, ReadAhead, read_span
 from foosim.rehearsal.playing import Reading, Span
 from foosim.vhub.capture_reader import Scan, deployment_of, open_capture, read_about
 from foosim.vhub.rows import PacketRow
-from tests.replay.conftest import TICK_NS, TICKS, messages_of, rewritten, with_row
+from tests.replay.conftest import TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
 
 MS = 1_000_000
 
@@ -225,9 +225,7 @@ def test_the_span_is_read_from_heads_of_chunks(run: Path, tmp_path: Path) -> Non
 
 
 def test_what_is_damaged_is_told_behind_what_was_read(run: Path, tmp_path: Path) -> None:
-    content = bytearray(run.read_bytes())
-    content[len(content) // 2] ^= 0xFF
-    (tmp_path / "damaged.mcap").write_bytes(content)
+    damaged(run, tmp_path / "damaged.mcap")
     reader = Reader(tmp_path / "damaged.mcap", Span(0, TICKS * TICK_NS))
     reader.ahead.ask(Reading(0, 0))
     entries: list[Entry] = []
