@@ -93,6 +93,8 @@ def test_every_table_is_the_same_as_parquet(run: Path, tmp_path: Path, what: str
 def as_text(value: Any) -> str:
     if value is None:
         return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
     return value.hex() if isinstance(value, bytes) else str(value)
 
 
