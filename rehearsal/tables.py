@@ -20,7 +20,7 @@ from foosim.client.payloads import COMMAND_KINDS, channel_kind, decode_payload, 
 from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Malformed, show
-from foosim.protocol.names import CHANNEL_ECHO, nearest_name
+from foosim.protocol.names import nearest_name
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import PACKETS, ROW_TYPES, PacketRow, Row
 from foosim.vhub.transforms import read_poses
@@ -153,14 +153,15 @@ class _Decoded:
                 self._kinds[pair] = ""
         return self._kinds[pair]
 
-    def numbers(self, kind: str, payload: bytes) -> dict[str, float]:
-        """Return the numbers of a payload by name; none when it is another payload than its channel's."""
-        if kind in ("", CHANNEL_ECHO):
+    def numbers(self, kind: str, payload: bytes) -> dict[str, Any]:
+        """Return what a payload holds by name; nothing when it is no payload of its channel, or plain bytes."""
+        if not kind:
             return {}
         try:
-            return dict(zip(value_fields(kind), decode_payload(kind, payload), strict=True))
+            value = decode_payload(kind, payload)
         except Malformed:
             return {}
+        return {} if isinstance(value, bytes) else value._asdict()
 
 
 class _PacketRows(_Decoded):
