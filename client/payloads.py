@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 from foosim.client.errors import UnknownName
 from foosim.protocol.deployment import Deployment, RodRobot
 from foosim.protocol.errors import BadValue, Malformed
-from foosim.protocol.names import CHANNEL_ECHO, CHANNEL_POSITION
+from foosim.protocol.names import CHANNEL_ECHO, CHANNEL_NAMES_RESERVED, CHANNEL_POSITION
 
 ANGLE_RAD_MAX: Final = 1000.0
 """The greatest angle that a rod's actuator takes."""
@@ -53,6 +53,8 @@ _NUMBERS: Final[Mapping[str, tuple[struct.Struct, Any]]] = {
     CHANNEL_POSITION: (struct.Struct("<2d"), Command),
 }
 KINDS: Final = (*_NUMBERS, CHANNEL_ECHO)
+COMMAND_KINDS: Final = tuple(kind for kind in _NUMBERS if kind in CHANNEL_NAMES_RESERVED)
+"""What moves a robot: channels that are no sensor's."""
 
 
 def channel_kind(deployment: Deployment, robot: str, channel: str) -> str:
@@ -68,6 +70,12 @@ def channel_kind(deployment: Deployment, robot: str, channel: str) -> str:
         built_in = [CHANNEL_ECHO, *([CHANNEL_POSITION] if isinstance(settings, RodRobot) else [])]
         raise UnknownName(f"{robot} has no such channel", channel, [*settings.sensors, *built_in])
     return settings.sensors[channel].kind
+
+
+def value_fields(kind: str) -> tuple[str, ...]:
+    """Return the names of the numbers that a kind carries; none for bytes."""
+    fields: tuple[str, ...] = _NUMBERS[kind][1]._fields if kind in _NUMBERS else ()
+    return fields
 
 
 def decode_payload(kind: str, payload: bytes) -> Value:
