@@ -4,7 +4,7 @@ The ticks of the capture are closed again by the vHub's own state, with the fram
 has, and with the network that is asked about. It is an open loop: robots and clients send what they sent, whatever
 reaches them. Without another network every fate is the captured one. Where fates depend on places and the capture does
 not have the frame of every tick, the world is simulated again from its orders and deliveries.
-Neighbours: `verify` and `replica` (the world again), `whatif_picture` draws what this finds, `foosim.vhub.state` judges.
+Neighbours: `verify` and `replica` (the world again), `whatif_picture` (draws it), `foosim.vhub.state` (judges).
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from foosim.protocol.messages import Edit, Freeze, RobotPacket, Sent
 from foosim.protocol.network import Network
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
-from foosim.vhub.capture_reader import CaptureData
+from foosim.vhub.capture_reader import CaptureData, Scan, captured_tick
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.profiles import Profiles
-from foosim.vhub.rows import CLIENTS, PACKETS, CaptureError, ClientRow, PacketRow, packet_row
+from foosim.vhub.rows import CLIENTS, PACKETS, TICK, CaptureError, ClientRow, PacketRow, TickRow, edit_of, packet_row
 from foosim.vhub.state import OUTBOX_SHIFT, HubState, Joining
 
 CHANGED_KEPT: Final = 10_000
@@ -124,15 +124,30 @@ def _age_ms(sent: np.ndarray, due: np.ndarray) -> float:
 
 
 def what_if(capture: CaptureData, network: Network | None = None) -> WhatIf:
-    """Judge a capture's packets again, by another network or by its own. Raises CaptureError when it lacks something."""
+    """Judge a capture's packets again, by another network or by its own. Raises CaptureError for what it lacks."""
     deployment = capture.deployment
     if network is not None:
         deployment = deployment.model_copy(update={"network": network})
-    rows = {_key(row): row for row in capture.rows(PACKETS) if isinstance(row, PacketRow)}
+    rows, came, ticks = _read(capture)
     compared = _Compared(rows)
-    for flight in _judged(capture, deployment, _by_tick(rows.values(), deployment)):
+    for flight in _judged(capture, deployment, _by_tick(rows.values(), deployment), came, ticks):
         compared.take(flight)
     return compared.result()
+
+
+def _read(capture: CaptureData) -> tuple[dict[Key, PacketRow], dict[int, list[ClientRow]], list[TickRow]]:
+    """Return, in one pass over the file, its packets, who came and went by tick, and the ticks that were closed."""
+    rows: dict[Key, PacketRow] = {}
+    came: defaultdict[int, list[ClientRow]] = defaultdict(list)
+    ticks: list[TickRow] = []
+    for _, row in Scan(capture.path).rows(frozenset({PACKETS, CLIENTS, TICK})):
+        if isinstance(row, PacketRow):
+            rows[row.source, row.sequence, row.destination, row.copy] = row
+        elif isinstance(row, ClientRow):
+            came[row.tick].append(row)
+        elif isinstance(row, TickRow):
+            ticks.append(row)
+    return rows, came, ticks[:-1] if capture.finished else ticks
 
 
 class _Compared:
@@ -195,10 +210,6 @@ class _Compared:
         return WhatIf(len(self._rows), self._changed, links, counted[0], counted[1], changes)
 
 
-def _key(row: PacketRow) -> Key:
-    return row.source, row.sequence, row.destination, row.copy
-
-
 # --- what was offered -------------------------------------------------------------------------------------------------
 
 
@@ -208,6 +219,9 @@ class _Offered:
 
     robots: dict[tuple[str, int], RobotPacket] = field(default_factory=dict)
     clients: dict[tuple[str, int], Sent] = field(default_factory=dict)
+
+
+_NOTHING: Final = _Offered()
 
 
 def _by_tick(rows: Iterable[PacketRow], deployment: Deployment) -> dict[int, _Offered]:
@@ -226,25 +240,24 @@ def _by_tick(rows: Iterable[PacketRow], deployment: Deployment) -> dict[int, _Of
     return offered
 
 
-def _judged(capture: CaptureData, deployment: Deployment, offered: dict[int, _Offered]) -> Iterator[Flight]:
+def _judged(
+    capture: CaptureData,
+    deployment: Deployment,
+    offered: dict[int, _Offered],
+    came: dict[int, list[ClientRow]],
+    ticks: Sequence[TickRow],
+) -> Iterator[Flight]:
     """Close the ticks of a capture again; yield the packets as their fates become final, the rest at the end."""
-    ticks = [int(tick) for tick in capture.ticks]
-    closed = ticks[:-1] if capture.finished else ticks
-    state = HubState(deployment, ticks[0] if ticks else 0)
-    came: defaultdict[int, list[ClientRow]] = defaultdict(list)
-    for row in capture.rows(CLIENTS):
-        assert isinstance(row, ClientRow)
-        came[row.tick].append(row)
-    worlds = _worlds(capture, len(closed), Profiles(deployment, deployment.network).on_radio)
-    for frame, edits in worlds:
-        for row in came[frame.tick]:
+    state = HubState(deployment, ticks[0].tick if ticks else 0)
+    for frame, edits in _worlds(capture, ticks, Profiles(deployment, deployment.network).on_radio):
+        for row in came.get(frame.tick, ()):
             _come_and_go(state, row)
-        at = offered.get(frame.tick, _Offered())
+        at = offered.get(frame.tick, _NOTHING)
         fates: list[Flight] = []
         state.close_world(frame, [at.robots[key] for key in sorted(at.robots)], fates, edits)
-        admitted: defaultdict[str, list[Sent]] = defaultdict(list)
+        admitted: dict[str, list[Sent]] = {}
         for (source, _), sent in sorted(at.clients.items()):
-            admitted[source].append(sent)
+            admitted.setdefault(source, []).append(sent)
         state.close_clients(frame, admitted, fates)
         yield from fates
     for flight in state.in_flight():
@@ -256,40 +269,41 @@ def _come_and_go(state: HubState, row: ClientRow) -> None:
     if row.event == "leaves":
         state.leave(row.client)
     else:
-        heard = [(subscription.robot, subscription.channel) for subscription in row.subscriptions]
+        heard = [(heard.source, heard.channel) for heard in row.subscriptions]
         state.join(Joining(row.client, row.period, heard), row.tick)
 
 
-def _worlds(capture: CaptureData, count: int, depends_on_places: bool) -> Iterator[tuple[Frame, Sequence[Edit]]]:
-    """Yield the frames of the first `count` ticks with the edits that led to each.
+def _worlds(
+    capture: CaptureData, ticks: Sequence[TickRow], depends_on_places: bool
+) -> Iterator[tuple[Frame, Sequence[Edit]]]:
+    """Yield the frame of each tick with the edits that led to it.
 
-    A frame that the capture does not have is that of the tick before it where fates do not depend on places and nobody
-    is taken out of service; else all are computed again.
+    Where fates do not depend on places and nobody is taken out of service the first frame stands for all. Else they
+    are the captured ones, or, where some are not there, all are computed again.
     """
+    edited = [[edit_of(edit) for edit in row.edits] for row in ticks]
+    if not depends_on_places and not any(isinstance(edit, Freeze) for edits in edited for edit in edits):
+        first = capture.first_frame()
+        if first is None:
+            raise CaptureError(f"{capture.path}: it does not have the frame with which it begins")
+        for row, edits in zip(ticks, edited, strict=True):
+            yield Frame(row.tick, first.layout, first.values), edits
+        return
     captured = {int(tick): (block, index) for block in capture.frame_blocks for index, tick in enumerate(block.ticks)}
-    history = [(tick.tick, tick.digest, tick.edits, tick.delivered) for tick in capture.captured_ticks()][:count]
-    changes = any(isinstance(edit, Freeze) for _, _, edits, _ in history for edit in edits)
-    if all(tick in captured for tick, *_ in history) or not (depends_on_places or changes):
-        frame: Frame | None = None
-        for tick, _, edits, _ in history:
-            if tick in captured:
-                block, index = captured[tick]
-                frame = block.frame(index)
-            elif frame is not None:
-                frame = Frame(tick, frame.layout, frame.values, frame.outboxes)
-            if frame is None:
-                raise CaptureError(f"{capture.path}: it does not have the frame with which it begins")
-            yield frame, edits
+    if all(row.tick in captured for row in ticks):
+        for row, edits in zip(ticks, edited, strict=True):
+            block, index = captured[row.tick]
+            yield block.frame(index), edits
         return
     text, name = capture.about.deployment_text, capture.about.deployment_name
     replica = Replica(text, name, capture.deployment, start=start_of(capture))
     try:
-        for number, (tick, digest, edits, delivered) in enumerate(history):
-            frame = replica.frame if number == 0 else replica.step(edits, delivered)
-            if frame.tick != tick or frame.digest != digest:
-                raise CaptureError(
-                    f"{capture.path}: frame {tick} is not there, and comes out otherwise here: verify it"
-                )
-            yield frame, edits
+        for number, row in enumerate(ticks):
+            tick = captured_tick(row)
+            frame = replica.frame if number == 0 else replica.step(tick.edits, tick.delivered)
+            if frame.tick != tick.tick or frame.digest != tick.digest:
+                what = f"frame {tick.tick} is not there, and comes out otherwise here: verify it"
+                raise CaptureError(f"{capture.path}: {what}")
+            yield frame, tick.edits
     finally:
         replica.close()

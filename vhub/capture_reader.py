@@ -244,13 +244,7 @@ class CaptureData:
         """Yield what a re-simulation needs, tick by tick."""
         for row in self.rows(TICK):
             assert isinstance(row, TickRow)
-            yield CapturedTick(
-                row.tick,
-                bytes.fromhex(row.digest),
-                tuple(bytes.fromhex(digest) for digest in row.entities),
-                [edit_of(edit) for edit in row.edits],
-                [delivered_of(delivered) for delivered in row.deliveries],
-            )
+            yield captured_tick(row)
 
     def poses(self, name: str) -> Poses:
         """Return the poses of a link (`red.goal/slide`), or of an entity's last link (`ball`, `red.goal`)."""
@@ -269,6 +263,17 @@ class CaptureData:
             hint = f", nearest is {nearest}" if nearest else ""
             raise CaptureError(f"{self.path}: nothing with a body is called {name!r}{hint}")
         return poses_of(found, link)
+
+
+def captured_tick(row: TickRow) -> CapturedTick:
+    """Return what a re-simulation needs of a row."""
+    return CapturedTick(
+        row.tick,
+        bytes.fromhex(row.digest),
+        tuple(bytes.fromhex(digest) for digest in row.entities),
+        [edit_of(edit) for edit in row.edits],
+        [delivered_of(delivered) for delivered in row.deliveries],
+    )
 
 
 def read_about(path: Path) -> About:

@@ -9,7 +9,8 @@ from foosim.protocol.limits import RELEASE_AHEAD
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import IDLE_NS_MAX, System
 from foosim.rehearsal.verify import verify_capture
-from foosim.vhub.capture_reader import capture_info, open_capture
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import open_capture
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 PERIOD: Final = 5
