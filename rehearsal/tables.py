@@ -54,9 +54,23 @@ class Table:
 
 
 _UNITS: Final[Mapping[str, str]] = {
-    "ns": "ns", "m": "m", "mm": "mm", "s": "s", "hz": "Hz", "bps": "bit/s", "ppm": "ppm", "bytes": "B", "size": "B",
-    "db": "dB", "dbm": "dBm", "cdb": "0.01 dB", "cdbm": "0.01 dBm",
-    "slide": "m", "spin": "rad", "tick": "tick", "period": "ticks",
+    "ns": "ns",
+    "m": "m",
+    "mm": "mm",
+    "s": "s",
+    "hz": "Hz",
+    "bps": "bit/s",
+    "ppm": "ppm",
+    "bytes": "B",
+    "size": "B",
+    "db": "dB",
+    "dbm": "dBm",
+    "cdb": "0.01 dB",
+    "cdbm": "0.01 dBm",
+    "slide": "m",
+    "spin": "rad",
+    "tick": "tick",
+    "period": "ticks",
 }
 """By the last word of a column's name."""
 

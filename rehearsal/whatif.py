@@ -19,7 +19,6 @@ import numpy as np
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Edit, Freeze, RobotPacket, Sent
-from foosim.protocol.network import Network
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
 from foosim.vhub.capture_reader import CaptureData, Scan, captured_tick
@@ -81,6 +80,9 @@ class WhatIf:
 
     packets: int
     changed: int
+    """How many have another fate, cause, time or content; or are copies that only one of the networks makes."""
+    inputs_changed: int
+    """How many have the same, for other reasons."""
     links: tuple[LinkChange, ...]
     causes: dict[str, int]
     """How many packets were dropped, by cause, as captured."""
@@ -123,11 +125,13 @@ def _age_ms(sent: np.ndarray, due: np.ndarray) -> float:
     return float((spans * ages + spans * spans / 2.0).sum() / spans.sum())
 
 
-def what_if(capture: CaptureData, network: Network | None = None) -> WhatIf:
-    """Judge a capture's packets again, by another network or by its own. Raises CaptureError for what it lacks."""
-    deployment = capture.deployment
-    if network is not None:
-        deployment = deployment.model_copy(update={"network": network})
+def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatIf:
+    """Judge a capture's packets again, by its own network or that of another deployment of the same world.
+
+    Raises CaptureError for what the capture lacks.
+    """
+    if deployment is None:
+        deployment = capture.deployment
     rows, came, ticks = _read(capture)
     compared = _Compared(rows)
     for flight in _judged(capture, deployment, _by_tick(rows.values(), deployment), came, ticks):
@@ -156,7 +160,7 @@ class _Compared:
     def __init__(self, rows: dict[Key, PacketRow]) -> None:
         self._rows = rows
         self._left = dict.fromkeys(rows)
-        self._changed = 0
+        self._changed = self._inputs_changed = 0
         self._changes: list[PacketChange] = []
         self._new_causes: Counter[str] = Counter()
         self._after: defaultdict[tuple[str, str], _Series] = defaultdict(_Series)
@@ -168,8 +172,10 @@ class _Compared:
         self._left.pop(key, None)
         flight.released_wall_ns = 0 if before is None else before.wall_released_ns
         after = packet_row(flight)
-        if after != before:
+        if before is None or _verdict(after) != _verdict(before):
             self._note(key, before, after)
+        else:
+            self._inputs_changed += after != before
         self._new_causes[after.cause] += after.fate == "dropped"
         if after.fate == "delivered":
             series = self._after[after.source, after.destination]
@@ -207,7 +213,11 @@ class _Compared:
             {cause: count for cause, count in sorted(found.items()) if count} for found in (causes, self._new_causes)
         ]
         changes = tuple(sorted(self._changes, key=lambda change: (change.sent_ns, change.source, change.sequence)))
-        return WhatIf(len(self._rows), self._changed, links, counted[0], counted[1], changes)
+        return WhatIf(len(self._rows), self._changed, self._inputs_changed, links, counted[0], counted[1], changes)
+
+
+def _verdict(row: PacketRow) -> tuple[str, str, int, int, bytes]:
+    return row.fate, row.cause, row.due_ns, row.arrival_tick, row.payload
 
 
 # --- what was offered -------------------------------------------------------------------------------------------------
