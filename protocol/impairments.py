@@ -122,6 +122,9 @@ class ParetoDwell(Part):
     max_ns: Dwell = Field(alias="max")
 
 
+BURST_MAX: Final = 1e6
+
+
 class Burst(Part):
     """Gilbert-Elliott by what it does: `loss` is the mean loss, `mean_bad` the mean length of a bad time.
 
@@ -131,7 +134,7 @@ class Burst(Part):
 
     loss: Share
     mean_bad_ns: Dwell | None = Field(default=None, alias="mean_bad")
-    mean_burst: Annotated[float, Field(ge=1.0, le=1e6)] | None = None
+    mean_burst: Annotated[float, Field(ge=1.0, le=BURST_MAX)] | None = None
     bad_loss: Probability = default("100 %")
     bad_extra_delay_ns: Delay = default("0 s", "bad_extra_delay")
     dwell: ParetoDwell | None = None

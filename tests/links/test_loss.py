@@ -72,7 +72,7 @@ def chain_z(lost: list[bool], loss: float, eigenvalue: float) -> float:
     return (sum(lost) / n - loss) / sqrt(loss * (1 - loss) / n * (1 + eigenvalue) / (1 - eigenvalue))
 
 
-@pytest.mark.parametrize(("loss", "burst"), [(0.01, 4.0), (0.05, 3.0), (0.1, 5.0), (0.003, 1.33), (0.2, 1.5)])
+@pytest.mark.parametrize(("loss", "burst"), [(0.01, 4.0), (0.05, 3.0), (0.1, 5.0), (0.003, 1.33), (0.2, 1.5), (0.6, 1.5)])
 def test_bursts_of_packets(proof: Proof, loss: float, burst: float) -> None:
     """The mean loss, the mean length of losses in a row, and the law of these: geometric."""
     n = proof.size(100_000, 2_000_000)

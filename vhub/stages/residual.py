@@ -110,7 +110,8 @@ def chain_of_burst(burst: Burst) -> GilbertElliott:
     assert burst.mean_burst is not None
     share = burst.loss / burst.bad_loss
     r = 1.0 - (1.0 - 1.0 / burst.mean_burst) / burst.bad_loss
-    return GilbertElliott.model_construct(p=r * share / (1.0 - share), r=r, h=1.0 - burst.bad_loss, k=1.0)
+    p = min(1.0, r * share / (1.0 - share))
+    return GilbertElliott.model_construct(p=p, r=r, h=1.0 - burst.bad_loss, k=1.0)
 
 
 def make_residual(setup: LinkSetup) -> Residual | None:
