@@ -66,13 +66,16 @@ class ShiftedExponentialJitter(Part):
     mean_ns: Spread = Field(alias="mean")
 
 
+PARETO_MAX: Final = "10 s"
+
+
 class ParetoJitter(Part):
-    """A Lomax (Pareto II) distribution from 0 with the mean `mean`, cut at `max`: `alpha` above 1 is its tail."""
+    """A Lomax (Pareto II) distribution from 0, cut at `max`, with the mean `mean`: `alpha` above 1 is its tail."""
 
     shape: Literal["pareto"]
     mean_ns: Spread = Field(alias="mean")
     alpha: Annotated[float, Field(ge=1.01, le=100.0)] = 2.5
-    max_ns: Spread = default("10 s", "max")
+    max_ns: Spread = default(PARETO_MAX, "max")
 
 
 class Component(Part):

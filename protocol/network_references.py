@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
-from foosim.protocol.impairments import BURST_MAX, BURSTS
+from foosim.protocol.impairments import BURST_MAX, BURSTS, PARETO_MAX
 from foosim.protocol.names import nearest_name
 from foosim.protocol.network import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_MAX, REST
 from foosim.protocol.presets import PRESETS, preset_settings
@@ -208,6 +208,8 @@ def _jitter(view: View, location: Location) -> Iterator[Finding]:
         if None not in shares and sum(share or 0 for share in shares) != 1:
             yield Finding((*location, "parts"), "shares that do not add up to 100 %", len(shares))
         return
+    if shape == "pareto":
+        yield from _pareto(view, location)
     if shape not in ("gamma", "lognormal"):
         return
     try:
@@ -217,6 +219,17 @@ def _jitter(view: View, location: Location) -> Iterator[Finding]:
     if not mean_ns <= JITTER_RATIO_MAX * sd_ns <= JITTER_RATIO_MAX * 3 * mean_ns:
         what = f"not between 1/{JITTER_RATIO_MAX} of the mean and 3 times the mean"
         yield Finding((*location, "sd"), what, view.get(*location, "sd"))
+
+
+def _pareto(view: View, location: Location) -> Iterator[Finding]:
+    """The cut leaves room for the mean."""
+    jitter = view.mapping(*location)
+    try:
+        mean_ns, max_ns = units.parse_ns(jitter.get("mean")), units.parse_ns(jitter.get("max", PARETO_MAX))
+    except BadValue:
+        return
+    if max_ns < 2 * mean_ns:
+        yield Finding((*location, "mean"), f"above half of max, {jitter.get('max', PARETO_MAX)}", jitter.get("mean"))
 
 
 def _events(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:

@@ -159,3 +159,18 @@ def contingency(table: Sequence[Sequence[int]]) -> float:
         for count, due in zip(counts, dues, strict=True)
     )
     return chi_square_p(statistic, (len(rows) - 1) * (len(columns) - 1))
+
+
+def gamma_cdf(shape: float, x: float) -> float:
+    """Return the regularised incomplete gamma function P(shape, x): its series (Abramowitz and Stegun, 6.5.29)."""
+    if x <= 0.0:
+        return 0.0
+    if x > 200.0 + 10.0 * shape:
+        return 1.0
+    term = total = 1.0 / shape
+    n = shape
+    while term > 1e-16 * total:
+        n += 1.0
+        term *= x / n
+        total += term
+    return min(1.0, total * exp(shape * log(x) - x - lgamma(shape)))

@@ -19,11 +19,13 @@ TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
         ("burst: {loss: 98 %, mean_burst: 2}", "so much loss comes in bursts of at least 49 packets, 2"),
         ("burst: {loss: 5 %, mean_burst: 2, bad_loss: 50 %}", "with this bad_loss bursts are shorter than 2 packets, 2"),
         ("burst: {loss: 5 %, mean_bad: 1 s, dwell: {alpha: 2, max: 1 s}}", "dwell.max: not above mean_bad, '1 s'"),
+        ("jitter: {shape: pareto, mean: 51 ms, max: 100 ms}", "jitter.mean: above half of max, 100 ms, '51 ms'"),
+        ("jitter: {shape: pareto, mean: 6 s}", "jitter.mean: above half of max, 10 s, '6 s'"),
         ("markov4: {p13: 60 %, p31: 50 %, p14: 41 %}", "p14: more than 100 % with p13, '41 %'"),
         ("markov4: {p13: 6 %, p31: 80 %, p32: 21 %}", "p32: more than 100 % with p31, '21 %'"),
     ],
 )
-def test_a_model_of_bursts_that_there_is_not(settings: str, problem: str) -> None:
+def test_settings_that_do_not_go_together(settings: str, problem: str) -> None:
     with pytest.raises(DeploymentError) as caught:
         load_deployment(apply_sets(TEXT, "t", [f"network.links=[{{id: l, between: ['*', '*'], {settings}}}]"]), "t")
     assert problem in str(caught.value)
@@ -37,6 +39,7 @@ def test_a_model_of_bursts_that_there_is_not(settings: str, problem: str) -> Non
         "burst: {loss: 50 %, mean_burst: 1}",
         "burst: {loss: 5 %, mean_burst: 1.99, bad_loss: 50 %}",
         "burst: {loss: 5 %, mean_bad: 1 s, dwell: {alpha: 2, max: 2 s}}",
+        "jitter: {shape: pareto, mean: 50 ms, max: 100 ms}",
         "markov4: {p13: 60 %, p31: 50 %, p14: 40 %}",
     ],
 )
