@@ -31,7 +31,8 @@ class Link:
         via = (profile.radio,) if profile.radio else ()
         self._key = draw_key(fabric.seed, "link", source, destination, *via)
         self._version = -1
-        self._until_ns = -1
+        self._from_ns, self._until_ns = 0, -1
+        """Between these times the stages hold."""
         self._stages: list[Stage] = []
         self._draws = False
         self._slots = 0
@@ -40,20 +41,26 @@ class Link:
     def rule(self) -> str:
         return self.profile.rule
 
-    def settings_at(self, time_ns: int) -> tuple[Radio, int]:
-        """Return the link's settings at a time, and until when they hold."""
-        settings, until_ns = self.profile.settings, 2**62
+    def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
+        """Return the link's settings at a time, from when and until when they hold."""
+        settings, from_ns, until_ns = self.profile.settings, 0, 2**62
         for change in self._fabric.timeline.changes_of(self.rule, self.source, self.destination):
             if change.start_ns <= time_ns < change.end_ns:
                 settings = over(settings, change.changes)
-                until_ns = min(until_ns, change.end_ns)
-            elif change.start_ns > time_ns:
-                until_ns = min(until_ns, change.start_ns)
-        return settings, until_ns
+            for at_ns in (change.start_ns, change.end_ns):
+                if at_ns <= time_ns:
+                    from_ns = max(from_ns, at_ns)
+                else:
+                    until_ns = min(until_ns, at_ns)
+        return settings, from_ns, until_ns
 
-    def _renew(self, time_ns: int) -> None:
-        settings, self._until_ns = self.settings_at(time_ns)
-        self._version = self._fabric.timeline.version
+    def _turn_to(self, time_ns: int) -> None:
+        """Have the stages of a time: a packet is judged at arrival by the settings that it was sent with."""
+        version = self._fabric.timeline.version
+        if version == self._version and self._from_ns <= time_ns < self._until_ns:
+            return
+        self._version = version
+        settings, self._from_ns, self._until_ns = self.settings_at(time_ns)
         setup = self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
         self._slots = slots_of(settings, is_radio=setup.is_radio)
@@ -62,8 +69,7 @@ class Link:
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
         state = self.state
-        if flight.sent_ns >= self._until_ns or self._version != self._fabric.timeline.version:
-            self._renew(flight.sent_ns)
+        self._turn_to(flight.sent_ns)
         is_offered = flight.copy == 0
         state.offered += is_offered
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
@@ -84,8 +90,7 @@ class Link:
 
         `hindered` is why its receiver does not take it; empty when it does.
         """
-        if self._version != self._fabric.timeline.version:
-            self._renew(flight.sent_ns)
+        self._turn_to(flight.sent_ns)
         state, is_offered = self.state, flight.copy == 0
         for stage in self._stages:
             cause = stage.at_arrival(flight, hindered)
