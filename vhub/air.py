@@ -67,7 +67,8 @@ class Air:
         """Take a transmission: it spoils what is on air beside it."""
         self.state.on_air.append(known)
         for flight, of in self._flights:
-            _spoil(flight, known, of)
+            if not flight.cause:  # the inputs of a fate do not change behind it
+                _spoil(flight, known, of)
 
     def listen(self, flight: Flight, of: Propagation) -> None:
         """Take a packet on air, which those who are on air beside it spoil."""
