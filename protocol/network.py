@@ -18,7 +18,7 @@ from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
 from foosim.protocol.hosts import Name
 from foosim.protocol.impairments import Impairments, default
-from foosim.protocol.radios import Place, PresetName, Radio
+from foosim.protocol.radios import PresetName, Radio, Site
 from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity, custom_error
 
@@ -166,7 +166,7 @@ class Network(Part):
     radios: dict[Name, Radio] = Field(default={}, max_length=RADIOS_MAX)
     robots: dict[Selector, Annotated[list[Name], Field(max_length=16)]] = Field(default={}, max_length=LINK_RULES_MAX)
     """The radios of the endpoints that each selector matches; the first selector that matches is an endpoint's."""
-    places: dict[Selector, Place] = Field(default={}, max_length=LINK_RULES_MAX)
+    places: dict[Selector, Site] = Field(default={}, max_length=LINK_RULES_MAX)
     """Where endpoints without a body are (x, y, z in the world)."""
     links: list[LinkRule] = Field(default=[], max_length=LINK_RULES_MAX)
     events: list[Event] = Field(default=[], max_length=EVENTS_MAX)

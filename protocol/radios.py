@@ -22,6 +22,8 @@ Gain = Annotated[float, Quantity(units.GAIN, "-50 dBi", "60 dBi")]
 Level = Annotated[float, Quantity(units.LEVEL, "0 dB", "100 dB")]
 Offset = Annotated[float, Quantity(units.LENGTH, "-100 m", "100 m")]
 Place = Annotated[list[Offset], Field(min_length=3, max_length=3)]
+Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
+Site = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Distance = Annotated[float, Quantity(units.LENGTH, "1 mm", "100 km")]
 Spread = Annotated[int, Quantity(units.TIME, "1 ns", "60 s")]
 

@@ -22,7 +22,10 @@ settings.load_profile("foosim")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """What `make fuzz` chooses; by default the share of it that `make test` has."""
+    """What `make fuzz` and `make stats` choose; by default the share of them that `make test` has."""
+    parser.addoption("--links-seed", type=int, default=1, help="of the networks and packets of tests/links")
+    parser.addoption("--links-full", action="store_true", help="tests/links at full size, one failure in a million")
+    parser.addoption("--links-table", default="", help="the file that the figures of tests/links are written into")
     parser.addoption("--fuzz-payloads", type=int, default=100, help="payloads for each target of the fuzz tests")
     parser.addoption("--fuzz-seed", type=int, default=17, help="what the payloads are drawn from")
     parser.addoption("--fuzz-block", type=int, default=-1, help="bring the payloads of this block alone")
@@ -32,7 +35,9 @@ def pytest_report_header(config: pytest.Config) -> str:
     """The settings under which hypothesis runs, and the fuzz tests' seed, in the first lines of the output."""
     current = settings()
     seed, payloads = config.getoption("--fuzz-seed"), config.getoption("--fuzz-payloads")
-    return f"hypothesis: derandomize={current.derandomize}, deadline={current.deadline}; fuzz: {seed=}, {payloads=}"
+    links = f"links: seed={config.getoption('--links-seed')}, full={config.getoption('--links-full')}"
+    hypothesis = f"hypothesis: derandomize={current.derandomize}, deadline={current.deadline}"
+    return f"{hypothesis}; fuzz: {seed=}, {payloads=}; {links}"
 
 
 class WireTogether(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types

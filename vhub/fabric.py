@@ -95,9 +95,10 @@ class Fabric:
 
     def restore_flight(self, flight: Flight) -> None:
         """Take up a packet in flight of such a state: it may be on air."""
-        settings = self.network.radios.get(flight.radio)
-        if settings is not None and settings.medium not in ("none", "wired"):
-            self._air(flight.radio, settings).restore(flight, self._propagation(flight.radio, settings))
+        profile = self.profiles.find(flight.source, flight.destination, flight.channel)
+        settings, name = profile.settings, profile.radio or profile.rule
+        if settings.medium not in ("none", "wired"):
+            self._air(name, settings).restore(flight, self._propagation(name, settings))
 
     def setup(
         self, source: str, destination: str, profile: Profile, settings: Radio, key: bytes, memory: LinkState

@@ -32,7 +32,8 @@ class Link:
         via = (profile.radio,) if profile.radio else ()
         self._key = draw_key(fabric.seed, "link", source, destination, *via)
         self._version = -1
-        self._from_ns = self._until_ns = -1
+        self._from_ns, self._until_ns = 0, -1
+        """Between these times the stages hold."""
         self._stages: list[Stage] = []
         self._draws = False
         self._slots = 0
@@ -42,24 +43,25 @@ class Link:
         return self.profile.rule
 
     def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
-        """Return the link's settings at a time, from when on, and until when they hold."""
+        """Return the link's settings at a time, from when and until when they hold."""
         settings, from_ns, until_ns = self.profile.settings, 0, FOREVER_NS
         for change in self._fabric.timeline.changes_of(self.rule, self.source, self.destination):
             if change.start_ns <= time_ns < change.end_ns:
                 settings = over(settings, change.changes)
-            for edge_ns in (change.start_ns, change.end_ns):
-                if edge_ns <= time_ns:
-                    from_ns = max(from_ns, edge_ns)
+            for at_ns in (change.start_ns, change.end_ns):
+                if at_ns <= time_ns:
+                    from_ns = max(from_ns, at_ns)
                 else:
-                    until_ns = min(until_ns, edge_ns)
+                    until_ns = min(until_ns, at_ns)
         return settings, from_ns, until_ns
 
     def _turn_to(self, time_ns: int) -> None:
-        """Have the stages of a time: who judges then depends on nothing that happened on the link before."""
-        if self._version == self._fabric.timeline.version and self._from_ns <= time_ns < self._until_ns:
+        """Have the stages of a time: a packet is judged at arrival by the settings that it was sent with."""
+        version = self._fabric.timeline.version
+        if version == self._version and self._from_ns <= time_ns < self._until_ns:
             return
+        self._version = version
         settings, self._from_ns, self._until_ns = self.settings_at(time_ns)
-        self._version = self._fabric.timeline.version
         setup = self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
         self._slots = slots_of(settings, is_radio=setup.is_radio)
@@ -85,11 +87,11 @@ class Link:
         return True
 
     def arrive(self, flight: Flight, hindered: str) -> bool:
-        """Judge a packet at arrival by the settings of when it is due: True when it is delivered, False when dropped.
+        """Judge a packet at arrival: True when it is delivered, False when it is dropped.
 
         `hindered` is why its receiver does not take it; empty when it does.
         """
-        self._turn_to(flight.due_ns)
+        self._turn_to(flight.sent_ns)
         state, is_offered = self.state, flight.copy == 0
         for stage in self._stages:
             cause = stage.at_arrival(flight, hindered)
