@@ -7,6 +7,7 @@ that is walked), `fabric` (all links of a run, and what they share), `profiles` 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
@@ -14,7 +15,9 @@ from foosim.protocol.radios import Radio
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.profiles import Profile, over
+from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES, Stage
+from foosim.vhub.stages.delay import Delay
 
 if TYPE_CHECKING:
     from foosim.vhub.fabric import Fabric
@@ -31,7 +34,7 @@ class Link:
         via = (profile.radio,) if profile.radio else ()
         self._key = draw_key(fabric.seed, "link", source, destination, *via)
         self._version = -1
-        self._until_ns = -1
+        self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
         self._draws = False
         self._slots = 0
@@ -40,30 +43,48 @@ class Link:
     def rule(self) -> str:
         return self.profile.rule
 
-    def settings_at(self, time_ns: int) -> tuple[Radio, int]:
-        """Return the link's settings at a time, and until when they hold."""
-        settings, until_ns = self.profile.settings, 2**62
+    def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
+        """Return the link's settings at a time, and from when and until when they hold."""
+        settings, since_ns, until_ns = self.profile.settings, -1, 2**62
         for change in self._fabric.timeline.changes_of(self.rule, self.source, self.destination):
             if change.start_ns <= time_ns < change.end_ns:
                 settings = over(settings, change.changes)
-                until_ns = min(until_ns, change.end_ns)
-            elif change.start_ns > time_ns:
-                until_ns = min(until_ns, change.start_ns)
-        return settings, until_ns
+            for edge_ns in (change.start_ns, change.end_ns):
+                if edge_ns <= time_ns:
+                    since_ns = max(since_ns, edge_ns)
+                else:
+                    until_ns = min(until_ns, edge_ns)
+        return settings, since_ns, until_ns
 
-    def _renew(self, time_ns: int) -> None:
-        settings, self._until_ns = self.settings_at(time_ns)
+    def setup_at(self, time_ns: int) -> LinkSetup:
+        """Return what the link's stages are made from at a time."""
+        return self._setup(self.settings_at(time_ns)[0])
+
+    def _setup(self, settings: Radio) -> LinkSetup:
+        return self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
+
+    def _settle(self, time_ns: int) -> None:
+        """Have the stages of a time: made anew where settings have changed, or what is known of them."""
+        if self._version == self._fabric.timeline.version and self._since_ns <= time_ns < self._until_ns:
+            return
+        settings, self._since_ns, self._until_ns = self.settings_at(time_ns)
         self._version = self._fabric.timeline.version
-        setup = self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
+        setup = self._setup(settings)
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._draws = self._slots != 0
 
+    def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
+        """Clogs have changed: give packets on their way, in the order of sending, new due times."""
+        self._settle(now_ns)
+        for stage in self._stages:
+            if isinstance(stage, Delay):
+                stage.retime(flights, now_ns)
+
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
         state = self.state
-        if flight.sent_ns >= self._until_ns or self._version != self._fabric.timeline.version:
-            self._renew(flight.sent_ns)
+        self._settle(flight.sent_ns)
         is_offered = flight.copy == 0
         state.offered += is_offered
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
@@ -80,12 +101,12 @@ class Link:
         return True
 
     def arrive(self, flight: Flight, hindered: str) -> bool:
-        """Judge a packet at arrival: True when it is delivered, False when it is dropped.
+        """Judge a packet at arrival, by the settings of when it was sent: whatever was sent on the link meanwhile.
 
-        `hindered` is why its receiver does not take it; empty when it does.
+        True when it is delivered, False when it is dropped. `hindered` is why its receiver does not take it; empty when
+        it does.
         """
-        if self._version != self._fabric.timeline.version:
-            self._renew(flight.sent_ns)
+        self._settle(flight.sent_ns)
         state, is_offered = self.state, flight.copy == 0
         for stage in self._stages:
             cause = stage.at_arrival(flight, hindered)

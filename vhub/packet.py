@@ -85,6 +85,8 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Whether it was acknowledged: nothing that is sent later spoils it."""
     is_spoiled: bool = False
     """Whether something else on air meanwhile was too strong for it to survive (LoRa)."""
+    held_ns: int = 0
+    """For how long clogs put off its due time."""
     outcome: str = ""
     """What the medium found out and the channel says, at sending; empty when it came through."""
 

@@ -178,6 +178,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     retries: Counter = 0
     is_bad: bool = False
     bits_flipped: Counter = 0
+    held_ns: Counter = 0
 
 
 class SubscriptionRow(Row, frozen=True):
@@ -384,6 +385,7 @@ def _inputs(flight: Flight) -> tuple[Any, ...]:
         flight.retries,
         flight.is_bad,
         flight.bits_flipped,
+        flight.held_ns,
     )
 
 
