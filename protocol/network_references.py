@@ -206,8 +206,6 @@ def event_findings(
     for key in ("for", "until") if action not in _LASTING else ():
         if key in event:
             yield Finding((*location, key), f"{action} happens at once", key, at="key")
-    if action == "chaos" and "for" not in event and "until" not in event:
-        yield Finding((*location, "until"), "missing key: chaos needs an end (until or for)", "until", at="missing")
     yield from _ends(view, location)
     if action == "chaos":
         yield from _chaos(view, location)
@@ -226,7 +224,9 @@ def event_findings(
 
 
 def _chaos(view: View, location: Location) -> Iterator[Finding]:
-    """Chaos is short enough for all its partitions to be known beforehand."""
+    """Chaos has an end, and is short enough for all its partitions to be known beforehand."""
+    if view.get(*location, "for") is None and view.get(*location, "until") is None:
+        yield Finding((*location, "until"), "missing key: chaos needs an end (until or for)", "until", at="missing")
     random, at = view.get(*location, "for", "exponential"), view.get(*location, "at")
     for key in ("for", "until"):
         try:

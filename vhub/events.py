@@ -96,11 +96,11 @@ class Timeline:
         self._compile()
 
     def _compile(self) -> None:
-        """Walk back through time, so that the next heal of each kind is known; of one moment the later entry is last."""
+        """Walk back through time, so that the next heal of each kind is known; at one moment the last entry is last."""
         self.version += 1
         self.cuts, self.holds, self.settings, self.chaos = [], [], [], []
         heals: dict[str, int] = {}
-        for event, purpose in reversed(sorted(self._events, key=lambda of: of[0].at_ns)):
+        for event, purpose in sorted(self._events, key=lambda of: of[0].at_ns)[::-1]:
             if event.heal is not None:
                 heals |= dict.fromkeys(HEALED if event.heal == "all" else (event.heal,), event.at_ns)
             else:
