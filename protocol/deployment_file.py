@@ -10,7 +10,6 @@ line are placed in the same tree first: settings.py.
 """
 
 import codecs
-import re
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import chain, islice
@@ -21,9 +20,9 @@ from pydantic import ValidationError
 
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import DeploymentError, describe, show
+from foosim.protocol.errors import DeploymentError, describe
 from foosim.protocol.network_references import check_network
-from foosim.protocol.references import Finding, Location, check_references
+from foosim.protocol.references import Finding, check_references, path_text
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.settings import place_sets
 from foosim.protocol.yaml_tree import (
@@ -45,8 +44,6 @@ PROBLEMS_MAX: Final = 100
 """How many problems are looked for and shown: a hostile file may hold many thousands, each with names to compare."""
 DEPLOYMENTS_KEPT: Final = 16
 """Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time."""
-
-_PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
 
 
 @lru_cache(maxsize=DEPLOYMENTS_KEPT)
@@ -163,20 +160,8 @@ def _report(found: Sequence[Problem]) -> list[str]:
 def _problem(tree: Tree, finding: Finding) -> Problem:
     location = finding.location if finding.at == "value" else finding.location[:-1]
     text = describe(finding.what, finding.value, finding.nearest)
-    path = _path(location)
+    path = path_text(location)
     return Problem(_place(tree, finding), f"{path}: {text}" if path else text)
-
-
-def _path(location: Location) -> str:
-    """`nodes.red.robots[1]`."""
-    text = ""
-    for step in location:
-        if isinstance(step, int):
-            text += f"[{step}]"
-        else:
-            name = step if _PLAIN_KEY.fullmatch(step) else show(step)
-            text += f".{name}" if text else name
-    return text
 
 
 def _place(tree: Tree, finding: Finding) -> Place:

@@ -17,6 +17,7 @@ from foosim.protocol.presets import PRESETS, preset_settings
 from foosim.protocol.references import Finding, Location, View, quoted
 
 JITTER_RATIO_MAX: Final = 100
+CHAOS_NS_MAX: Final = 3_600_000_000_000
 BODILESS: Final = "camera"
 """The model of robots that have no body."""
 _LASTING: Final = ("partition", "clog", "chaos")
@@ -259,9 +260,9 @@ def event_findings(
     for key in ("for", "until") if action not in _LASTING else ():
         if key in event:
             yield Finding((*location, key), f"{action} happens at once", key, at="key")
-    if action == "chaos" and "for" not in event and "until" not in event:
-        yield Finding((*location, "until"), "missing key: chaos needs an end (until or for)", "until", at="missing")
     yield from _ends(view, location)
+    if action == "chaos":
+        yield from _chaos(view, location)
     if action == "partition":
         groups = view.get(*location, "partition")
         for index in range(len(groups) if isinstance(groups, list) else 0):
@@ -274,6 +275,21 @@ def event_findings(
         yield Finding((*location, "set", "link"), "unknown link rule", link, quoted(nearest_name(link, links)))
     if view.mapping(*location, "set"):
         yield from _impairments(view, (*location, "set"))
+
+
+def _chaos(view: View, location: Location) -> Iterator[Finding]:
+    """Chaos has an end, and is short enough for all its partitions to be known beforehand."""
+    if view.get(*location, "for") is None and view.get(*location, "until") is None:
+        yield Finding((*location, "until"), "missing key: chaos needs an end (until or for)", "until", at="missing")
+    random, at = view.get(*location, "for", "exponential"), view.get(*location, "at")
+    for key in ("for", "until"):
+        try:
+            lasts_ns = units.parse_ns(random if key == "for" and random is not None else view.get(*location, key))
+            lasts_ns -= 0 if key == "for" or at is None else units.parse_ns(at)
+        except BadValue:
+            continue
+        if lasts_ns > CHAOS_NS_MAX:
+            yield Finding((*location, key), "chaos of more than 1 h", view.get(*location, key))
 
 
 def _ends(view: View, location: Location) -> Iterator[Finding]:

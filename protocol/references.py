@@ -5,6 +5,7 @@ one go: whatever is missing or malformed is passed over here, since the schema r
 findings into lines with places; what concerns the network is in network_references.py.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -12,13 +13,15 @@ from fractions import Fraction
 from typing import Any, Final, Literal
 
 from foosim.protocol import names, units
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, show
 from foosim.protocol.names import LINE_NAMES, nearest_name
 
 Location = tuple[str | int, ...]
 
 # Bounds of what is looked at; what is beyond them, the schema refuses.
 TEXTS_MAX: Final = 4096
+
+_PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,18 @@ def check_references(data: object) -> Iterator[Finding]:
 
 def quoted(nearest: str | None) -> str | None:
     return None if nearest is None else repr(nearest)
+
+
+def path_text(location: Location) -> str:
+    """A location as messages print it: `nodes.red.robots[1]`."""
+    text = ""
+    for step in location:
+        if isinstance(step, int):
+            text += f"[{step}]"
+        else:
+            name = step if _PLAIN_KEY.fullmatch(step) else show(step)
+            text += f".{name}" if text else name
+    return text
 
 
 class View:

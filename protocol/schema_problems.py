@@ -44,17 +44,21 @@ _BOOLEANS: Final = {"on": "true", "yes": "true", "off": "false", "no": "false"}
 _CONSEQUENCES: Final = frozenset({"default_factory_not_called"})
 
 
-def schema_findings(error: ValidationError) -> Iterator[Finding]:
-    """One finding for each of pydantic's errors, worked out as they are asked for."""
+def schema_findings(error: ValidationError, under: Location = ()) -> Iterator[Finding]:
+    """One finding for each of pydantic's errors, worked out as they are asked for.
+
+    `under` is where in a deployment the part stands that was checked.
+    """
     details = error.errors(include_url=False)
-    return (_finding(detail) for detail in details if detail["type"] not in _CONSEQUENCES)
+    return (_finding(detail, under) for detail in details if detail["type"] not in _CONSEQUENCES)
 
 
-def _finding(detail: ErrorDetails) -> Finding:
+def _finding(detail: ErrorDetails, under: Location) -> Finding:
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    location, schema, is_key = _follow(detail["loc"])
+    path = (*under, *detail["loc"])
+    location, schema, is_key = _follow(path)
     if kind == "extra_forbidden":
-        return _unknown(location, _follow(detail["loc"][:-1])[1])
+        return _unknown(location, _follow(path[:-1])[1])
     translate = _TRANSLATIONS.get(kind)
     if translate is not None:
         finding = translate(location, schema, value, context)

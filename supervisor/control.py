@@ -200,6 +200,11 @@ def push(impulse: Vector, name: str = "ball", run: str | None = None) -> Answer:
     return _ask(run, "push", impulse=impulse, name=name)
 
 
+def network(event: dict[str, Any], run: str | None = None) -> Answer:
+    """Have something happen to the network: an event of a deployment without its time."""
+    return _ask(run, "network", event=event)
+
+
 def _check_finite(what: str, numbers: Iterable[float]) -> None:
     """Raise BadValue for a number that JSON cannot say."""
     for number in numbers:

@@ -23,7 +23,7 @@ def control_of(core: SupervisorCore) -> Control:
     """Return what people have set."""
     pacer = core.pacer
     people = sorted(core.roster.stopped), dict(core.recovery.returns), dict(core.roster.starts)
-    return Control(str(pacer.pace), pacer.paused, pacer.granted, core.stop_at, *people)
+    return Control(str(pacer.pace), pacer.paused, pacer.granted, core.stop_at, *people, core.requests.disruptions)
 
 
 def head_of(core: SupervisorCore) -> bytes:
@@ -70,7 +70,7 @@ def stand_on(core: SupervisorCore, history: History) -> None:
     core.roster.stopped, core.roster.starts = set(control.stopped), dict(control.starts)
     core.recovery.recovered, core.recovery.returns = history.recovered, dict(control.returns)
     core.branches.number, core.branches.tick = history.branch
-    core.requests.resume(history.edits, history.answers, history.issued)
+    core.requests.resume(history.edits, history.answers, history.issued, control.disruptions)
 
 
 def stand_at(core: SupervisorCore, frame: Frame, chain: bytes, commit: bytes) -> None:

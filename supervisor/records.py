@@ -44,7 +44,8 @@ class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_
 
 class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbid_unknown_fields=True):
     """What people have set, as it is now; `granted` is the tick up to which `step` allows, `returns` says which node
-    gets a robot back that was adopted, `starts` how often somebody asked for a node to be started."""
+    gets a robot back that was adopted, `starts` how often somebody asked for a node to be started, `disruptions` how
+    often for something to happen to the network."""
 
     pace: str
     paused: bool
@@ -53,6 +54,7 @@ class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbi
     stopped: list[str]
     returns: dict[str, str]
     starts: dict[str, int]
+    disruptions: int = 0
 
 
 class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request", forbid_unknown_fields=True):

@@ -1,10 +1,10 @@
-"""What people ask of a running system: pause, resume, step, rate, add, remove, move, push,
+"""What people ask of a running system: pause, resume, step, rate, add, remove, move, push, network,
 stop and start (a node), down, status.
 
 A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push at the
-first tick not yet released, add and remove at the first not yet released when all nodes are ready for it, a move at the
-last commit, with its epoch. It is journalled when its tick is chosen, then answered. To add a verb: a method and a row.
-Neighbours: `core`, `status` (what `status` answers).
+first tick not yet released, network with what is sent at the one behind it, add and remove at the first not yet
+released when all nodes are ready for it, a move at the last commit, with its epoch. It is journalled when its tick is
+chosen, then answered. To add a verb: a method and a row. Neighbours: `core`, `status` (what `status` answers).
 """
 
 from __future__ import annotations
@@ -19,8 +19,10 @@ from foosim.protocol.codec import decode_json, encode, encode_json
 from foosim.protocol.errors import Malformed, Refused, show
 from foosim.protocol.frame import layout_after
 from foosim.protocol.layout import BALL, Layout
-from foosim.protocol.messages import Add, Answer, Edit, Push, Remove, Request
+from foosim.protocol.messages import Add, Answer, Disrupt, Edit, Push, Remove, Request
 from foosim.protocol.names import NAME_RULE, is_name, nearest_name
+from foosim.protocol.network import EVENTS_MAX, event_of
+from foosim.protocol.network_request import event_text, told
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.issued import Issued
 from foosim.supervisor.records import OrderedRecord, RequestRecord
@@ -59,6 +61,8 @@ class Requests:
         self._pending: list[_Waiting] = []
         self._edits: dict[int, list[Edit]] = {}
         self.issued = Issued()
+        self.disruptions = 0
+        """Events of the network that were asked for."""
         self._verbs: dict[str, Callable[[Request, dict[str, Any], int], Answer | None]] = {
             "status": self._status,
             "pause": self._pause,
@@ -69,6 +73,7 @@ class Requests:
             "remove": self._remove,
             "move": self._move,
             "push": self._push,
+            "network": self._network,
             "stop": self._stop_node,
             "start": self._start_node,
             "down": self._down,
@@ -109,10 +114,11 @@ class Requests:
     def _refuse(self, request: Request, why: str) -> Answer:
         """Journal a refusal as well: asked again, a supervisor that was started again might see it otherwise."""
         answer = Answer(request.sender, request.id, False, self._core.released, why[:TEXT_MAX], b"{}")
-        return self._keep(self._write(answer, [], self._core.owners))
+        return self._keep(self._write(answer, answer.tick, [], self._core.owners))
 
-    def _write(self, answer: Answer, edits: list[Edit], owners: dict[str, str]) -> Answer:
-        record = RequestRecord(answer.tick, edits, answer, self._core.control(), owners)
+    def _write(self, answer: Answer, tick: int, edits: list[Edit], owners: dict[str, str]) -> Answer:
+        """Journal an answer and what is added to the order of `tick`."""
+        record = RequestRecord(tick, edits, answer, self._core.control(), owners)
         self._core.actions.append(Journal(encode(record)))
         return answer
 
@@ -136,10 +142,14 @@ class Requests:
         text: str,
         edits: list[Edit] | None = None,
         owners: dict[str, str] | None = None,
+        effective: int | None = None,
     ) -> Answer:
-        """Journal a request whose tick is chosen, with all that it does, and keep its answer."""
-        answer = Answer(request.sender, request.id, True, tick, text, b"{}")
-        self._write(answer, edits or [], owners or self._core.owners)
+        """Journal a request whose tick is chosen, with all that it does, and keep its answer.
+
+        `effective` is the tick that the answer names, where that is not the one whose order has the edits.
+        """
+        answer = Answer(request.sender, request.id, True, tick if effective is None else effective, text, b"{}")
+        self._write(answer, tick, edits or [], owners or self._core.owners)
         if edits:
             self.issued.add(tick, edits)
             self._edits.setdefault(tick, []).extend(edits)
@@ -168,9 +178,11 @@ class Requests:
         """Return what requests add to ticks that are not released yet."""
         return [edit for tick in sorted(self._edits) for edit in self._edits[tick]]
 
-    def resume(self, edits: dict[int, list[Edit]], answers: dict[tuple[str, str], Answer], issued: Issued) -> None:
+    def resume(
+        self, edits: dict[int, list[Edit]], answers: dict[tuple[str, str], Answer], issued: Issued, disruptions: int
+    ) -> None:
         """Take what a journal says of requests; of answers the last ones, as many as are kept."""
-        self._edits, self.issued = edits, issued
+        self._edits, self.issued, self.disruptions = edits, issued, disruptions
         self._answers = dict(list(answers.items())[-ANSWERS_KEPT:])
 
     def set_back(self, tick: int) -> None:
@@ -284,10 +296,32 @@ class Requests:
         impulse = _vector(arguments, "impulse", None)
         if sum(value * value for value in impulse) > IMPULSE_MAX**2:
             raise Refused(f"impulse {impulse} is above {IMPULSE_MAX} N s")
+        tick = self._tick_for_edit()
+        return self._accept(request, tick, f"{name} pushed at tick {tick}", [Push(name, impulse)])
+
+    def _tick_for_edit(self) -> int:
+        """Return the first tick that is not released; raises Refused when its order is full."""
         tick = self._core.released
         if len(self._edits.get(tick, ())) >= limits.ENTITIES_MAX - PENDING_MAX:
             raise Refused(f"tick {tick} has {len(self._edits[tick])} edits already")
-        return self._accept(request, tick, f"{name} pushed at tick {tick}", [Push(name, impulse)])
+        return tick
+
+    def _network(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        """What the order of a tick says of the network holds for the frame behind it, and for what is sent from it."""
+        tick = self._tick_for_edit()
+        effective, deployment = tick + 1, self._core.deployment
+        text = event_text(deployment, arguments.get("event"), effective * deployment.tick_ns)
+        if self.disruptions >= EVENTS_MAX:
+            raise Refused(f"{EVENTS_MAX} events were asked for already")
+        self.disruptions += 1
+        event = event_of(text, effective * deployment.tick_ns)
+        what = f"{told(event)} from tick {effective} on" if event.heal is None else f"{told(event)} at tick {effective}"
+        return self._accept(request, tick, what, [Disrupt(text)], effective=effective)
+
+    def network_events(self) -> list[tuple[int, str]]:
+        """Return what was asked of the network at the last ticks at which something was: the tick, the event."""
+        by_tick = sorted(self.issued.by_tick.items())
+        return [(tick + 1, edit.event) for tick, edits in by_tick for edit in edits if isinstance(edit, Disrupt)]
 
     def _move(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         core = self._core

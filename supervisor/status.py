@@ -6,9 +6,10 @@ Neighbours: `requests` answers with it, `display` shows it, `up` prints the resu
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.codec import decode_json
 from foosim.protocol.hosts import places
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ class SupervisorStatistics:
     diverged: int
 
 
+DISRUPTIONS_SHOWN: Final = 16
+"""Events of the network that a status has, the last that were asked for."""
 NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0}
 NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
 
@@ -94,6 +97,13 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "processes": _processes(core, waiting_for),
         "starts": dict(core.roster.starts),
         "links": report.get("links", []),
+        "disruptions": {
+            "asked": core.requests.disruptions,
+            "last": [
+                {"tick": tick, "event": decode_json(text.encode())}
+                for tick, text in core.requests.network_events()[-DISRUPTIONS_SHOWN:]
+            ],
+        },
         "refusals": report.get("refusals", {}),
         "clients": report.get("clients", []),
     }

@@ -8,7 +8,7 @@ What lasts ends at the next `heal` at the latest. Neighbours: `stages.policy` (p
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,6 +19,8 @@ from foosim.vhub.chaos import chaos_settings, clogs_of_chaos, partitions_of_chao
 from foosim.vhub.numbers import exponential_ns
 
 FOREVER_NS: Final = 2**62
+HEALED: Final = ("partitions", "clogs", "chaos", "settings")
+"""What `heal` ends by kind; `all` is each of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +81,6 @@ class Timeline:
         self._events = [(event, f"event {number}") for number, event in enumerate(network.events)]
         """Each with what its draws are for: the same, whatever is added."""
         self._asked = 0
-        self._heals: list[tuple[int, Event]] = []
-        """Heals, with their place in the order of events."""
         self.cuts: list[Cut] = []
         self.holds: list[Hold] = []
         self.settings: list[Settings] = []
@@ -96,36 +96,38 @@ class Timeline:
         self._compile()
 
     def _compile(self) -> None:
+        """Walk back through time, so that the next heal of each kind is known; at one moment the last entry is last."""
         self.version += 1
         self.cuts, self.holds, self.settings, self.chaos = [], [], [], []
-        ordered = sorted(self._events, key=lambda of: of[0].at_ns)
-        self._heals = [(place, event) for place, (event, _) in enumerate(ordered) if event.heal is not None]
-        for place, (event, purpose) in enumerate(ordered):
-            self._take(place, event, draw_key(self._seed, "network", purpose))
+        heals: dict[str, int] = {}
+        for event, purpose in sorted(self._events, key=lambda of: of[0].at_ns)[::-1]:
+            if event.heal is not None:
+                heals |= dict.fromkeys(HEALED if event.heal == "all" else (event.heal,), event.at_ns)
+            else:
+                self._take(event, draw_key(self._seed, "network", purpose), heals)
+        for line in (self.cuts, self.holds, self.settings, self.chaos):
+            line.reverse()
 
-    def _take(self, place: int, event: Event, key: bytes) -> None:
+    def _take(self, event: Event, key: bytes, heals: Mapping[str, int]) -> None:
         start_ns, end_ns = event.at_ns, _end_ns(event, key)
+
+        def healed(what: str) -> int:
+            return min(end_ns, heals.get(what, FOREVER_NS))
+
         if event.partition is not None:
-            healed_ns = self._healed("partitions", place, end_ns)
-            self.cuts.append(Cut(start_ns, healed_ns, self._groups(event.partition), event.symmetric))
+            self.cuts.append(Cut(start_ns, healed("partitions"), self._groups(event.partition), event.symmetric))
         elif event.clog is not None:
             ends = self._selected(event.clog.from_), self._selected(event.clog.to)
-            self.holds.append(Hold(start_ns, self._healed("clogs", place, end_ns), *ends))
+            self.holds.append(Hold(start_ns, healed("clogs"), *ends))
         elif event.set is not None:
-            until_ns = self._healed("settings", place, FOREVER_NS)
-            self.settings.append(Settings(start_ns, until_ns, event.set.link, event.set))
+            self.settings.append(Settings(start_ns, healed("settings"), event.set.link, event.set))
         elif event.chaos is not None:
             among = self._selected(event.chaos.among)
-            chaos = ChaosTime(start_ns, self._healed("chaos", place, end_ns), key, among)
+            chaos = ChaosTime(start_ns, healed("chaos"), key, among)
             self.chaos.append(chaos)
             self.settings.append(Settings(start_ns, chaos.end_ns, "", chaos_settings(key), among))
             for begin_ns, stop_ns, group, both in partitions_of_chaos(key, start_ns, chaos.end_ns, sorted(among)):
                 self.cuts.append(Cut(begin_ns, stop_ns, (group, among - group), both))
-
-    def _healed(self, what: str, place: int, end_ns: int) -> int:
-        """Return when it ends: by itself, or by the first heal behind the event at `place`."""
-        heals = (heal.at_ns for where, heal in self._heals if where > place and heal.heal in ("all", what))
-        return min(end_ns, next(heals, FOREVER_NS))
 
     def _selected(self, globs: Sequence[str]) -> frozenset[str]:
         return frozenset(name for name in self._endpoints if selects(globs, name))
@@ -148,6 +150,11 @@ class Timeline:
     def cuts_of(self, source: str, destination: str) -> list[tuple[int, int]]:
         """Return the times in which the link is cut, by start."""
         return sorted((cut.start_ns, cut.end_ns) for cut in self.cuts if cut.parts(source, destination))
+
+    @property
+    def has_holds(self) -> bool:
+        """Whether there ever is a clog."""
+        return bool(self.holds or self.chaos)
 
     def holds_of(self, source: str, destination: str) -> list[tuple[int, int]]:
         """Return the times in which the link is clogged, by start."""

@@ -7,6 +7,7 @@ that is walked), `fabric` (all links of a run, and what they share), `profiles` 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
@@ -15,7 +16,9 @@ from foosim.vhub.events import FOREVER_NS
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.profiles import Profile, over
+from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES, Stage
+from foosim.vhub.stages.delay import Delay
 
 if TYPE_CHECKING:
     from foosim.vhub.fabric import Fabric
@@ -32,8 +35,7 @@ class Link:
         via = (profile.radio,) if profile.radio else ()
         self._key = draw_key(fabric.seed, "link", source, destination, *via)
         self._version = -1
-        self._from_ns, self._until_ns = 0, -1
-        """Between these times the stages hold."""
+        self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
         self._draws = False
         self._slots = 0
@@ -43,34 +45,47 @@ class Link:
         return self.profile.rule
 
     def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
-        """Return the link's settings at a time, from when and until when they hold."""
-        settings, from_ns, until_ns = self.profile.settings, 0, FOREVER_NS
+        """Return the link's settings at a time, and from when and until when they hold."""
+        settings, since_ns, until_ns = self.profile.settings, -1, FOREVER_NS
         for change in self._fabric.timeline.changes_of(self.rule, self.source, self.destination):
             if change.start_ns <= time_ns < change.end_ns:
                 settings = over(settings, change.changes)
-            for at_ns in (change.start_ns, change.end_ns):
-                if at_ns <= time_ns:
-                    from_ns = max(from_ns, at_ns)
+            for edge_ns in (change.start_ns, change.end_ns):
+                if edge_ns <= time_ns:
+                    since_ns = max(since_ns, edge_ns)
                 else:
-                    until_ns = min(until_ns, at_ns)
-        return settings, from_ns, until_ns
+                    until_ns = min(until_ns, edge_ns)
+        return settings, since_ns, until_ns
 
-    def _turn_to(self, time_ns: int) -> None:
-        """Have the stages of a time: a packet is judged at arrival by the settings that it was sent with."""
-        version = self._fabric.timeline.version
-        if version == self._version and self._from_ns <= time_ns < self._until_ns:
+    def setup_at(self, time_ns: int) -> LinkSetup:
+        """Return what the link's stages are made from at a time."""
+        return self._setup(self.settings_at(time_ns)[0])
+
+    def _setup(self, settings: Radio) -> LinkSetup:
+        return self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
+
+    def _settle(self, time_ns: int) -> None:
+        """Have the stages of a time: made anew where settings have changed, or what is known of them."""
+        if self._version == self._fabric.timeline.version and self._since_ns <= time_ns < self._until_ns:
             return
-        self._version = version
-        settings, self._from_ns, self._until_ns = self.settings_at(time_ns)
-        setup = self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
+        settings, self._since_ns, self._until_ns = self.settings_at(time_ns)
+        self._version = self._fabric.timeline.version
+        setup = self._setup(settings)
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._draws = self._slots != 0
 
+    def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
+        """Clogs have changed: give packets on their way, in the order of sending, new due times."""
+        self._settle(now_ns)
+        for stage in self._stages:
+            if isinstance(stage, Delay):
+                stage.retime(flights, now_ns)
+
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
         state = self.state
-        self._turn_to(flight.sent_ns)
+        self._settle(flight.sent_ns)
         is_offered = flight.copy == 0
         state.offered += is_offered
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
@@ -87,11 +102,12 @@ class Link:
         return True
 
     def arrive(self, flight: Flight, hindered: str) -> bool:
-        """Judge a packet at arrival: True when it is delivered, False when it is dropped.
+        """Judge a packet at arrival, by the settings of when it was sent: whatever was sent on the link meanwhile.
 
-        `hindered` is why its receiver does not take it; empty when it does.
+        True when it is delivered, False when it is dropped. `hindered` is why its receiver does not take it; empty when
+        it does.
         """
-        self._turn_to(flight.sent_ns)
+        self._settle(flight.sent_ns)
         state, is_offered = self.state, flight.copy == 0
         for stage in self._stages:
             cause = stage.at_arrival(flight, hindered)

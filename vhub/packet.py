@@ -76,6 +76,8 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     is_bad: bool = False
     """Whether the link was in a bad time."""
     bits_flipped: int = 0
+    mangled: bytes = b""
+    """The payload as it arrives, where bits are flipped; what was offered stays."""
     air_start_ns: int = 0
     air_end_ns: int = 0
     """When it was on air the last time; others who are on air between may spoil it."""
@@ -85,8 +87,15 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Whether it was acknowledged: nothing that is sent later spoils it."""
     is_spoiled: bool = False
     """Whether something else on air meanwhile was too strong for it to survive (LoRa)."""
+    held_ns: int = 0
+    """For how long clogs put off its due time."""
     outcome: str = ""
     """What the medium found out and the channel says, at sending; empty when it came through."""
+
+
+def content_of(flight: Flight) -> bytes:
+    """Return the payload as it arrives."""
+    return flight.mangled or flight.payload
 
 
 def size_of(flight: Flight) -> int:

@@ -162,6 +162,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     airtime_ns: Counter = 0
     propagation_ns: Counter = 0
     jitter_ns: Counter = 0
+    held_ns: Counter = 0
     is_bad: bool = False
     bits_flipped: Counter = 0
     rate_bps: Counter = 0
@@ -357,6 +358,7 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.airtime_ns,
         flight.propagation_ns,
         flight.jitter_ns,
+        flight.held_ns,
         flight.is_bad,
         flight.bits_flipped,
         flight.rate_bps,

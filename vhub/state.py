@@ -21,8 +21,9 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Delivered, Deliveries, Disrupt, Edit, Epoch, Received, RobotPacket, Sent
 from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.fabric import Fabric
+from foosim.vhub.links import Link
 from foosim.vhub.memory import AirState, LinkState, RadioState
-from foosim.vhub.packet import Flight
+from foosim.vhub.packet import Flight, content_of
 from foosim.vhub.room import Room
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
 
@@ -176,9 +177,9 @@ class HubState:
         assert tick == self.closed + 1, (tick, self.closed)
         sent_ns = tick * self.tick_ns
         self.fabric.turn_to(frame)
-        for edit in edits:
-            if isinstance(edit, Disrupt):
-                self.fabric.take(tick, sent_ns, edit.event)
+        disruptions = [edit.event for edit in edits if isinstance(edit, Disrupt)]
+        if disruptions:
+            self._disrupt(tick, disruptions)
         for packet in packets:
             sequence = (tick << OUTBOX_SHIFT) + packet.index
             for receiver in self._addressed(packet.robot, packet.destination, packet.channel):
@@ -239,6 +240,8 @@ class HubState:
         members = [member for member in self.members.values() if member.active]
         if any(member.period == 0 for member in members):
             return 0
+        if self._is_clogged(tick):
+            return 0
         if are_answered(self.deliveries[tick]) or are_answered(self.deliveries[tick + 1]):
             return 0
         for following in range(limits.RELEASE_AHEAD):
@@ -248,6 +251,13 @@ class HubState:
             if any(flight.destination in self._robots for flight in self._flights.get(arrival, ())):
                 return following
         return limits.RELEASE_AHEAD
+
+    def _is_clogged(self, tick: int) -> bool:
+        """Whether a clog holds something back from a robot: a heal may let it go at any tick."""
+        if not self.fabric.timeline.has_holds:
+            return False
+        flights = (flight for arrival, those in self._flights.items() if arrival > tick for flight in those)
+        return any(flight.held_ns > 0 and flight.destination in self._robots for flight in flights)
 
     def _admit(self, source: str, sent: Sent) -> bool:
         """Refuse at the door what is no packet of this run: a repeat, or to nobody."""
@@ -287,22 +297,50 @@ class HubState:
         return self._receivers.get((source, channel), ())
 
     def _send(self, flight: Flight, tick: int, fates: list[Flight]) -> None:
-        is_offered, payload = flight.copy == 0, flight.payload
+        is_offered = flight.copy == 0
         self.packets.offered += is_offered
         if not self.fabric.link(flight.source, flight.destination, flight.channel).send(flight):
             self.packets.dropped += is_offered
             fates.append(flight)
             return
-        self._let_fly(flight, tick)
+        is_sensed = flight.source in self._robots and flight.destination in self.members
+        self._let_fly(flight, tick if is_sensed else tick + 1)
         if flight.is_doubled:
             self.packets.copies += 1
-            what = flight.sequence, flight.sent_ns, flight.stamp_ns, payload, flight.published
+            what = flight.sequence, flight.sent_ns, flight.stamp_ns, flight.payload, flight.published
             twin = Flight(flight.source, flight.destination, flight.channel, *what, copy=1)
             self._send(twin, tick, fates)
 
-    def _let_fly(self, flight: Flight, tick: int) -> None:
+    def _disrupt(self, tick: int, events: Sequence[str]) -> None:
+        """Take what was asked of the network; clogs that come or go by it move what is on its way."""
+        timeline, now_ns = self.fabric.timeline, tick * self.tick_ns
+        flights = self.in_flight()
+        pairs = sorted({(flight.source, flight.destination) for flight in flights})
+        before = {pair: timeline.holds_of(*pair) for pair in pairs}
+        for event in events:
+            self.fabric.take(tick, now_ns, event)
+        moved = {pair for pair in pairs if timeline.holds_of(*pair) != before[pair]}
+        if not moved:
+            return
+        on_links: dict[Link, list[Flight]] = {}
+        self._flights.clear()
+        for flight in sorted(flights, key=lambda flight: (flight.sequence, flight.copy)):
+            if (flight.source, flight.destination) in moved:
+                link = self.fabric.link(flight.source, flight.destination, flight.channel)
+                on_links.setdefault(link, []).append(flight)
+            else:
+                self._flights.setdefault(flight.arrival_tick, []).append(flight)
+        for link, those in on_links.items():
+            due_ns = [flight.due_ns for flight in those]
+            link.retime(those, now_ns)
+            for flight, before_ns in zip(those, due_ns, strict=True):
+                # What reaches robots at this tick is said already.
+                earliest = tick + (flight.destination in self._robots)
+                self._let_fly(flight, flight.arrival_tick if flight.due_ns == before_ns else earliest)
+
+    def _let_fly(self, flight: Flight, earliest: int) -> None:
+        """Have a packet arrive when it is due, at that tick at the earliest."""
         member = self.members.get(flight.destination)
-        earliest = tick if member is not None and flight.source in self._robots else tick + 1
         arrival = max(earliest, -(-flight.due_ns // self.tick_ns))
         if member is not None:
             arrival = member.release_tick(arrival)
@@ -370,7 +408,7 @@ class HubState:
                     flight.copy,
                     flight.destination,
                     flight.channel,
-                    flight.payload,
+                    content_of(flight),
                 )
             )
         return deliveries
@@ -431,7 +469,7 @@ class HubState:
 
 def received(flights: Iterable[Flight]) -> list[Received]:
     """Return flights as a client gets them."""
-    return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, f.payload) for f in flights]
+    return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, content_of(f)) for f in flights]
 
 
 def _order(flight: Flight) -> tuple[int, str, int, int, str]:

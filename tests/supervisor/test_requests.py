@@ -394,7 +394,7 @@ def test_the_same_id_of_another_is_another_request() -> None:
 
 GREAT: Final = 10**400
 BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
-    ("fly", {}, "no verb 'fly'; there are status, pause, resume, step, rate, add, remove, move, push, stop, start, "),
+    ("fly", {}, "no verb 'fly'; there are status, pause, resume, step, rate, add, remove, move, push, network, stop, start, "),
     ("step", {}, "count: a whole number from 1 to 1000000000 is needed, not null"),
     ("step", {"count": 0}, "not 0"),
     ("step", {"count": True}, "not true"),
@@ -502,6 +502,6 @@ def test_no_more_wait_for_engines_than_a_limit() -> None:
 def test_after_a_take_over_no_more_answers_are_kept_than_before() -> None:
     requests = Run().system.supervisor.requests
     answers = {("one", f"r{n}"): Answer("one", f"r{n}", True, n, "", b"") for n in range(ANSWERS_KEPT + 50)}
-    requests.resume({}, answers, Issued())
+    requests.resume({}, answers, Issued(), 0)
     kept = requests.journalled()[1]
     assert kept == list(answers.values())[-ANSWERS_KEPT:]

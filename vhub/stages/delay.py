@@ -1,10 +1,13 @@
 """Delay: queue, access, airtime and propagation, the constant delay, jitter, clogs; then the order of the link.
 
 Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo unless
-they say otherwise. Neighbours: `jitter` makes the table.
+they say otherwise. A clog that is asked for, or healed, while packets are on their way moves their due times: as if it
+had been known when they were sent. Neighbours: `jitter` makes the table.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from foosim.protocol.draws import Slot, chance_threshold
 from foosim.vhub.jitter import interpolate_ns, quantiles_ns
@@ -43,18 +46,47 @@ class Delay:
             due_ns += flight.jitter_ns
         if flight.is_bad:
             due_ns += self._bad_ns
+        if self._is_late(flight):
+            due_ns += self._extra_ns
+            flight.due_ns = self._held_ns(due_ns)
+        else:
+            flight.due_ns = self._in_order(self._held_ns(due_ns), self._memory.last_due_ns)
+            if self._fifo:
+                self._memory.last_due_ns = flight.due_ns
+        if self._holds:
+            flight.held_ns = flight.due_ns - due_ns
+        return ""
+
+    def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
+        """Give packets on their way, in the order of sending, the due times that the present clogs leave them.
+
+        What is due already and waits for its receiver's tick stays.
+        """
+        last_ns = -1
+        for flight in flights:
+            if flight.due_ns < now_ns:
+                continue
+            free_ns = flight.due_ns - flight.held_ns
+            flight.due_ns = self._held_ns(free_ns)
+            if not self._is_late(flight):
+                last_ns = flight.due_ns = self._in_order(flight.due_ns, last_ns)
+            flight.held_ns = flight.due_ns - free_ns
+        if self._fifo:
+            self._memory.last_due_ns = max(last_ns, min(self._memory.last_due_ns, now_ns))
+
+    def _is_late(self, flight: Flight) -> bool:
+        """Whether those behind it overtake it."""
+        return self._extra_ns > 0 and flight.words[Slot.REORDER] < self._reordered
+
+    def _held_ns(self, due_ns: int) -> int:
+        """Return when what would be due now is, for clogs."""
         for start_ns, end_ns in self._holds:
             if start_ns <= due_ns < end_ns:
                 due_ns = end_ns
-        if self._extra_ns and flight.words[Slot.REORDER] < self._reordered:
-            flight.due_ns = due_ns + self._extra_ns
-            return ""
-        if self._fifo:
-            memory = self._memory
-            due_ns = max(due_ns, memory.last_due_ns + 1)
-            memory.last_due_ns = due_ns
-        flight.due_ns = due_ns
-        return ""
+        return due_ns
+
+    def _in_order(self, due_ns: int, last_ns: int) -> int:
+        return max(due_ns, last_ns + 1) if self._fifo else due_ns
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:
         return ""

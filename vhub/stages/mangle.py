@@ -72,7 +72,7 @@ class Mangle:
         payload = bytearray(flight.payload)
         for place in places:
             payload[place >> 3] ^= 1 << (place & 7)
-        flight.payload, flight.bits_flipped = bytes(payload), count
+        flight.mangled, flight.bits_flipped = bytes(payload), count
 
     def _count(self, word: int, bits: int) -> int:
         """Return how many of the bits are flipped, given that the draw says that some are: the binomial law."""

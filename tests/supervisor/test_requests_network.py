@@ -1,0 +1,129 @@
+"""What is asked of the network of a running system: what is refused and why, what is answered, what status shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from foosim.protocol.codec import decode_json
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.messages import Answer
+from foosim.protocol.network import EVENTS_MAX, event_of
+from foosim.protocol.network_request import BadEvent, event_text, told
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings, System
+from foosim.vhub.records import Closing
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+LINK: Final = "network.links=[{id: lan, between: ['*', '*'], delay: 1 ms}]"
+SETS: Final = ("engine=pure", LINK)
+DEPLOYMENT: Final = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, SETS), TABLE.name)
+SECOND_NS: Final = 10**9
+
+
+@pytest.mark.parametrize(
+    ("event", "problems"),
+    [
+        ([], ["not an event, which is a mapping, a list of 0"]),
+        ({}, ["missing key: one of partition, clog, set, chaos, heal, 'heal'"]),
+        ({"heal": "al"}, ["heal: not one of all, partitions, clogs, chaos, settings, 'al', nearest is 'all'"]),
+        ({"heal": "all", "at": "3 s"}, ["an event that is asked for happens at the next tick, it has no time, 'at'"]),
+        ({"heal": "all", "for": "3 s"}, ["heal happens at once, 'for'"]),
+        ({"partition": [["player-rde"], ["rest"]]}, [
+            "partition[0][0]: a selector that matches no endpoint, 'player-rde', nearest is 'player-red'",
+        ]),
+        ({"clog": {"from": "camera", "to": "*"}, "for": "2"}, [
+            "for: not a time (a number and one of ns, us, ms, s, min, h), '2'"
+        ]),
+        ({"clog": {"from": "camera", "to": "*"}, "until": "900 ms"}, [
+            "until: not after the present simulated time, 1 s, '900 ms'"
+        ]),
+        ({"clog": {"form": "camera", "to": "*"}}, [
+            "clog: missing key, 'from'", "clog: unknown key, 'form', nearest is 'from'"
+        ]),
+        ({"set": {"link": "lam", "loss": "5"}}, [
+            "set.link: unknown link rule, 'lam', nearest is 'lan'", "set.loss: not a probability"
+        ]),
+        ({"chaos": {}}, ["missing key: chaos needs an end (until or for), 'until'"]),
+        ({"chaos": {}, "for": "2 h"}, ["for: chaos of more than 1 h, '2 h'"]),
+        ({"heal": "all", "chaos": {}, "for": "1 s"}, ["beside chaos: an event does one thing, 'heal'"]),
+    ],
+)  # fmt: skip
+def test_a_bad_event_is_refused_with_path_value_and_nearest_name(event: Any, problems: list[str]) -> None:
+    with pytest.raises(BadEvent) as refused:
+        event_text(DEPLOYMENT, event, SECOND_NS)
+    for problem in problems:
+        assert problem in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("event", "text"),
+    [
+        ({"partition": [["player-red"], ["rest"]]}, "partition of player-red from rest"),
+        ({"partition": [["*.goal", "camera"], ["player-*"]], "symmetric": False, "until": "3 s"},
+         "partition of *.goal, camera, one way, from player-* until 3 s"),
+        ({"clog": {"from": "*", "to": "camera"}, "for": {"exponential": "2 s"}},
+         "clog from * to camera for 2 s (mean, exponential)"),
+        ({"set": {"link": "lan", "loss": "5 %", "delay": "3 ms"}}, "lan: delay, loss set"),
+        ({"chaos": {"among": "player-*"}, "for": "10s"}, "chaos among player-* for 10 s"),
+        ({"heal": "all"}, "heal of all"),
+    ],
+)  # fmt: skip
+def test_an_event_is_told_in_words(event: Any, text: str) -> None:
+    assert told(event_of(event_text(DEPLOYMENT, event, SECOND_NS), SECOND_NS)) == text
+
+
+def test_it_happens_to_what_is_sent_from_the_tick_of_the_answer_on() -> None:
+    closings: list[Closing] = []
+    statuses: list[Any] = []
+    asked: list[str] = []
+
+    def prepare(system: System) -> None:
+        def ask(**event: Any) -> None:
+            asked.append(system.request("network", event=event))
+
+        system.at_tick(20, lambda: ask(partition=[["camera"], ["player-*"]]))
+        system.at_tick(40, lambda: ask(partition=[["camra"], ["player-*"]]))
+        system.at_tick(60, lambda: ask(heal="all"))
+        system.at_tick(80, lambda: statuses.append(system.request("status")))
+
+    rehearsed = rehearse(
+        TABLE.read_text(), TABLE.name, 100, 1, SETS, Settings(on_closing=closings.append), prepare=prepare
+    )
+    cut, refused, healed = (rehearsed.answers[identity] for identity in asked)
+    assert cut.text == f"partition of camera from player-* from tick {cut.tick} on"
+    assert healed.text == f"heal of all at tick {healed.tick}"
+    assert not refused.accepted and "nearest is 'camera'" in refused.text
+    lost = {f.sent_ns // 2_000_000 for c in closings for f in c.fates if f.cause == "partition" and f.arrival_tick < 0}
+    sensed = {f.sent_ns // 2_000_000 for c in closings for f in c.fates if f.source == "camera"}
+    assert lost == {tick for tick in sensed if cut.tick <= tick < healed.tick}
+    assert [c.frame.tick for c in closings if c.edits] == [cut.tick, healed.tick], "edits led to these frames"
+    status = decode_json(_answer(rehearsed.answers, statuses).result)
+    assert isinstance(status, dict)
+    assert status["disruptions"] == {
+        "asked": 2,
+        "last": [
+            {"tick": cut.tick, "event": {"partition": [["camera"], ["player-*"]]}},
+            {"tick": healed.tick, "event": {"heal": "all"}},
+        ],
+    }
+
+
+def _answer(answers: dict[str, Answer], asked: list[Any]) -> Answer:
+    return answers[asked[0]]
+
+
+def test_there_are_so_many_events_and_no_more() -> None:
+    refused: list[str] = []
+
+    def prepare(system: System) -> None:
+        def ask() -> None:
+            system.supervisor.requests.disruptions = EVENTS_MAX
+            refused.append(system.request("network", event={"heal": "all"}))
+
+        system.at_tick(10, ask)
+
+    rehearsed = rehearse(TABLE.read_text(), TABLE.name, 30, 1, SETS, prepare=prepare)
+    assert _answer(rehearsed.answers, refused).text == f"{EVENTS_MAX} events were asked for already"
