@@ -1,9 +1,9 @@
-"""Fixed things that a deployment puts into its world beside the table: boxes, and meshes from files.
+"""Fixed things that a deployment puts into its world beside table or hall: boxes, and meshes from files.
 
 This is their schema, and how they become shapes of the scene. A mesh's file is named by a path inside the deployment's
 asset folder; its digest is written beside it when a run is planned, so that the deployment's text alone says which
 world is meant, on every machine. Neighbours: `deployment` (which holds them), `assets` (reads the files), `mesh` (what
-is in them), `table_scene` (adds the shapes to the scene).
+is in them), `table_scene` and `hall_scene` (add the shapes to the scene).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from foosim.protocol import limits, units
 from foosim.protocol.errors import BadValue
 from foosim.protocol.mesh import MESH_READERS, AssetError, Mesh, check_digest, digest_of, read_mesh
 from foosim.protocol.scene import Box, Colour, Quaternion, Shape, Vector, multiply, turn
-from foosim.protocol.table import Length, Part, Position
+from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity, custom_error
 
 PATH_LENGTH_MAX: Final = 200
@@ -75,6 +75,8 @@ def _digest(text: str) -> str:
 AssetFolder = Annotated[str, AfterValidator(_folder)]
 MeshPath = Annotated[str, AfterValidator(_mesh_path)]
 Digest = Annotated[str, AfterValidator(_digest)]
+Length = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "1000 m")]
+Position = Annotated[float, Quantity(units.LENGTH, "-1000 m", "1000 m")]
 Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
 Share = Annotated[float, Field(ge=0, le=1)]
 SurfaceName = Literal["floor", "walls", "goal", "ramps"]
@@ -98,7 +100,10 @@ class Material(Part):
 
 
 class Placed(Part):
-    """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw)."""
+    """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw).
+
+    `surface` is what it is to a table's ball.
+    """
 
     x: Position = _default("0 m")
     y: Position = _default("0 m")
@@ -106,7 +111,7 @@ class Placed(Part):
     roll: Turn = _default("0 deg")
     pitch: Turn = _default("0 deg")
     yaw: Turn = _default("0 deg")
-    surface: SurfaceName
+    surface: SurfaceName = "walls"
     material: Material = Field(default_factory=Material)
 
     @property

@@ -74,6 +74,9 @@ ACCELERATION: Final = Dimension("acceleration", {"m/s2": Fraction(1), "mm/s2": F
 FORCE: Final = Dimension("force", _sizes(N="1", mN="1e-3", kN="1e3"))
 TORQUE: Final = Dimension("torque", {"N m": Fraction(1), "mN m": Fraction(1, 1000)})
 IMPULSE: Final = Dimension("impulse", {"N s": Fraction(1), "mN s": Fraction(1, 1000)})
+ENERGY: Final = Dimension("energy", _sizes(J="1", kJ="1e3", Wh="3600", kWh="3.6e6"))
+POWER: Final = Dimension("power", _sizes(W="1", mW="1e-3", kW="1e3"))
+VOLTAGE: Final = Dimension("voltage", _sizes(V="1", mV="1e-3", kV="1e3"))
 PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)})
 
 

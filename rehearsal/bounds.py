@@ -28,6 +28,7 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 10,
     "HubState.links": limits.CLIENTS_MAX,
+    "HubState._receivers": limits.ENTITIES_MAX,
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers of something else than ticks."""

@@ -223,6 +223,8 @@ class Requests:
     # --- the world ---------------------------------------------------------------------------------------------------
 
     def _add(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
+        if self._core.deployment.is_hall:
+            raise Refused("this world is a hall: balls are added to a table")
         layout = self._next_layout()
         taken = {*layout.names, *(waiting.edit.name for waiting in self._pending)}
         name = _name(arguments, "name", _free_name(taken))

@@ -21,7 +21,7 @@ from typing import Any, Final
 import pytest
 import yaml
 
-from foosim.client.payloads import decode_payload
+from foosim.client.payloads import Command, decode_payload
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor.plan import RunOptions, make_plan
@@ -104,7 +104,8 @@ def test_the_readmes_player_plays(house: Path) -> None:
     sent = capture.packets.where(capture.packets.source == "player-red")
     rods = [f"red.{line}" for line in ("goal", "defence", "midfield", "attack")]
     assert set(sent.destination) == set(rods)
-    assert {decode_payload("position", payload)[1] for payload in sent.payload} == {0.5, -1.2}
+    commands = [decode_payload("position", payload) for payload in sent.payload]
+    assert {command.spin for command in commands if isinstance(command, Command)} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
 
 
