@@ -28,6 +28,10 @@ SWERVE_M: Final = 0.9
 SWERVE_RAD: Final = 0.8
 """by so much: to the right, if there is room, as whoever comes the other way does."""
 ROOM_M: Final = 0.5
+CLOSE_M: Final = 0.12
+"""Nearer than this to anything it gets away from it,"""
+AWAY: Final = 0.2
+"""m/s, first of all."""
 APPROACH: Final = 1.2
 """Greatest speed per way to what is ahead, and to the goal, in 1/s."""
 SPEED_MIN: Final = 0.15
@@ -88,12 +92,22 @@ class Steering:
         if ahead < SWERVE_M and ahead < way and abs(error) < AHEAD_RAD:
             right, left = least(ranges, -SIDE_RAD / 2, SIDE_RAD / 2), least(ranges, SIDE_RAD / 2, SIDE_RAD / 2)
             error += -SWERVE_RAD if right > ROOM_M or right >= left else SWERVE_RAD
+        if ranges and min(ranges) < CLOSE_M:
+            return self._away(ranges)
         forward = min(speed, max(APPROACH * way, SPEED_MIN), APPROACH * max(ahead - STOP_M, 0.0)) * max(cos(error), 0.0)
         turning = min(max(TURN_GAIN * error, -TURN_MAX), TURN_MAX) * self._track / 2.0
         # Turning goes first: what is too fast for the wheels is taken from the way ahead.
         forward = min(forward, max(self._speed_max - abs(turning), 0.0))
         limit = self._speed_max
         return Drive(max(-limit, min(limit, forward - turning)), max(-limit, min(limit, forward + turning)))
+
+    def _away(self, ranges: tuple[float, ...]) -> Drive:
+        """Return the speeds that take it slowly away from what nearly touches it, turning its side to it."""
+        ray = min(range(len(ranges)), key=ranges.__getitem__)
+        angle = 2.0 * pi * ray / len(ranges)
+        forward = -AWAY if cos(angle) > 0.0 else AWAY
+        turning = (-AWAY if sin(angle) > 0.0 else AWAY) / 2.0
+        return Drive(forward - turning, forward + turning)
 
 
 def least(ranges: tuple[float, ...], middle: float, half: float) -> float:

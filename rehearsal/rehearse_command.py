@@ -83,7 +83,8 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
         score = f", {score_text(result)}" if result["score"] else ""
         typer.echo(f"{seconds:.2f} s simulated at {result['rtf']}x{score}")
         packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
-        typer.echo(f"{result['handovers']} hand-overs of the ball, packets {packets}")
+        handovers = f"{result['handovers']} hand-overs of the ball, " if result["score"] else ""
+        typer.echo(f"{handovers}packets {packets}")
         typer.echo(f"digest of all ticks {result['digest']['chain']}")
     raise typer.Exit(FAILED if result["failed"] else DONE)
 

@@ -210,7 +210,7 @@ def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
     """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
     of_world = () if load_deployment(text, name).is_hall else OF_TABLE
     text = with_nodes(text, name, nodes, [f"seed={seed}", *SMALL, *of_world, *PATIENT])
-    return text, with_nodes(text, name, 1, ["players={}", "clients={}"])
+    return text, with_nodes(text, name, 1, ["players={}", "clients={}", "network={}"])
 
 
 class Flight:

@@ -16,16 +16,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, pi, sin, sqrt
+from math import cos, floor, pi, sin, sqrt
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.protocol.layout import Entity, Layout
-from foosim.protocol.obstacles import obstacles_of
+from foosim.protocol.obstacles import Obstacle, obstacles_of
 
 HALVINGS: Final = 7
 """A way that is blocked is tried at 1, 1/2, 1/4, ... of its length, so often."""
+SQUARE_REACH_M: Final = 0.71
+"""From the middle of a square metre to its corners, and a little more."""
 GAP_M: Final = 1e-6
 """Half of what stays between two rovers: far above rounding."""
 
@@ -65,6 +67,7 @@ class RoverEngine:
         self._near_m = 2.0 * (hall.rover.radius + GAP_M + hall.rover.drive.speed * deployment.tick_ns / 1e9)
         """Rovers that are farther apart cannot meet within the tick."""
         self._slips = {entity.index: wheel_slips(deployment, entity.name) for entity in layout.rovers}
+        self._squares: dict[tuple[int, int], tuple[Obstacle, ...]] = {}
         self._loaded: dict[int, Loaded] = {}
 
     def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
@@ -147,7 +150,18 @@ class RoverEngine:
             if x * nx + y * ny > most and x * nx + y * ny > rover.x * nx + rover.y * ny:
                 return False
         radius = self._rover.radius
-        return all(obstacle.is_clear(x, y, radius) for obstacle in self._obstacles)
+        return all(obstacle.is_clear(x, y, radius) for obstacle in self._around(x, y))
+
+    def _around(self, x: float, y: float) -> tuple[Obstacle, ...]:
+        """Return the obstacles that a rover in this square metre can touch: few of all, found once for each square."""
+        square = floor(x), floor(y)
+        found = self._squares.get(square)
+        if found is None:
+            reach = self._rover.radius + SQUARE_REACH_M
+            middle = square[0] + 0.5, square[1] + 0.5
+            found = tuple(obstacle for obstacle in self._obstacles if not obstacle.is_clear(*middle, reach))
+            self._squares[square] = found
+        return found
 
     def _discharge(self, rover: Loaded) -> None:
         """Take what standing and rolling cost, and give what a station beside it gives."""
