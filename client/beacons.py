@@ -65,7 +65,7 @@ class Entry(NamedTuple):
 
 
 def encode_beacon(beacon: Beacon) -> bytes:
-    """Return a beacon's bytes: 20, 8 more with something seen, and 4 a visit."""
+    """Return a beacon's bytes: 19, 8 more with something seen, and 4 a visit."""
     seen = b"" if beacon.seen is None else _SEEN.pack(*beacon.seen)
     flags = len(beacon.visits) | (_HAS_SEEN if seen else 0)
     where = beacon.number, beacon.x, beacon.y, beacon.heading, beacon.here, beacon.goal

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from math import cos, hypot, pi, sin
+from math import atan2, cos, hypot, pi, sin
 from typing import Any, Final
 
 from foosim.client.beacons import (
@@ -26,15 +26,15 @@ from foosim.client.beacons import (
     encode_beacon,
     encode_telemetry,
 )
+from foosim.client.errors import UnknownName
 from foosim.client.packets import Outgoing
 from foosim.client.payloads import Battery, Drive, Pose, Ranges, WheelTravel
 from foosim.client.player import Samples, Turn
 from foosim.client.roadmap import roadmap_of
-from foosim.client.steering import Estimate, Steering
+from foosim.client.steering import Estimate, Steering, wrapped
 from foosim.protocol.deployment import Deployment, RoverRobot, StationRobot
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.protocol.errors import BadValue
-from foosim.protocol.names import nearest_name
 from foosim.protocol.obstacles import obstacles_of
 
 ARRIVED_M: Final = 0.35
@@ -49,6 +49,11 @@ STUCK_S: Final = 4.0
 """A spot that comes no nearer for so long is given up,"""
 GIVEN_UP_S: Final = 10.0
 """for so long."""
+NEAR_M: Final = 1.2
+"""What is not on the map, and nearer than this where it is going, it turns away from,"""
+AVOIDED_S: Final = 3.0
+"""and keeps to that for so long."""
+SIDE_RAD: Final = 1.2
 TELEMETRY_S: Final = 5.0
 ROVERS_MAX: Final = 255
 """A rover's number is a byte."""
@@ -79,7 +84,7 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     known = {field.name: field.type for field in fields(Settings)}
     for name, value in parameters.items():
         if name not in known:
-            raise BadValue("no parameter of a patrol", name, nearest_name(name, known))
+            raise UnknownName("no parameter of a patrol", name, known)
         is_text = name in ("rover", "base")
         number = isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < 1000.0
         if not (isinstance(value, str) if is_text else number):
@@ -87,9 +92,9 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     settings = Settings(**{"rover": "", **parameters})
     rovers = [name for name, robot in deployment.robots.items() if isinstance(robot, RoverRobot)]
     if settings.rover not in rovers:
-        raise BadValue("parameter rover is no rover", settings.rover, nearest_name(settings.rover, rovers))
+        raise UnknownName("parameter rover is no rover", settings.rover, rovers)
     if settings.base and settings.base not in deployment.players:
-        raise BadValue("parameter base is no player", settings.base, nearest_name(settings.base, deployment.players))
+        raise UnknownName("parameter base is no player", settings.base, deployment.players)
     if len(rovers) > ROVERS_MAX:
         raise BadValue(f"a patrol has at most {ROVERS_MAX} rovers", len(rovers))
     if not settings.low < settings.high <= 1.0:
@@ -138,6 +143,7 @@ class Patrol:
         self._sequences: dict[str, int] = {}
         self._heard_s = -settings.alone_s
         self._here = self._goal = -1
+        self._avoided_s = 0.0
         self._least_m, self._least_s = 0.0, 0.0
         """How near the goal has been, and since when it comes no nearer."""
         self._seen: tuple[float, float] | None = None
@@ -242,6 +248,10 @@ class Patrol:
             self._head_for(self._next(now_s), now_s)
         elif self._must_give_way(now_s):
             self._head_for(self._here, now_s)
+        elif self._meets_somebody() and now_s >= self._avoided_s:
+            self._avoided_s = now_s + AVOIDED_S
+            self._here = self._map.nearest(x, y)
+            self._head_for(self._away(now_s), now_s)
         elif way_m < self._least_m - 0.05:
             self._least_m, self._least_s = way_m, now_s
         elif now_s - self._least_s > STUCK_S:
@@ -262,6 +272,22 @@ class Patrol:
         return any(
             known.here == self._goal or (known.goal == self._goal and number < self.number) for number, known in claims
         )
+
+    def _meets_somebody(self) -> bool:
+        """Whether something that is not on the map is near, and about where it is going."""
+        if self._seen is None:
+            return False
+        at, goal = self._estimate, self._map.spots[self._goal]
+        seen_x, seen_y = self._seen[0] - at.x, self._seen[1] - at.y
+        aside = wrapped(atan2(seen_y, seen_x) - atan2(goal[1] - at.y, goal[0] - at.x))
+        return hypot(seen_x, seen_y) < NEAR_M and abs(aside) < SIDE_RAD
+
+    def _away(self, now_s: float) -> int:
+        """Return the spot near here that is farthest from what it meets."""
+        assert self._seen is not None
+        seen, claimed = self._seen, self._claimed(now_s)
+        free = [spot for spot in (self._here, *self._map.neighbours[self._here]) if spot not in claimed]
+        return max(free, key=lambda spot: (self._map.distance(spot, *seen), -spot), default=self._here)
 
     def _next(self, now_s: float) -> int:
         """Return the spot to go to from here; here, when there is none that is free."""

@@ -152,6 +152,9 @@ def encode_payload(kind: str, value: Value) -> bytes:
     if kind == CHANNEL_ECHO:
         assert isinstance(value, bytes), f"echo carries bytes, not {type(value).__name__}"
         return value
+    if kind == PROXIMITY:
+        assert isinstance(value, Ranges), f"{kind} carries Ranges, not {type(value).__name__}"
+        return struct.pack(f"<{len(value.ways)}d", *value.ways)
     packed, make = _NUMBERS[kind]
     assert isinstance(value, make), f"{kind} carries {make.__name__}, not {type(value).__name__}"
     for field, number in zip(make._fields, value, strict=True):

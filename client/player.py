@@ -162,6 +162,11 @@ class PlayerLoop:
                 core.send(self._act(max(core.tick, 0)), now_ns)
                 self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
 
+    @property
+    def player(self) -> Player | None:
+        """The player that acts; None before the run has let it in."""
+        return self._player
+
     def deadline_ns(self) -> int:
         """When a free-running player acts next."""
         return NEVER_NS if self.core.ended or self.core.is_away else self._beat_ns

@@ -42,7 +42,7 @@ class Roadmap:
         return frozenset(spot for spot in range(len(self.spots)) if self.distance(spot, x, y) <= radius)
 
     def step_towards(self, start: int, goals: Collection[int], avoided: Collection[int]) -> int | None:
-        """Return the next spot on a shortest way to one of the goals, round those to avoid; None where there is none."""
+        """Return the next spot on a shortest way to one of the goals, round those to avoid; None without a way."""
         first: dict[int, int] = {start: start}
         waiting = deque([start])
         while waiting:

@@ -104,6 +104,8 @@ def _world(view: _View) -> Iterator[Finding]:
     if len({*given}) > 1:
         yield Finding(("hall",), "a hall beside a table: a world is one of them", "hall", at="key")
     if not given:
+        if not isinstance(view.data, dict):
+            return
         yield Finding(("table",), "missing key of a world, which is a table or a hall", "table", at="missing")
         return
     for name in view.robots:

@@ -119,11 +119,13 @@ def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: st
 
 
 def test_a_players_declaration_is_valid() -> None:
-    (text,) = blocks(ROOT / "docs" / "writing_a_player.md", "yaml")
-    ((name, declared),) = yaml.safe_load(text)["players"].items()
     table = (ROOT / "deploy" / "table.yaml").read_text()
-    changed = apply_sets(table, "table.yaml", [f"players.{name}={json.dumps(declared)}"])
-    assert load_deployment(changed, "table.yaml").players[name].class_ == "follower:Follower"
+    classes = []
+    for text in blocks(ROOT / "docs" / "writing_a_player.md", "yaml"):
+        ((name, declared),) = yaml.safe_load(text)["players"].items()
+        changed = apply_sets(table, "table.yaml", [f"players.{name}={json.dumps(declared)}"])
+        classes.append(load_deployment(changed, "table.yaml").players[name].class_)
+    assert classes == ["follower:Follower", "scouting:Scout"]
 
 
 # --- what is named exists --------------------------------------------------------------------------------------------
