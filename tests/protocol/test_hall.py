@@ -14,7 +14,7 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.frame import fitting_edits
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Add, Freeze, Push, Remove
+from foosim.protocol.messages import Add, Edit, Freeze, Push, Remove, Thaw
 from foosim.protocol.obstacles import Circle, Rectangle, obstacle, obstacles_of
 from foosim.protocol.scene import Cylinder, Shape, antenna_position, forward_kinematics
 from foosim.protocol.scenes import build_scene
@@ -92,8 +92,8 @@ def test_a_hall_has_no_ball_no_score_and_nothing_can_be_added() -> None:
     with pytest.raises(Malformed, match="ball b2 cannot be added: nothing can be to a hall"):
         build_layout(DEPLOYMENT, [("b2", "ball")])
     still = (0.0, 0.0, 0.0)
-    edits = [Add("b2", "ball", still, still), Remove("b2"), Push("rover01", still), Freeze("rover01"), Freeze("base")]
-    assert fitting_edits(layout, edits) == edits[3:]
+    edits: list[Edit] = [Add("b2", "ball", still, still), Remove("b2"), Push("rover01", still)]
+    assert fitting_edits(layout, [*edits, Freeze("rover01"), Thaw("base")]) == [Freeze("rover01"), Thaw("base")]
 
 
 def test_rovers_start_where_they_are_declared() -> None:
