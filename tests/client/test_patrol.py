@@ -8,8 +8,11 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.client.beacons import Beacon, decode_beacon, encode_beacon
 from foosim.client.dispatch import Dispatch
 from foosim.client.patrol import Patrol
+from foosim.client.payloads import Pose
+from foosim.client.player import Sample
 from foosim.client.roadmap import roadmap_of
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import BadValue
@@ -121,6 +124,85 @@ def test_alone_they_are_slow_and_still_patrol_and_touch_nothing_for_long(apart: 
     blocked = sum(frame.at(name, "blocked") for frame in apart.frames for name in apart.names)
     assert blocked < 0.02 * len(apart.frames) * len(apart.names)
     assert 0.6 < apart.nearest_m() < 1.2, "nobody tells them to keep out of each other's way"
+
+
+# --- one of them, told by hand what others say ------------------------------------------------------------------------
+
+
+class Told:
+    """The patrol of rover02 at a spot with four ways, at a quarter of a second a turn."""
+
+    def __init__(self, text: str) -> None:
+        self.deployment = load_deployment(text, "hall.yaml")
+        self.patrol = Patrol(self.deployment, {"rover": "rover02"})
+        self.map = roadmap_of(self.deployment, 2.5)
+        self.here = self.map.nearest(-6.25, 1.25)
+        self.samples: dict[tuple[str, str], Sample] = {}
+        self.tick = 0
+
+    def say(self, number: int, here: int, goal: int, ago_s: float = 0.0, payload: bytes | None = None) -> None:
+        """What rover number + 1 broadcasts."""
+        raw = encode_beacon(Beacon(number, 0.0, 0.0, 0.0, here, goal, 1.0, None, ())) if payload is None else payload
+        sent_ns = int((self.tick * 0.02 - ago_s) * 1e9)
+        name = f"pilot{number + 1:02d}"
+        self.samples[name, "beacon"] = Sample(name, "beacon", self.tick, sent_ns, sent_ns, raw)
+
+    def turn(self, spot: int) -> int:
+        """Be at a spot; return where it heads for, as its beacon says."""
+        self.tick += 20
+        x, y = self.map.spots[spot]
+        pose = ("rover02", "pose")
+        self.samples[pose] = Sample(*pose, self.tick, self.tick, self.tick, Pose(x, y, 0.0))
+        (packet,) = self.patrol.act(self.tick, self.samples).packets
+        beacon = decode_beacon(packet.payload, 6, len(self.map.spots))
+        assert beacon is not None and beacon.number == 1
+        return beacon.goal
+
+
+@pytest.fixture
+def told(fleet_text: Callable[..., str]) -> Told:
+    return Told(fleet_text(6))
+
+
+def test_it_keeps_out_of_where_others_are_or_go(told: Told) -> None:
+    ways = told.map.neighbours[told.here]
+    assert len(ways) == 4
+    for free in ways:
+        first, second, third = (spot for spot in ways if spot != free)
+        told.tick += 200
+        told.say(0, first, second)
+        told.say(4, third, third)
+        assert told.turn(told.here) == free
+        told.say(0, first, second)
+        told.say(4, third, third)
+        assert told.turn(free) in told.map.neighbours[free], "and on from there"
+
+
+def test_what_was_said_long_ago_or_is_no_beacon_counts_no_more(told: Told) -> None:
+    ways = told.map.neighbours[told.here]
+    told.tick += 300
+    told.say(0, ways[0], ways[1], ago_s=3.0)
+    told.say(4, ways[2], ways[3], ago_s=3.0)
+    assert told.turn(told.here) in ways
+    told.say(0, ways[0], ways[1])
+    told.say(4, ways[2], ways[3])
+    assert told.turn(told.here) == told.here, "there is nowhere to go"
+    told.say(3, ways[0], ways[1], payload=b"\xff" * 19)
+    told.turn(told.here)
+    assert told.patrol.heard.keys() == {0, 4}
+
+
+@pytest.mark.parametrize("number", [0, 4])
+def test_of_two_that_head_for_the_same_spot_the_smaller_number_goes(told: Told, number: int) -> None:
+    goal = told.turn(told.here)
+    told.tick += 20
+    told.say(number, told.map.nearest(3.75, 1.25), goal)
+    (x, y), (to_x, to_y) = told.map.spots[told.here], told.map.spots[goal]
+    way = ("rover02", "pose")
+    told.samples[way] = Sample(*way, told.tick, 0, 0, Pose(0.6 * x + 0.4 * to_x, 0.6 * y + 0.4 * to_y, 0.0))
+    (packet,) = told.patrol.act(told.tick, told.samples).packets
+    beacon = decode_beacon(packet.payload, 6, len(told.map.spots))
+    assert beacon is not None and beacon.goal == (told.here if number == 0 else goal)
 
 
 @pytest.mark.parametrize(

@@ -179,6 +179,21 @@ def test_it_stops_at_what_stands_in_its_way_and_its_wheels_slip(
     assert hall.at(rover, "position") == pytest.approx(x - 0.1) and hall.at(rover, "blocked") == 0.0
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_what_is_beyond_the_edge_of_its_square_metre_stops_it_too(fleet_text: Callable[..., str], side: float) -> None:
+    """Obstacles are looked up by the square that the rover's middle is in."""
+    middle = 0.5 + side * 0.45
+    box = f"{{shape: box, x: {middle + side * 1.31} m, z: 1 m, length: 2 m, width: 4 m, height: 2 m}}"
+    hall = Hall(fleet_text(1, *EMPTY, f"robots.rover01.x={middle} m", f"scenery={{box: {box}}}"))
+    (rover,) = hall.rovers
+    hall.put(rover, middle, 0.05, 0.0 if side > 0.0 else pi)
+    hall.want(rover, 0.1, 0.1)
+    for _ in range(100):
+        hall.step()
+        assert hall.strays() == []
+    assert hall.at(rover, "blocked") == 1.0
+
+
 def test_it_passes_under_what_is_higher_than_its_antenna(fleet_text: Callable[..., str]) -> None:
     beam = "scenery={beam: {shape: box, x: 2 m, z: 70 cm, length: 1 m, width: 4 m, height: 30 cm}}"
     hall = Hall(fleet_text(1, *EMPTY, beam))
