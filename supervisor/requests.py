@@ -349,7 +349,7 @@ def _chosen(what: str, name: str, choices: Sequence[str]) -> str:
         return name
     nearest = nearest_name(name, choices)
     hint = f", nearest is {nearest}" if nearest else ""
-    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices)}{hint}")
+    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices) or 'none'}{hint}")
 
 
 def _integer(arguments: dict[str, Any], name: str, low: int, high: int) -> int:

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Final
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
 
 import pytest
 
-from foosim.protocol.draws import draw_key, draw_words
+from foosim.client.payloads import Drive
+from foosim.client.player import Samples
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.protocol.frame import Frame
 from foosim.rehearsal.bus import Weather
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.swarm import fly
 from foosim.rehearsal.system import Settings, System
+from foosim.rehearsal.verify import verify_capture
+from foosim.vhub.capture_reader import open_capture
 
 TICKS: Final = 250
 ROVERS: Final = 6
@@ -29,8 +37,31 @@ NARROW: Final = (
     *(f"robots.rover0{number}.y={y} m" for number, y in enumerate((2.4, 2.4, 2.4, -2.4, -2.4, -2.4), 1)),
     *(f"players.pilot0{number}.parameters.cell_m=1.2" for number in range(1, ROVERS + 1)),
     "players.dispatch.parameters={cell_m: 1.2}",
+    *(f"players.pilot0{number}.class=blind_rovers:Blind" for number in range(4, ROVERS + 1)),
 )
-"""Six rovers that meet all the time."""
+"""Six rovers with little room, three of which look at nothing and run into everything."""
+
+
+class Blind:
+    """Drives at random."""
+
+    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+        self.rover = parameters["rover"]
+        self.key = draw_key(deployment.seed, "blind", self.rover)
+
+    def act(self, tick: int, samples: Samples) -> Mapping[str, Drive]:
+        words = draw_words(self.key, tick // 60)
+        return {self.rover: Drive(*(0.7 * unit_interval(word) + 0.5 for word in words[:2]))}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def blind_rovers() -> Iterator[None]:
+    """Makes the class one that a deployment can name."""
+    module = ModuleType("blind_rovers")
+    module.Blind = Blind  # type: ignore[attr-defined]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "blind_rovers", module)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +77,8 @@ def alone(text: str) -> Rehearsed:
     names = [rover.name for rover in frames[0].layout.rovers]
     drive = sum(any(frame.vector(name, "wheel_speeds", 2)) for frame in frames for name in names)
     assert drive > 0.5 * len(names) * TICKS
-    near = 0
-    for frame in frames:
-        places = [frame.vector(name, "position", 2) for name in names]
-        near += sum(0.0 < (x - u) * (x - u) + (y - v) * (y - v) < 1.44 for x, y in places for u, v in places)
-    assert near > 50, "rovers that never meet prove nothing"
+    blocked = sum(frame.at(name, "blocked") for frame in frames for name in names)
+    assert blocked > 50, "rovers that never run into anything prove nothing"
     return run
 
 
@@ -87,6 +115,58 @@ def test_nodes_that_are_lost_and_come_back_change_nothing(text: str, alone: Rehe
     assert run.digests == alone.digests
     told = [(entry["what"], entry["name"]) for entry in run.json["recoveries"]]
     assert told == [("node", "n2"), ("join", "n2"), ("node", "n1"), ("node", "n3"), ("join", "n1")]
+
+
+def test_a_hall_is_captured_and_simulated_again(text: str, alone: Rehearsed, tmp_path: Path) -> None:
+    path = tmp_path / "hall.mcap"
+    run = rehearse(text, "hall.yaml", 100, 2, capture=path)
+    assert run.digests == alone.digests[: len(run.digests)]
+    assert verify_capture(path, 3).equal
+    capture = open_capture(path)
+    poses, frames = capture.poses("rover04"), capture.frames
+    assert poses.positions.tolist() == frames.column("rover04", "position", 3).tolist()
+    assert {tuple(place) for place in capture.poses("base").positions.tolist()} == {(-4.0, 0.0, 0.0)}
+
+
+def test_the_rovers_of_a_node_that_is_lost_can_brake_and_wait_for_it(text: str) -> None:
+    frames: list[Frame] = []
+
+    def prepare(system: System) -> None:
+        system.at_tick(40, partial(system.kill, "n2"))
+        system.at_tick(150, partial(system.start, "n2"))
+
+    run = rehearse(
+        text, "hall.yaml", TICKS, 2, ["on_node_loss=freeze"], Settings(on_commit=frames.append), prepare=prepare
+    )
+    lost = [name for name in run.json["nodes"]["n2"]["owned"] if name.startswith("rover")]
+    assert len(lost) == 3
+
+    def speeds(tick: int, names: Sequence[str]) -> list[float]:
+        return [abs(speed) for name in names for speed in frames[tick].vector(name, "wheel_speeds", 2)]
+
+    assert max(speeds(35, lost)) > 0.3
+    assert set(speeds(140, lost)) == {0.0} and all(frames[140].at(name, "down") for name in lost)
+    assert max(speeds(140, [rover.name for rover in frames[0].layout.rovers if rover.name not in lost])) > 0.3
+    assert max(speeds(240, lost)) > 0.3 and not any(frames[240].at(name, "down") for name in lost)
+
+
+def test_what_is_of_a_table_is_refused_in_a_hall(text: str) -> None:
+    systems: list[System] = []
+    asked: list[str] = []
+
+    def prepare(system: System) -> None:
+        systems.append(system)
+        for verb, arguments in (("add", {}), ("push", {"impulse": [0.1, 0.0, 0.0]}), ("remove", {"name": "rover01"})):
+            system.at_tick(20, partial(lambda v, a: asked.append(system.request(v, **a)), verb, arguments))
+
+    assert not rehearse(text, "hall.yaml", 60, 2, prepare=prepare).json["failed"]
+    refused = [systems[0].answers[identity] for identity in asked]
+    assert not any(answer.accepted for answer in refused)
+    assert [answer.text for answer in refused] == [
+        "this world is a hall: balls are added to a table",
+        "no free body 'ball'; there are none",
+        "'rover01' was not added; added are none",
+    ]
 
 
 @pytest.mark.parametrize("seed", [1])
