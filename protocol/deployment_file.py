@@ -21,6 +21,7 @@ from pydantic import ValidationError
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import DeploymentError, describe
+from foosim.protocol.hall_start import start_findings
 from foosim.protocol.network_references import check_network
 from foosim.protocol.references import Finding, check_references, path_text
 from foosim.protocol.schema_problems import schema_findings
@@ -143,6 +144,8 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
             deployment = Deployment.model_validate(data)
         except ValidationError as error:
             findings += islice(schema_findings(error), PROBLEMS_MAX + 1)
+        if deployment is not None and not findings:
+            findings = list(start_findings(deployment))
         found += [_problem(tree, finding) for finding in findings]
     if found or deployment is None:
         raise DeploymentError(_report(found))

@@ -17,7 +17,7 @@ from foosim.protocol.units import Quantity
 
 Frequency = Annotated[float, Quantity(units.FREQUENCY, "1 kHz", "100 GHz")]
 Bandwidth = Annotated[float, Quantity(units.FREQUENCY, "1 kHz", "10 GHz")]
-PowerLevel = Annotated[float, Quantity(units.POWER, "-200 dBm", "100 dBm")]
+PowerLevel = Annotated[float, Quantity(units.POWER_LEVEL, "-200 dBm", "100 dBm")]
 Gain = Annotated[float, Quantity(units.GAIN, "-50 dBi", "60 dBi")]
 Level = Annotated[float, Quantity(units.LEVEL, "0 dB", "100 dB")]
 Offset = Annotated[float, Quantity(units.LENGTH, "-100 m", "100 m")]
@@ -38,7 +38,7 @@ Environment = Literal[
 
 
 class Antenna(Part):
-    """Where the antenna is on its endpoint's body (x, y, z in the body's frame), and its gain in every direction."""
+    """Where the antenna is: x, y, z beside that of its body, in the body's frame; and its gain in every direction."""
 
     gain_dbi: Gain = default("0 dBi", "gain")
     mount: Place = Field(default=["0 m", "0 m", "0 m"], validate_default=True)

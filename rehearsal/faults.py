@@ -209,10 +209,18 @@ def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
 # --- people ----------------------------------------------------------------------------------------------------------
 
 
+OF_TABLE: Final = ("red.goal", "red.attack", "blue.defence", "camera")
+
+
 def _move(dice: Dice, names: Sequence[str]) -> Fault:
-    robot, node = dice.one_of(("red.goal", "red.attack", "blue.defence", "camera")), dice.one_of(names)
-    request = partial(ask, verb="move", robot=robot, node=node)
-    return Fault(_tick(dice), "move", f"move {robot} to {node}", request)
+    robot, node = dice.one_of(OF_TABLE), dice.one_of(names)
+
+    def do(system: System) -> None:
+        others = sorted(system.supervisor.owners)  # of a hall, the robots in the same places of the list
+        chosen = robot if robot in others else others[OF_TABLE.index(robot) % len(others)]
+        ask(system, "move", robot=chosen, node=node)
+
+    return Fault(_tick(dice), "move", f"move {robot} to {node}", do)
 
 
 def _add(dice: Dice, names: Sequence[str]) -> Fault:

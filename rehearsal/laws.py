@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, edits_content
+from foosim.protocol.frame import CHAIN_START, basis_of, chain_next, edits_content
 from foosim.protocol.messages import (
     Answer,
     Commit,
@@ -35,6 +35,7 @@ from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.packet_laws import PacketLaws, hold
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import System
+from foosim.rehearsal.world_bounds import strays
 from foosim.supervisor.records import CommitRecord, HeadRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
@@ -54,7 +55,6 @@ class Laws:
         self.epoch = 0
         self.flipped: Collection[str] = ()
         """Nodes whose memory a fault has changed."""
-        self._table = deployment.table
         self._replica = replica
         self._deployment = deployment
         self._chains = {0: CHAIN_START}
@@ -305,22 +305,11 @@ class Laws:
         hold(again.digest == closing.digest, f"frame {frame.tick} is another one than its orders and deliveries give")
         hold(closing.digest == self._digests[frame.tick], f"frame {frame.tick} is not the committed one")
         self.packets.senses(again, self._replica)
-        self._in_bounds(again)
+        stray = strays(self._deployment, again)
+        hold(not stray, f"at tick {frame.tick} {', '.join(stray)}")
         self.ticks = frame.tick
         self._frames[frame.tick] = again
         self._frames.pop(frame.tick - FRAMES_KEPT, None)
-
-    def _in_bounds(self, frame: Frame) -> None:
-        """What is not in quarantine is in the world and no faster than the model promises."""
-        margin, limit = self._table.rules.out_margin, self._table.ball.speed_limit
-        for ball in frame.layout.balls:
-            if frame.at(ball.name, "quarantined") == 0.0:
-                x, y, _ = frame.vector(ball.name, "position", 3)
-                speed = sum(value * value for value in frame.vector(ball.name, "linear_velocity", 3))
-                inside = (
-                    abs(x) <= self._table.field.length / 2 + margin and abs(y) <= self._table.field.width / 2 + margin
-                )
-                hold(inside and speed <= limit * limit, f"{ball.name} is out of its bounds at tick {frame.tick}")
 
     def end(self, system: System, nodes: int) -> None:
         """When all has healed: everybody is back, everything is answered, and the journals give what is there."""

@@ -236,6 +236,8 @@ class Requests:
     # --- the world ---------------------------------------------------------------------------------------------------
 
     def _add(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
+        if self._core.deployment.is_hall:
+            raise Refused("this world is a hall: balls are added to a table")
         layout = self._next_layout()
         taken = {*layout.names, *(waiting.edit.name for waiting in self._pending)}
         name = _name(arguments, "name", _free_name(taken))
@@ -382,7 +384,7 @@ def _chosen(what: str, name: str, choices: Sequence[str]) -> str:
         return name
     nearest = nearest_name(name, choices)
     hint = f", nearest is {nearest}" if nearest else ""
-    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices)}{hint}")
+    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices) or 'none'}{hint}")
 
 
 def _integer(arguments: dict[str, Any], name: str, low: int, high: int) -> int:

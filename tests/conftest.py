@@ -9,10 +9,14 @@ import os
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
+
+from foosim.protocol.deployment_file import apply_sets
+from foosim.protocol.yaml_tree import locate_in, plain, read_tree, write_yaml
 
 settings.register_profile(
     "foosim", derandomize=True, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
@@ -38,6 +42,29 @@ def pytest_report_header(config: pytest.Config) -> str:
     links = f"links: seed={config.getoption('--links-seed')}, full={config.getoption('--links-full')}"
     hypothesis = f"hypothesis: derandomize={current.derandomize}, deadline={current.deadline}"
     return f"{hypothesis}; fuzz: {seed=}, {payloads=}; {links}"
+
+
+WAREHOUSE = Path(__file__).parent.parent / "deploy" / "warehouse.yaml"
+
+
+@pytest.fixture(scope="session")
+def fleet_text() -> Callable[..., str]:
+    """The text of a small hall: so many of the warehouse's rovers, with their controllers, and settings."""
+
+    def text(rovers: int, *sets: str) -> str:
+        tree, _ = read_tree(WAREHOUSE.read_text(), locate_in(WAREHOUSE.name))
+        assert tree is not None
+        data: Any = plain(tree)
+        gone = {f"{kind}{number:02d}" for kind in ("rover", "pilot") for number in range(rovers + 1, 21)}
+        for section in ("robots", "players"):
+            data[section] = {name: about for name, about in data[section].items() if name not in gone}
+        if rovers == 1:
+            del data["players"]["pilot01"]["hears"]["pilot*"]  # there is no other one
+        for node in data["nodes"].values():
+            node["robots"] = [robot for robot in node["robots"] if robot not in gone]
+        return apply_sets(write_yaml(data), WAREHOUSE.name, sets)
+
+    return text
 
 
 class WireTogether(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types

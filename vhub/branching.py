@@ -13,7 +13,7 @@ from pathlib import Path
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Malformed, Refused
 from foosim.protocol.frame import Frame, chain_next, frame_from_bytes
-from foosim.protocol.layout import BALL, WORLD, Layout
+from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import AddedEntity, Outbox
 from foosim.protocol.start import Start, start_with
 from foosim.protocol.units import format_ns, parse_ns
@@ -126,7 +126,7 @@ def _seconds(at_ns: int | None) -> str | None:
 
 def _differences(layout: Layout, deployment: Deployment, added: list[AddedEntity]) -> list[str]:
     """Return in words where a captured layout is not that of the deployment with what was added."""
-    wanted = {**{name: robot.model for name, robot in deployment.robots.items()}, BALL: BALL, WORLD: WORLD}
+    wanted = dict(build_layout(deployment).models)
     differing = [
         f"{a.name} was added, the deployment has a {wanted[a.name]} of that name" for a in added if a.name in wanted
     ]

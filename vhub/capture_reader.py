@@ -29,8 +29,8 @@ from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Delivered, Edit, Origin
 from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
+from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import first_chain
-from foosim.protocol.table_scene import build_scene
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
     ASSETS,

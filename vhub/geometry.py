@@ -37,7 +37,7 @@ from foosim.protocol.scene import (
     shape_box,
     swept_box,
 )
-from foosim.protocol.table_scene import build_scene
+from foosim.protocol.scenes import build_scene
 from foosim.vhub.rays import (
     MARGIN_M,
     Span,

@@ -15,6 +15,7 @@ from foosim.node.core import NodeCore
 from foosim.node.inputs import Inputs
 from foosim.node.sensors import encoder
 from foosim.node.step import Stepper
+from foosim.node.table_world import TableWorld
 from foosim.protocol import channels
 from foosim.protocol.assign import Assignment
 from foosim.protocol.member import Member
@@ -121,7 +122,7 @@ def _running_noise(planting: Planting) -> None:
 
 @register("no quarantine", "a result that cannot be is not taken", 5)
 def _no_quarantine(planting: Planting) -> None:
-    planting.swap(Stepper, "_plausible", lambda self, entity, numbers, before: True)
+    planting.swap(TableWorld, "plausible", lambda self, entity, numbers, before: True)
 
 
 @register("commands go to who solved last", "deliveries apply in their order at their tick", 1)

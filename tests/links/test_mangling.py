@@ -9,7 +9,7 @@ from math import comb, expm1, log1p, sqrt
 import pytest
 
 from foosim.protocol.messages import Sent
-from foosim.vhub.packet import Flight
+from foosim.vhub.packet import Flight, content_of
 from tests.links.offered import ENDS, MS, Hub, deployment_of, every, fabric_of, fates, play, rule
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, chi_square
@@ -34,8 +34,8 @@ def test_packets_with_errors(proof: Proof, size: int, rate: float) -> None:
     counts, places = Counter[int](), [0] * min(bits, 16)
     for flight in fates(fabric_of(settings, proof.seed), every(MS, n), size):
         assert not flight.cause
-        found = flipped(zeros, flight.payload) if flight.bits_flipped else []
-        assert len(found) == flight.bits_flipped and (found or flight.payload == zeros)
+        found = flipped(zeros, content_of(flight)) if flight.bits_flipped else []
+        assert len(found) == flight.bits_flipped and (found or content_of(flight) == zeros)
         counts[len(found)] += 1
         for place in found:
             places[place * len(places) // bits] += 1
