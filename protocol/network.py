@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, StringConstraints
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
 from foosim.protocol.hosts import Name
-from foosim.protocol.impairments import Impairments, default
+from foosim.protocol.impairments import Delay, Impairments, default
 from foosim.protocol.radios import PresetName, Radio, Site
 from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity, custom_error
@@ -155,6 +155,10 @@ class Defaults(Part):
     preset: PresetName = "perfect"
     in_flight_on_partition: Literal["drop", "deliver"] = "drop"
     """What becomes of a packet that is on its way when a partition between its ends begins."""
+    phase_ns: Delay = default("0 s", "phase")
+    """How far apart the clocks of radios are: the packets of each come to it later by a time of its own, at most this.
+
+    Without it all that is sent at one tick is sent at the same instant, and contends."""
 
 
 class Network(Part):

@@ -31,6 +31,7 @@ def check_network(data: object) -> Iterator[Finding]:
         return
     yield from _radios(view)
     yield from _carriers(view, endpoints)
+    yield from _phase(view)
     yield from _placeless(view, endpoints)
     yield from _links(view, endpoints)
     yield from _events(view, endpoints)
@@ -68,6 +69,17 @@ def _carriers(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
         if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
             nearest = quoted(nearest_name(glob, endpoints))
             yield Finding(("network", "places", glob), "a selector that matches no endpoint", glob, nearest, at="key")
+
+
+def _phase(view: View) -> Iterator[Finding]:
+    """Packets of one tick are sent before those of the next."""
+    try:
+        phase_ns, tick_ns = units.parse_ns(view.get("network", "defaults", "phase")), view.tick_ns()
+    except BadValue:
+        return
+    if tick_ns is not None and phase_ns > tick_ns:
+        text = view.get("network", "defaults", "phase")
+        yield Finding(("network", "defaults", "phase"), "more than the tick", text, repr(units.format_ns(tick_ns)))
 
 
 def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ measures in wall time is off, because the machines that run the tests are shared
 import os
 import subprocess
 from collections.abc import Callable, Iterator
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -51,10 +52,12 @@ WAREHOUSE = Path(__file__).parent.parent / "deploy" / "warehouse.yaml"
 def fleet_text() -> Callable[..., str]:
     """The text of a small hall: so many of the warehouse's rovers, with their controllers, and settings."""
 
+    tree, _ = read_tree(WAREHOUSE.read_text(), locate_in(WAREHOUSE.name))
+    assert tree is not None
+    whole: Any = plain(tree)
+
     def text(rovers: int, *sets: str) -> str:
-        tree, _ = read_tree(WAREHOUSE.read_text(), locate_in(WAREHOUSE.name))
-        assert tree is not None
-        data: Any = plain(tree)
+        data = deepcopy(whole)
         gone = {f"{kind}{number:02d}" for kind in ("rover", "pilot") for number in range(rovers + 1, 21)}
         for section in ("robots", "players"):
             data[section] = {name: about for name, about in data[section].items() if name not in gone}

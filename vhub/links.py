@@ -38,7 +38,7 @@ class Link:
         self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
         self._draws = False
-        self._slots = 0
+        self._slots = self._phase_ns = 0
 
     @property
     def rule(self) -> str:
@@ -74,6 +74,7 @@ class Link:
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._draws = self._slots != 0
+        self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """Clogs have changed: give packets on their way, in the order of sending, new due times."""
@@ -90,6 +91,7 @@ class Link:
         state.offered += is_offered
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
         flight.due_ns = flight.sent_ns
+        flight.phase_ns = self._phase_ns
         if self._draws:
             flight.slots = self._slots
             flight.words = draw_words(self._key, flight.sequence, flight.copy)

@@ -48,6 +48,8 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Which of them its link uses: bit n for slot n."""
     released_wall_ns: int = 0
     radio: str = ""
+    phase_ns: int = 0
+    """By how much later than its tick it came to its radio."""
     queue_bytes: int = 0
     """What waited before it when it came."""
     queue_ns: int = 0

@@ -180,7 +180,7 @@ class HubState:
         disruptions = [edit.event for edit in edits if isinstance(edit, Disrupt)]
         if disruptions:
             self._disrupt(tick, disruptions)
-        for packet in packets:
+        for packet in self._in_phase(packets):
             sequence = (tick << OUTBOX_SHIFT) + packet.index
             for receiver in self._addressed(packet.robot, packet.destination, packet.channel):
                 if receiver not in self._endpoints:
@@ -191,14 +191,23 @@ class HubState:
                 self._send(flight, tick, fates)
         return self._arrive_at_clients(tick, fates)
 
+    def _in_phase(self, packets: Iterable[RobotPacket]) -> Iterable[RobotPacket]:
+        """Return packets in the order in which they come to their radios."""
+        if not self.fabric.network.defaults.phase_ns:
+            return packets
+        return sorted(packets, key=lambda packet: (self.fabric.phase_ns(packet.robot), packet.robot, packet.index))
+
     def close_clients(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]) -> Deliveries:
-        """Phase two: judge what clients sent, in (source, sequence) order. Return the deliveries of the next tick."""
+        """Phase two: judge what clients sent, in (phase, source, sequence) order.
+
+        Return the deliveries of the next tick.
+        """
         tick = frame.tick
         sent_ns = tick * self.tick_ns
         self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
         for cause, count in self.refused_at_door:
             self.refuse(cause, count)
-        for source in sorted(admitted):
+        for source in sorted(admitted, key=lambda name: (self.fabric.phase_ns(name), name)):
             copies = 0
             for sent in sorted(admitted[source], key=lambda packet: packet.sequence):
                 if not self._admit(source, sent):

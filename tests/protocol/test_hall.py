@@ -61,11 +61,13 @@ def problems(text: str, *sets: str) -> list[str]:
         ("players.pilot01.process=vhub", "players.pilot01.process: a reserved name, 'vhub'"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_is_refused_with_its_place(setting: str, problem: str) -> None:
+def test_what_does_not_fit_is_refused_with_its_place(
+    fleet_text: Callable[..., str], setting: str, problem: str
+) -> None:
     elsewhere = {"'3 m, 12.4 m'": "y=12.4 m", "'-1 m, 9 m'": "y=9 m", "0 m'": "y=0 m", "'4 m, 6.5 m'": "y=6.5 m"}
     more = [f"robots.rover01.{y}" for end, y in elsewhere.items() if problem.endswith(end)]
     more += ["robots.rover03.y=6.5 m", "robots.rover01.x=4.2 m"] if "rover03" in setting else []
-    assert problems(WAREHOUSE, setting, *more)[:1] == [problem]
+    assert problems(fleet_text(3), setting, *more)[:1] == [problem]
 
 
 def test_a_process_has_its_players_on_one_host() -> None:

@@ -141,7 +141,7 @@ class OnAir:
     def _transmit(self, flight: Flight, last: Sending, broadcast: bool, cause: str) -> None:
         sender, air = self._sender, self._air
         air.advance(flight.sent_ns)
-        ready_ns = max(flight.sent_ns, sender.free_ns)
+        ready_ns = max(flight.sent_ns + flight.phase_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
         access, airtime_ns = self.access(flight, broadcast, UNIT if cause else None)
         end_ns, until_ns = start_ns + access.delay_ns, start_ns + access.occupancy_ns

@@ -43,7 +43,7 @@ class Queue:
             if shared is not None:
                 flight.queue_bytes, flight.queue_ns = shared.queue_bytes, shared.queue_ns
                 return shared.cause
-        now_ns, waiting = flight.sent_ns, sender.waiting
+        now_ns, waiting = flight.sent_ns + flight.phase_ns, sender.waiting
         gone = next((n for n, (departure_ns, _) in enumerate(waiting) if departure_ns > now_ns), len(waiting))
         if gone:
             del waiting[:gone]
