@@ -55,7 +55,7 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     queue_ns: int = 0
     access_ns: int = 0
     airtime_ns: int = 0
-    """On air or wire, all attempts together."""
+    """On air or wire, the last time; what attempts before it took is in `access_ns`."""
     propagation_ns: int = 0
     jitter_ns: int = 0
     distance_mm: int = 0

@@ -146,8 +146,8 @@ class OnAir:
         access, airtime_ns = self.access(flight, broadcast, UNIT if cause else None)
         end_ns, until_ns = start_ns + access.delay_ns, start_ns + access.occupancy_ns
         flight.air_start_ns, flight.air_end_ns = end_ns - airtime_ns, end_ns
-        flight.airtime_ns = access.airtime_ns
-        flight.access_ns = end_ns - ready_ns - access.airtime_ns
+        flight.airtime_ns = min(airtime_ns, access.delay_ns)
+        flight.access_ns = end_ns - ready_ns - flight.airtime_ns
         flight.retries = access.retries
         if access.outcome == "ok":
             flight.is_settled = not broadcast and self.is_acknowledged
