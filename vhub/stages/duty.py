@@ -19,7 +19,7 @@ class Duty:
         self._settings, self._sender = setup.settings, setup.sender
         self._share = setup.settings.duty_cycle
         self._size_ns = int(self._share * setup.settings.duty_window_ns)
-        self._broadcasts = setup.settings.published == "broadcast"
+        self._broadcasts = setup.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Duty | None:

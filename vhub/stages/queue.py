@@ -34,7 +34,7 @@ class Queue:
         self._codel = queue.drop == "codel"
         self._target_ns, self._interval_ns = queue.codel_target_ns, queue.codel_interval_ns
         self._overhead = setup.settings.overhead_bytes
-        self._broadcasts = setup.is_radio and setup.settings.published == "broadcast"
+        self._broadcasts = setup.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Queue | None:
