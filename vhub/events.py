@@ -79,6 +79,8 @@ class Timeline:
         self._events = [(event, f"event {number}") for number, event in enumerate(network.events)]
         """Each with what its draws are for: the same, whatever is added."""
         self._asked = 0
+        self._heals: list[tuple[int, Event]] = []
+        """With their place in the order of time."""
         self.cuts: list[Cut] = []
         self.holds: list[Hold] = []
         self.settings: list[Settings] = []
@@ -96,31 +98,34 @@ class Timeline:
     def _compile(self) -> None:
         self.version += 1
         self.cuts, self.holds, self.settings, self.chaos = [], [], [], []
-        for event, purpose in sorted(self._events, key=lambda of: of[0].at_ns):
-            self._take(event, draw_key(self._seed, "network", purpose))
+        ordered = sorted(self._events, key=lambda of: of[0].at_ns)
+        self._heals = [(number, event) for number, (event, _) in enumerate(ordered) if event.heal is not None]
+        for number, (event, purpose) in enumerate(ordered):
+            self._take(number, event, draw_key(self._seed, "network", purpose))
 
-    def _take(self, event: Event, key: bytes) -> None:
+    def _take(self, number: int, event: Event, key: bytes) -> None:
         start_ns, end_ns = event.at_ns, _end_ns(event, key)
         if event.partition is not None:
-            healed_ns = self._healed("partitions", start_ns, end_ns)
+            healed_ns = self._healed("partitions", number, end_ns)
             self.cuts.append(Cut(start_ns, healed_ns, self._groups(event.partition), event.symmetric))
         elif event.clog is not None:
             ends = self._selected(event.clog.from_), self._selected(event.clog.to)
-            self.holds.append(Hold(start_ns, self._healed("clogs", start_ns, end_ns), *ends))
+            self.holds.append(Hold(start_ns, self._healed("clogs", number, end_ns), *ends))
         elif event.set is not None:
-            until_ns = self._healed("settings", start_ns, FOREVER_NS)
+            until_ns = self._healed("settings", number, FOREVER_NS)
             self.settings.append(Settings(start_ns, until_ns, event.set.link, event.set))
         elif event.chaos is not None:
             among = self._selected(event.chaos.among)
-            chaos = ChaosTime(start_ns, self._healed("chaos", start_ns, end_ns), key, among)
+            chaos = ChaosTime(start_ns, self._healed("chaos", number, end_ns), key, among)
             self.chaos.append(chaos)
             self.settings.append(Settings(start_ns, chaos.end_ns, "", chaos_settings(key), among))
             for begin_ns, stop_ns, group, both in partitions_of_chaos(key, start_ns, chaos.end_ns, sorted(among)):
                 self.cuts.append(Cut(begin_ns, stop_ns, (group, among - group), both))
 
-    def _healed(self, what: str, start_ns: int, end_ns: int) -> int:
-        heals = (e.at_ns for e, _ in self._events if e.heal in ("all", what) and e.at_ns >= start_ns)
-        return min(end_ns, min(heals, default=FOREVER_NS))
+    def _healed(self, what: str, number: int, end_ns: int) -> int:
+        """Return when what an event began ends: by itself, or with the next heal behind it."""
+        heals = (heal.at_ns for behind, heal in self._heals if behind > number and heal.heal in ("all", what))
+        return min(end_ns, next(heals, FOREVER_NS))
 
     def _selected(self, globs: Sequence[str]) -> frozenset[str]:
         return frozenset(name for name in self._endpoints if selects(globs, name))
