@@ -100,7 +100,9 @@ class RadioKeys(Impairments):
     """The Wi-Fi access category: its window and its waiting time."""
     retries: Annotated[int, Field(ge=0, le=31)] = 7
     published: Literal["broadcast", "unicast"] = "broadcast"
-    """How a packet goes that is for all who subscribe: once for all without acknowledgement, or once for each."""
+    """How a packet goes that is for all who subscribe: once for all without acknowledgement, or once for each.
+
+    Over LTE it is once for each."""
     spreading_factor: Annotated[int, Field(ge=7, le=12)] = 7
     coding_rate: Annotated[int, Field(ge=1, le=4)] = 1
     """Of LoRa: 4 / (4 + this)."""

@@ -61,20 +61,12 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     opportunity_bytes: int = 0
     """How far a trace of capacity is used up."""
     last: Sending | None = None
-    last_copy: Sending | None = None
-    """The last transmission, and the last one of a copy."""
+    """The last transmission."""
 
     def sending(self, sequence: int, copy: int) -> Sending | None:
         """Return the last transmission if it is that of a packet: a broadcast's receivers share it."""
-        last = self.last_copy if copy else self.last
+        last = self.last
         return last if last is not None and last.sequence == sequence and last.copy == copy else None
-
-    def keep(self, sending: Sending) -> None:
-        """Remember a transmission as the last one."""
-        if sending.copy:
-            self.last_copy = sending
-        else:
-            self.last = sending
 
 
 class Transmission(msgspec.Struct, array_like=True, forbid_unknown_fields=True):

@@ -182,13 +182,15 @@ class HubState:
             self._disrupt(tick, disruptions)
         for packet in self._in_phase(packets):
             sequence = (tick << OUTBOX_SHIFT) + packet.index
+            flights = []
             for receiver in self._addressed(packet.robot, packet.destination, packet.channel):
                 if receiver not in self._endpoints:
                     self.refuse("no_route")
                     continue
                 published = not packet.destination
-                flight = Flight(packet.robot, receiver, packet.channel, sequence, sent_ns, 0, packet.payload, published)
-                self._send(flight, tick, fates)
+                what = sequence, sent_ns, 0, packet.payload, published
+                flights.append(Flight(packet.robot, receiver, packet.channel, *what))
+            self._send(flights, tick, fates)
         return self._arrive_at_clients(tick, fates)
 
     def _in_phase(self, packets: Iterable[RobotPacket]) -> Iterable[RobotPacket]:
@@ -217,9 +219,8 @@ class HubState:
                 if copies > limits.PACKETS_PER_MESSAGE_MAX:
                     self.refuse("broadcast_full")
                     continue
-                for receiver in receivers:
-                    what = sent.sequence, sent_ns, sent.stamp_ns, sent.payload, not sent.destination
-                    self._send(Flight(source, receiver, sent.channel, *what), tick, fates)
+                what = sent.sequence, sent_ns, sent.stamp_ns, sent.payload, not sent.destination
+                self._send([Flight(source, receiver, sent.channel, *what) for receiver in receivers], tick, fates)
         self.closed = tick
         deliveries = self._arrive_at_robots(tick + 1, frame, fates)
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
@@ -305,20 +306,24 @@ class HubState:
             self._receivers = {pair: tuple(names) for pair, names in heard.items()}
         return self._receivers.get((source, channel), ())
 
-    def _send(self, flight: Flight, tick: int, fates: list[Flight]) -> None:
-        is_offered = flight.copy == 0
-        self.packets.offered += is_offered
-        if not self.fabric.link(flight.source, flight.destination, flight.channel).send(flight):
-            self.packets.dropped += is_offered
-            fates.append(flight)
-            return
-        is_sensed = flight.source in self._robots and flight.destination in self.members
-        self._let_fly(flight, tick if is_sensed else tick + 1)
-        if flight.is_doubled:
-            self.packets.copies += 1
-            what = flight.sequence, flight.sent_ns, flight.stamp_ns, flight.payload, flight.published
-            twin = Flight(flight.source, flight.destination, flight.channel, *what, copy=1)
-            self._send(twin, tick, fates)
+    def _send(self, flights: Sequence[Flight], tick: int, fates: list[Flight]) -> None:
+        """Judge a packet for each of its receivers, then the copies: all receivers of a broadcast share the air."""
+        twins = []
+        for flight in flights:
+            is_offered = flight.copy == 0
+            self.packets.offered += is_offered
+            if not self.fabric.link(flight.source, flight.destination, flight.channel).send(flight):
+                self.packets.dropped += is_offered
+                fates.append(flight)
+                continue
+            is_sensed = flight.source in self._robots and flight.destination in self.members
+            self._let_fly(flight, tick if is_sensed else tick + 1)
+            if flight.is_doubled:
+                self.packets.copies += 1
+                what = flight.sequence, flight.sent_ns, flight.stamp_ns, flight.payload, flight.published
+                twins.append(Flight(flight.source, flight.destination, flight.channel, *what, copy=1))
+        if twins:
+            self._send(twins, tick, fates)
 
     def _disrupt(self, tick: int, events: Sequence[str]) -> None:
         """Take what was asked of the network; clogs that come or go by it move what is on its way."""

@@ -19,7 +19,7 @@ class Duty:
         self._settings, self._sender = setup.settings, setup.sender
         self._share = setup.settings.duty_cycle
         self._size_ns = int(self._share * setup.settings.duty_window_ns)
-        self._broadcasts = setup.settings.published == "broadcast"
+        self._broadcasts = setup.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Duty | None:
@@ -38,7 +38,7 @@ class Duty:
         sender.tokens_at_ns = flight.sent_ns
         airtime_ns = self._airtime_ns(len(flight.payload))
         if airtime_ns > sender.tokens_ns:
-            sender.keep(Sending(flight.sequence, flight.copy, DUTY_CYCLE))
+            sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
             return DUTY_CYCLE
         sender.tokens_ns -= airtime_ns
         return ""

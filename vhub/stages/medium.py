@@ -116,7 +116,7 @@ class OnAir:
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
-        self._once = setup.settings.published == "broadcast"
+        self._once = setup.sends_once
 
     def at_sending(self, flight: Flight) -> str:
         cause = self._budget.measure(flight)

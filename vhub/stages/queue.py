@@ -28,7 +28,7 @@ class Queue:
         self._codel = queue.drop == "codel"
         self._target_ns, self._interval_ns = queue.codel_target_ns, queue.codel_interval_ns
         self._overhead = setup.settings.overhead_bytes
-        self._broadcasts = setup.is_radio and setup.settings.published == "broadcast"
+        self._broadcasts = setup.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Queue | None:
@@ -51,7 +51,7 @@ class Queue:
         wait_ns = max(0, sender.free_ns - now_ns)
         cause = self._judge(len(waiting), queued + len(flight.payload) + self._overhead, now_ns, wait_ns)
         flight.queue_bytes, flight.queue_ns = queued, wait_ns
-        sender.keep(Sending(flight.sequence, flight.copy, cause, queued, wait_ns))
+        sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
         return cause
 
     def _judge(self, packets: int, size: int, now_ns: int, wait_ns: int) -> str:
