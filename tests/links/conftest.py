@@ -8,6 +8,7 @@ from typing import Final
 
 import pytest
 
+from bench import lateness
 from bench.machine import this_machine
 from tests.links.proof import Proof, Row
 
@@ -48,8 +49,19 @@ class Table:
             if name == ROWS and report.when == "teardown":
                 self._rows[report.nodeid] = [tuple(row) for row in rows]  # type: ignore[misc]  # from another process
 
-    def pytest_sessionfinish(self) -> None:
-        rows = sorted((int(row[0][1:]), row) for rows in self._rows.values() for row in rows)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Measure what has to do with the wall clock, when all else is over; write the file."""
+        proof = Proof(self._seed, is_full=True)
+        late = lateness.lateness()
+        for share, measured, limit in ((50, late.p50_ms, lateness.P50_MS), (99, late.p99_ms, lateness.P99_MS)):
+            what = f"release less arrival at {lateness.RATE_HZ} packets/s: {share} % quantile in ms, to be below {limit:g}"
+            try:
+                proof.below("T26", what, measured, 3 * limit, late.packets)
+            except AssertionError as error:
+                print(f"\n{error}")
+                session.exitstatus = pytest.ExitCode.TESTS_FAILED
+        self._rows["lateness"] = proof.rows
+        rows = sorted(((int(row[0][1:]), row) for rows in self._rows.values() for row in rows), key=lambda of: of[:2])
         here = this_machine()
         lines = [
             f"| {test} | {what} | {statistic} | {measured} | {accepted} | {n:,} | {'holds' if holds else '**fails**'} |"
