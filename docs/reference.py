@@ -75,7 +75,7 @@ def write_commands() -> Iterator[str]:
 
 
 def _argument(parameter: Any) -> str:
-    name = parameter.name.upper() if parameter.nargs == 1 else "X Y Z"
+    name = parameter.metavar or (parameter.name.upper() if parameter.nargs == 1 else "X Y Z")
     return name if parameter.required else f"[{name}]"
 
 

@@ -6,7 +6,8 @@ Each subcommand is a thin shell over typed functions: `vhub.lint`, `vhub.explain
 from __future__ import annotations
 
 import sys
-import time
+import threading
+from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -23,6 +24,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import Answer
 from foosim.protocol.names import nearest_name
 from foosim.protocol.presets import PRESETS, provenance
+from foosim.protocol.process import Stop
 from foosim.protocol.settings import nested
 from foosim.protocol.traces import check_files, network_files
 from foosim.supervisor import control
@@ -175,23 +177,27 @@ def top(
     """
     console = Console()
     with control.connect(run) as desk:
+        if once:
+            status = desk.status()
+            _show_links(console, None, status, links_shown(status), json)
+            return
+        ended = threading.Event()
+        Stop().then(ended.set)
         before: dict[str, Any] | None = None
-        live = Live(console=console, auto_refresh=False) if console.is_terminal and not (once or json) else None
-        try:
-            if live is not None:
-                live.start()
-            while True:
-                status = desk.status()
+        live = Live(console=console, auto_refresh=False) if console.is_terminal and not json else None
+        with live or nullcontext():
+            while not ended.is_set():
+                try:
+                    status = desk.status(give_up=ended.is_set)
+                except control.NoAnswer:
+                    if ended.is_set():
+                        return
+                    raise
                 _show_links(console, live, status, links_shown(status, before), json)
-                if once or status["state"] in ("ended", "failed"):
+                if status["state"] in ("ended", "failed"):
                     return
                 before = status
-                time.sleep(EVERY_S)
-        except KeyboardInterrupt:
-            return
-        finally:
-            if live is not None:
-                live.stop()
+                ended.wait(EVERY_S)
 
 
 def _show_links(

@@ -117,7 +117,8 @@ def find_packet(capture: CaptureData, which: PacketName) -> PacketRow:
     if len(exact) == 1:
         return exact[0]
     names = [str(PacketName(which.source, which.sequence, *key)) for key in sorted(chosen if exact else found)]
-    shown = ", ".join(names[:NAMES_SHOWN]) + (f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else "")
+    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    shown = ", ".join(names[:NAMES_SHOWN]) + more
     raise BadValue(f"{capture.path}: say which one of {shown}", str(which))
 
 
