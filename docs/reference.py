@@ -25,6 +25,7 @@ from foosim.rehearsal.replay_command import app as replay_app
 from foosim.supervisor.cli import app as supervisor_app
 from foosim.supervisor.doctor_command import app as doctor_app
 from foosim.supervisor.guard import app as guard_app
+from foosim.supervisor.net_command import app as net_app
 from foosim.supervisor.pki_command import app as pki_app
 from foosim.vhub.main import app as vhub_app
 from foosim.vhub.rows import ROW_TYPES, row_schema
@@ -34,6 +35,7 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-supervisor": supervisor_app,
     "foosim-rehearse": rehearse_app,
     "foosim-replay": replay_app,
+    "foosim-net": net_app,
     "foosim-vhub": vhub_app,
     "foosim-node": node_app,
     "foosim-player": player_app,
@@ -73,7 +75,7 @@ def write_commands() -> Iterator[str]:
 
 
 def _argument(parameter: Any) -> str:
-    name = parameter.name.upper() if parameter.nargs == 1 else "X Y Z"
+    name = parameter.metavar or (parameter.name.upper() if parameter.nargs == 1 else "X Y Z")
     return name if parameter.required else f"[{name}]"
 
 

@@ -22,7 +22,8 @@ from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import DeploymentError, describe
 from foosim.protocol.hall_start import start_findings
-from foosim.protocol.network_references import check_network
+from foosim.protocol.network import Network
+from foosim.protocol.network_references import check_network, check_network_alone
 from foosim.protocol.references import Finding, check_references, path_text
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.settings import place_sets
@@ -76,6 +77,28 @@ def apply_sets(text: str, name: str, sets: Sequence[str]) -> str:
         what = f"too large with these settings ({size} bytes, {nodes} nodes, {depth} deep)"
         raise DeploymentError([str(Problem(tree.place, what))])
     return canonical
+
+
+def load_network(text: str, name: str, sets: Sequence[str] = ()) -> Network | None:
+    """The network of a file that has its `network:` section alone, after settings; None for any other file.
+
+    Raises DeploymentError with all problems of the section. Whom its selectors match is not known.
+    """
+    tree, problems = read_tree(text, locate_in(name))
+    if not isinstance(tree, Fields) or set(tree.values) != {"network"}:
+        return None
+    tree, set_problems = place_sets(tree, sets)
+    data = plain(tree)
+    findings = list(islice(check_network_alone(data), PROBLEMS_MAX + 1))
+    network = None
+    try:
+        network = Network.model_validate(data["network"])
+    except ValidationError as error:
+        findings += islice(schema_findings(error, ("network",)), PROBLEMS_MAX + 1)
+    found = [*problems, *set_problems, *(_problem(tree, finding) for finding in findings)]
+    if found or network is None:
+        raise DeploymentError(_report(found))
+    return network
 
 
 def check_open_meshes(text: str, name: str, deployment: Deployment) -> None:

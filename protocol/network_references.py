@@ -17,6 +17,7 @@ from foosim.protocol.presets import PRESETS, preset_settings
 from foosim.protocol.references import Finding, Location, View, quoted
 
 JITTER_RATIO_MAX: Final = 100
+NO_ENDPOINT: Final = "a selector that matches no endpoint"
 CHAOS_NS_MAX: Final = 3_600_000_000_000
 BODILESS: Final = "camera"
 """The model of robots that have no body."""
@@ -37,6 +38,14 @@ def check_network(data: object) -> Iterator[Finding]:
     yield from _events(view, endpoints)
 
 
+def check_network_alone(data: object) -> Iterator[Finding]:
+    """All problems of a network's section that stands alone: whom its selectors match is not known."""
+    view = View(data)
+    for check in (_carriers, _links, _events):
+        yield from (finding for finding in check(view, ()) if finding.what != NO_ENDPOINT)
+    yield from _radios(view)
+
+
 def _count(view: View, key: str, at_most: int) -> range:
     entries = view.get("network", key)
     return range(min(len(entries), at_most) if isinstance(entries, list) else 0)
@@ -47,7 +56,7 @@ def _matches(view: View, location: Location, endpoints: Sequence[str], beside: S
     for index, glob in view.texts(*location):
         if glob not in beside and names.is_selector(glob) and not any(fnmatchcase(e, glob) for e in endpoints):
             nearest = quoted(nearest_name(glob, [*endpoints, *beside]))
-            yield Finding((*location, index), "a selector that matches no endpoint", glob, nearest)
+            yield Finding((*location, index), NO_ENDPOINT, glob, nearest)
 
 
 def _radios(view: View) -> Iterator[Finding]:
@@ -61,14 +70,14 @@ def _carriers(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
         location: Location = ("network", "robots", glob)
         if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
             nearest = quoted(nearest_name(glob, endpoints))
-            yield Finding(location, "a selector that matches no endpoint", glob, nearest, at="key")
+            yield Finding(location, NO_ENDPOINT, glob, nearest, at="key")
         for index, radio in view.texts(*location):
             if radio not in radios:
                 yield Finding((*location, index), "unknown radio", radio, quoted(nearest_name(radio, radios)))
     for glob in list(view.mapping("network", "places"))[:LINK_RULES_MAX]:
         if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
             nearest = quoted(nearest_name(glob, endpoints))
-            yield Finding(("network", "places", glob), "a selector that matches no endpoint", glob, nearest, at="key")
+            yield Finding(("network", "places", glob), NO_ENDPOINT, glob, nearest, at="key")
 
 
 def _phase(view: View) -> Iterator[Finding]:

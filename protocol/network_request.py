@@ -7,6 +7,7 @@ know), `supervisor.requests`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import islice
 from typing import Final
 
@@ -16,10 +17,12 @@ from foosim.protocol import limits, units
 from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Refused, describe
-from foosim.protocol.network import Event
+from foosim.protocol.impairments import Trace
+from foosim.protocol.network import Event, Network
 from foosim.protocol.network_references import event_findings
 from foosim.protocol.references import Finding, Location, View, path_text
 from foosim.protocol.schema_problems import schema_findings
+from foosim.protocol.traces import file_settings
 
 PROBLEMS_MAX: Final = 20
 _UNDER: Final[Location] = ("network", "events", 0)
@@ -56,10 +59,21 @@ def _findings(deployment: Deployment, data: dict[str, object], at_ns: int) -> li
         event = Event.model_validate({**data, "at": f"{at_ns} ns"})
     except ValidationError as error:
         return found + [_relative(finding) for finding in schema_findings(error, _UNDER)]
+    found += _files(deployment, event)
     if event.until_ns is not None and event.until_ns <= at_ns:
         what = f"not after the present simulated time, {units.format_ns(at_ns)}"
         found.append(Finding(("until",), what, data["until"]))
     return found
+
+
+def _files(deployment: Deployment, event: Event) -> Iterator[Finding]:
+    """Nobody brings files with a request: it may name those that the network was made with, for the same."""
+    known = {(type(setting), setting.file) for _, setting in file_settings(deployment.network)}
+    for _, setting in file_settings(Network(events=[event])):
+        if (type(setting), setting.file) not in known or setting.digest is not None:
+            key = "trace" if isinstance(setting, Trace) else "jitter"
+            what = "not one of the files of its kind that this deployment's network names, or with a digest"
+            yield Finding(("set", key, "file"), what, setting.file)
 
 
 def _relative(finding: Finding) -> Finding:

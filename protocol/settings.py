@@ -8,12 +8,12 @@ by its number, `[0]` or `.0`, or by its `id`. The value is YAML. Settings apply 
 
 import re
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import describe, show
+from foosim.protocol.errors import DeploymentError, describe, show
 from foosim.protocol.names import nearest_name
-from foosim.protocol.yaml_tree import Fields, Items, Leaf, Place, Problem, Tree, read_tree
+from foosim.protocol.yaml_tree import Fields, Items, Leaf, Place, Problem, Tree, plain, read_tree
 
 SETS_MAX: Final = 256
 SET_LENGTH_MAX: Final = 4096
@@ -46,6 +46,32 @@ def place_sets(tree: Tree, sets: Sequence[str]) -> tuple[Tree, list[Problem]]:
         except _Misplaced as misplaced:
             problems.append(Problem(_place(number, misplaced.column), misplaced.text))
     return tree, problems
+
+
+def nested(sets: Sequence[str]) -> dict[str, Any]:
+    """Return settings `a.b=VALUE` as nested plain data; raises DeploymentError with all problems."""
+    tree = Fields(_place(1, 1))
+    problems: list[Problem] = []
+    for number, text in enumerate(sets, 1):
+        try:
+            steps, start = _read_path(text)
+            value, value_problems = _read_value(text, start, number)
+            problems += value_problems
+            node = tree
+            for step, column in steps[:-1]:
+                inner = node.values.setdefault(step, Fields(_place(number, column)))
+                if not isinstance(inner, Fields):
+                    raise _Misplaced(column, describe("set inside a value that is no mapping", step))
+                node = inner
+            if value is not None:
+                node.values[steps[-1][0]] = value
+        except _Misplaced as misplaced:
+            problems.append(Problem(_place(number, misplaced.column), misplaced.text))
+    if problems:
+        raise DeploymentError([str(problem) for problem in problems])
+    content = plain(tree)
+    assert isinstance(content, dict), "a mapping"
+    return content
 
 
 def _place(number: int, column: int) -> Place:

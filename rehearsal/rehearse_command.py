@@ -20,6 +20,8 @@ from foosim.rehearsal.swarm import fly
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.display import score_text
 from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.vhub.lint import meanings
+from foosim.vhub.lint_text import start_lines
 
 app = new_app()
 
@@ -74,6 +76,9 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     settled = Settings(on_say=show)
     if plan.branch is not None and not json:
         typer.echo(plan.branch.text)
+    if not json:
+        for line in start_lines(meanings(plan.deployment), str(file)):
+            typer.echo(line)
     inputs: dict[str, Any] = {"capture": capture, "start": plan.start, "folder": file.parent}
     result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settled, **inputs).json
     if json:

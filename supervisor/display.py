@@ -184,10 +184,11 @@ def _links(status: dict[str, Any], links_max: int) -> Table:
         table.add_column(column, justify="right")
     links = status["links"]
     shown = sorted(links, key=lambda link: (-link[2], link[:2]))[:links_max]
-    for source, destination, offered, delivered, dropped, delay_ns in sorted(shown):
+    for source, destination, offered, delivered, dropped, delay_ns, *_ in sorted(shown):
         table.add_row(source, destination, str(offered), str(delivered), str(dropped), f"{delay_ns / 1e6:.2f} ms")
     packets = status["packets"]
-    more = f"and {len(links) - len(shown)} more" if len(links) > len(shown) else ""
+    hidden = max(len(links), status.get("links_in_all", 0)) - len(shown)
+    more = f"and {hidden} more" if hidden > 0 else ""
     total = (str(packets["offered"]), str(packets["delivered"]), str(packets["dropped"]))
     table.add_row("all", more, *total, f"{packets['in_flight']} in flight", style="bold")
     return table

@@ -99,6 +99,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "processes": _processes(core, waiting_for),
         "starts": dict(core.roster.starts),
         "links": report.get("links", []),
+        "links_in_all": report.get("links_in_all", 0),
         "disruptions": {
             "asked": core.requests.disruptions,
             "last": [

@@ -32,6 +32,8 @@ from foosim.supervisor.remote import CAPTURE
 from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
+from foosim.vhub.lint import meanings
+from foosim.vhub.lint_text import start_lines
 
 POLL_S: Final = 0.02
 """How often a run that starts is looked at."""
@@ -161,6 +163,8 @@ class Up:
         display.say(f"run {folder.name}, logs in {folder.logs}")
         if self.plan.branch is not None:
             display.say(self.plan.branch.text)
+        for line in start_lines(meanings(self.plan.deployment), str(options.file)):
+            display.say(line)
         info = self._await(self._own_info)
         if info is None:
             return False

@@ -92,6 +92,7 @@ SHELLS = {
     "supervisor/launcher.py",
     "supervisor/leftovers.py",
     "supervisor/main.py",
+    "supervisor/net_command.py",
     "supervisor/pki.py",
     "supervisor/pki_command.py",
     "supervisor/pki_hosts.py",

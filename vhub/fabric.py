@@ -117,7 +117,7 @@ class Fabric:
     ) -> LinkSetup:
         """Return what the stages of a link are made from, for some time."""
         timeline = self.timeline
-        radio = (source + _OWN_QUEUE + destination, profile.rule) if profile.is_own_queue else (source, profile.radio)
+        radio = _sender(source, destination, profile)
         sender = self.radios.get(radio)
         if sender is None:
             sender = self.radios[radio] = RadioState()
@@ -146,6 +146,14 @@ class Fabric:
             self._opportunities(settings),
         )
 
+    def queue_ns(self, key: LinkKey, now_ns: int) -> int:
+        """Return how long what is sent on a link now waits before its turn comes."""
+        source, destination, name = key
+        rule, _, radio = name.partition("/")
+        senders = (source + _OWN_QUEUE + destination, rule), (source, radio or rule), (source, "")
+        found = next((self.radios[sender] for sender in senders if sender in self.radios), None)
+        return 0 if found is None else max(0, found.free_ns - now_ns)
+
     def _propagation(self, name: str, settings: Radio) -> Propagation:
         found = self._propagations.get(name)
         if found is None:
@@ -169,6 +177,11 @@ class Fabric:
 
     def _text(self, path: str) -> str:
         return self.deployment.asset_files[path].decode("ascii", "replace")
+
+
+def _sender(source: str, destination: str, profile: Profile) -> RadioKey:
+    """Return whose queue a link's packets wait in."""
+    return (source + _OWN_QUEUE + destination, profile.rule) if profile.is_own_queue else (source, profile.radio)
 
 
 def _name(profile: Profile) -> str:

@@ -98,10 +98,15 @@ class Link:
         for stage in self._stages:
             cause = stage.at_sending(flight)
             if cause:
-                flight.cause = cause
-                state.dropped += is_offered
+                self._drop(flight, cause)
                 return False
         return True
+
+    def _drop(self, flight: Flight, cause: str) -> None:
+        flight.cause = cause
+        if flight.copy == 0:
+            self.state.dropped += 1
+            self.state.causes[cause] = self.state.causes.get(cause, 0) + 1
 
     def arrive(self, flight: Flight, hindered: str) -> bool:
         """Judge a packet at arrival, by the settings of when it was sent: whatever was sent on the link meanwhile.
@@ -114,8 +119,7 @@ class Link:
         for stage in self._stages:
             cause = stage.at_arrival(flight, hindered)
             if cause:
-                flight.cause = cause
-                state.dropped += is_offered
+                self._drop(flight, cause)
                 return False
         state.delivered += is_offered
         state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered

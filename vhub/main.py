@@ -45,6 +45,8 @@ from foosim.vhub.capture_file import check_new, origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.lint import meanings
+from foosim.vhub.lint_text import start_lines
 from foosim.vhub.records import Closing, first_head
 from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_captured
 from foosim.vhub.room_watch import RoomWatch
@@ -203,6 +205,8 @@ class HubProcess:
         if self._capture is not None and past is not None and past.known is not None:
             self._capture.keep(Closing(past.known, past.known.digest, [], []))  # which it has: it goes on from there
         core.begin(past, now_ns)
+        for line in start_lines(meanings(deployment), build.deployment_name) if past is None else ():
+            self._log.info(line)
         self._listen(deployment)
 
     def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:

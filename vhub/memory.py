@@ -22,6 +22,8 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Sum of (due - sent) of what was delivered, for people."""
     copies: int = 0
     """Copies that the link made; they are in none of the other counts."""
+    causes: dict[str, int] = {}
+    """How many were dropped by each cause."""
 
 
 class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):

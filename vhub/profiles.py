@@ -33,7 +33,8 @@ class Profile:
 
 
 @lru_cache(maxsize=16)
-def _preset(name: str) -> Radio:
+def preset_radio(name: str) -> Radio:
+    """Return a preset with nothing else written."""
     return Radio.model_validate({"preset": name})
 
 
@@ -57,18 +58,21 @@ class Profiles:
 
     def find(self, source: str, destination: str, channel: str) -> Profile:
         """Return the profile of packets from source to destination on a channel."""
+        return self.of_rule(self._network.rule_for(source, destination, channel), source, destination)
+
+    def of_rule(self, rule: LinkRule | None, source: str, destination: str) -> Profile:
+        """Return the profile of a pair of which it is known which rule matches."""
         network = self._network
-        rule = network.rule_for(source, destination, channel)
         via = None if rule is None else rule.via
         is_on_board = self.body(source) == self.body(destination)
         if via is None and not is_on_board:
             common = self._common(source, destination)
             if common == "" and rule is None:
-                return Profile(NO_RADIO, "", _preset(PERFECT))
+                return Profile(NO_RADIO, "", preset_radio(PERFECT))
             via = common or None
         if via is None and rule is None and is_on_board:
-            return Profile(ON_BOARD, "", _preset(PERFECT))
-        base = _preset(network.defaults.preset) if via is None else network.radios[via]
+            return Profile(ON_BOARD, "", preset_radio(PERFECT))
+        base = preset_radio(network.defaults.preset) if via is None else network.radios[via]
         if rule is None:
             return Profile(via or network.defaults.preset, via or "", base)
         return Profile(rule.id, via or "", over(base, rule), "rate_bps" in rule.model_fields_set or via is None)

@@ -6,13 +6,16 @@ Neighbours: `core` sends it, `supervisor.status` shows it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 from foosim.protocol.codec import encode_json
 from foosim.vhub.state import HubState
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore
+
+
+LINKS_TOLD_MAX: Final = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +43,9 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
 def report(core: HubCore) -> bytes:
     """Return the account so far, where the radio plane and the capture are, and how the capture does.
 
-    `links` are [from, to, offered, delivered, dropped, mean delay in ns]; `refused` counts messages by channel and
-    sender, `refusals` packets by reason.
+    `links` are those with the most traffic: [from, to, offered, delivered, dropped, mean delay in ns, rule, how long
+    its queue is in ns, dropped by cause], and `links_in_all` how many there are. `refused` counts messages by channel
+    and sender, `refusals` packets by reason.
     """
     state, refused = core.state, core.refusals.by_sender()
     if state is None:
@@ -58,20 +62,25 @@ def report(core: HubCore) -> bytes:
             },
             "refused": refused,
             "refusals": state.refusals,
-            "links": [
-                [
-                    source,
-                    destination,
-                    s.offered,
-                    s.delivered,
-                    s.dropped,
-                    s.delay_ns // s.delivered if s.delivered else 0,
-                ]
-                for (source, destination, _), s in sorted(state.fabric.states.items(), key=lambda item: item[0])
-            ],
+            "links": _links(state),
+            "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
             "capture": core.capture,
             "recording": core.recording,
             "radio_address": core.radio_address,
         }
     )
+
+
+def _links(state: HubState) -> list[list[Any]]:
+    """Return the links that are told, by name."""
+    fabric, now_ns = state.fabric, state.closed * state.tick_ns
+    busiest = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))[:LINKS_TOLD_MAX]
+    return [
+        [
+            *key[:2],
+            *(its.offered, its.delivered, its.dropped, its.delay_ns // its.delivered if its.delivered else 0),
+            *(key[2], fabric.queue_ns(key, now_ns), dict(sorted(its.causes.items()))),
+        ]
+        for key, its in sorted(busiest, key=lambda item: item[0])
+    ]

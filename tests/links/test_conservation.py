@@ -164,7 +164,7 @@ def received(n: int, seed: int, **changed: Any) -> int:
         "network.robots={'*': [r]}",
         f"network.places={{a: [0 m, 0 m, 1 m], b: [{at['distance']} m, 0 m, 1 m], '*': [0 m, 0 m, 50 m]}}",
     )
-    fabric = fabric_of("allow: true", seed, f"network.links=[]", *sets)
+    fabric = fabric_of("allow: true", seed, "network.links=[]", *sets)
     link, count = fabric.link("a", "b", "news"), 0
     for sequence in range(1, n + 1):
         flight = Flight("a", "b", "news", sequence, sequence * 400 * MS, 0, bytes(80), published=True)

@@ -93,7 +93,7 @@ SCRIPTS = st.lists(st.tuples(st.integers(1, TICKS - 10), EVENTS), max_size=6).ma
 @settings(max_examples=30)
 @given(script=SCRIPTS)
 def test_what_is_asked_for_does_what_it_does_in_a_deployment(script: Script) -> None:
-    """But to what reaches robots at that very tick: it is said already, or comes a tick later where a clog is healed."""
+    """But to what reaches robots at that very tick: that is said already."""
     usual, asked = fates_of(planned(script)), fates_of(deployment_with(), script)
     assert usual.keys() == asked.keys()
     ticks = {at for at, _ in script}

@@ -212,14 +212,15 @@ def wifi_timing(settings: Radio) -> WifiTiming:
 
 
 @lru_cache(maxsize=256)
-def _mode_of(modes: tuple[str, ...], rate_bps: int) -> str:
+def mode_of(modes: tuple[str, ...], rate_bps: int) -> str:
+    """Return the modulation whose rate is the nearest."""
     return min(modes, key=lambda mode: (abs(errors.MODES[mode].rate_bps - rate_bps), mode))
 
 
 def error_threshold(settings: Radio, flight: Flight, snr_cdb: int) -> int:
     """Return the packet error rate at a ratio, in units of 2^-64; 0 on media that have no curve."""
     if settings.medium == "wifi":
-        mode = _mode_of(wifi_modes(settings), flight.rate_bps)
+        mode = mode_of(wifi_modes(settings), flight.rate_bps)
         return errors.per_threshold(mode, snr_cdb, len(flight.payload) + WIFI_OVERHEAD_BYTES)
     if settings.medium == "ieee802154":
         return errors.per_threshold("oqpsk_250", snr_cdb, len(flight.payload) + LRWPAN_OVERHEAD_BYTES)
@@ -242,7 +243,7 @@ class WiFi(OnAir):
         """The fixed rate; else a broadcast goes at the lowest, a unicast at the highest with few errors."""
         settings = self._settings
         if settings.rates == "fixed":
-            return errors.MODES[_mode_of(self._modes, settings.fixed_rate_bps)].rate_bps
+            return errors.MODES[mode_of(self._modes, settings.fixed_rate_bps)].rate_bps
         if broadcast:
             return errors.MODES[self._modes[0]].rate_bps
         size = len(flight.payload) + WIFI_OVERHEAD_BYTES
@@ -252,7 +253,7 @@ class WiFi(OnAir):
         return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        mode = _mode_of(self._modes, flight.rate_bps)
+        mode = mode_of(self._modes, flight.rate_bps)
         airtime_ns = wifi_airtime_ns(mode, len(flight.payload), self._timing)
         ack_ns = 0 if broadcast else wifi_ack_ns(mode, self._timing)
         threshold = 0 if broadcast else lost

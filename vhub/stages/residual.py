@@ -37,6 +37,10 @@ class Residual:
         """Whether the packet meets the link in its bad state."""
         return False
 
+    def threshold(self, *, bad: bool) -> int:
+        """Return the number below which a packet's draw loses it, in the good or the bad state."""
+        return self._any[bad]
+
     def at_sending(self, flight: Flight) -> str:
         bad = flight.is_bad = self.is_bad(flight)
         if self._outages is not None and self._outages.is_bad(flight.sent_ns):

@@ -1,0 +1,95 @@
+"""What a network means, and what links of a running system do, as tables and lines for people.
+
+Pure: neighbours are `vhub.lint_text` (lines of the first), `links_shown` (figures of the second), `net_command`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from rich.table import Table
+
+from foosim.vhub.figures import range_text, rate_text, time_text
+from foosim.vhub.lint import MANY, SMALL_BYTES, Meaning
+from foosim.vhub.lint_text import burst_text, delay_text, loss_text
+
+
+def meaning_tables(meanings: Sequence[Meaning]) -> list[Table]:
+    """Return tables for a terminal: what happens to packets, how media carry them, how far radios reach."""
+    losses = Table(title="links", title_justify="left", box=None, pad_edge=False)
+    for column in ("rule", "medium", "links", "mean loss", "bursts", "delay beside the medium"):
+        losses.add_column(column, justify="right" if column == "links" else "left")
+    media = _table("media", "rule", "rate", "bytes", "airtime", "1 station", f"{MANY} stations", "full queue")
+    reach = _table("radios", "rule", "range in sight", "range behind walls", f"packets of {SMALL_BYTES} B an hour")
+    for meaning in meanings:
+        links = "?" if meaning.links is None else str(meaning.links)
+        losses.add_row(
+            meaning.name, meaning.medium, links, loss_text(meaning), burst_text(meaning), delay_text(meaning)
+        )
+        for number, carried in enumerate(meaning.carried):
+            first, queue_ns = number == 0, meaning.queue_ns
+            media.add_row(
+                meaning.name if first else "",
+                rate_text(meaning.rate_bps or 0) if first else "",
+                str(carried.size),
+                time_text(carried.airtime_ns),
+                rate_text(carried.goodput_bps),
+                "-" if carried.shared_bps is None else rate_text(carried.shared_bps),
+                time_text(queue_ns) if first and queue_ns is not None else "",
+            )
+        if meaning.range_los_m is not None:
+            ranges = range_text(meaning.range_los_m), range_text(meaning.range_nlos_m)
+            reach.add_row(meaning.name, *ranges, "-" if meaning.duty_packets_h is None else str(meaning.duty_packets_h))
+    return [table for table in (losses, media, reach) if table.row_count]
+
+
+def _table(title: str, first: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    table.add_column(first, no_wrap=True)
+    for column in columns:
+        table.add_column(column, justify="right")
+    return table
+
+
+RANGE_NOTE: Final = (
+    f"ranges: 90 % of single frames of {SMALL_BYTES} B at the lowest rate, without shadowing and fading, "
+    "antennas 1.5 m up"
+)
+
+
+# --- links of a running system ---------------------------------------------------------------------------------------
+
+
+def link_line(link: dict[str, Any]) -> str:
+    """Return one link of `foosim-net top` as a line."""
+    causes = "".join(f", {cause} {count}" for cause, count in link["causes"].items())
+    return (
+        f"{link['from']} to {link['to']} ({link['rule']}): {link['offered_per_s']:.1f}/s, offered {link['offered']}, "
+        f"delivered {link['delivered']}, dropped {link['dropped']}{causes}, mean delay "
+        f"{time_text(link['delay_ns'])}, queue {time_text(link['queue_ns'])}"
+    )
+
+
+def link_table(links: Sequence[dict[str, Any]], title: str) -> Table:
+    """Return the links of `foosim-net top` as a table."""
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for column in ("from", "to", "rule"):
+        table.add_column(column)
+    for column in ("offered/s", "offered", "delivered", "dropped", "mean delay", "queue"):
+        table.add_column(column, justify="right")
+    table.add_column("causes")
+    for link in links:
+        table.add_row(
+            link["from"],
+            link["to"],
+            link["rule"],
+            f"{link['offered_per_s']:.1f}",
+            str(link["offered"]),
+            str(link["delivered"]),
+            str(link["dropped"]),
+            time_text(link["delay_ns"]),
+            time_text(link["queue_ns"]),
+            ", ".join(f"{cause} {count}" for cause, count in link["causes"].items()),
+        )
+    return table
