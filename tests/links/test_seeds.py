@@ -5,10 +5,10 @@ from __future__ import annotations
 from itertools import combinations
 
 from foosim.protocol.draws import Slot
+from foosim.vhub.fabric import Fabric
 from tests.links.offered import ENDS, MS, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, chi_square, correlation, ks_uniform, normal_cdf
-from foosim.vhub.fabric import Fabric
 
 SEEDS = 64
 
