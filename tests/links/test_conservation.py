@@ -153,14 +153,14 @@ def test_what_is_dropped_early_leaves_later_stages_as_they_were() -> None:
 
 
 def received(n: int, seed: int, **changed: Any) -> int:
-    """How many broadcasts of n come through a link over 60 m and shadowed places."""
+    """How many broadcasts of n come through a link, over 60 m with fading if nothing else is said."""
     at = {"power": 5, "distance": 60, "rate": "6 Mbit/s", "preset": "wifi_5_indoor", "factor": 7} | changed
     wifi = f"burst: null, rates: fixed, fixed_rate: {at['rate']}"
     more = wifi if at["preset"] == "wifi_5_indoor" else "loss: 0 %"
     more += ", queue: {packets: 1000000, bytes: 1 GiB}, duty_cycle: 100 %"
     if at["preset"] == "lora_eu868":
         more += f", spreading_factor: {at['factor']}"
-    fading = "fading: {kind: rayleigh, coherence: 1 ms}"
+    fading = "fading: {kind: rayleigh, coherence: 1 ms}, shadowing: {on: false}"
     sets = (
         f"network.radios={{r: {{preset: {at['preset']}, tx_power: {at['power']} dBm, {more}, {fading}}}}}",
         "network.robots={'*': [r]}",
@@ -194,13 +194,13 @@ def test_more_signal_is_never_less(proof: Proof, what: str, values: list[dict[st
 
 
 def test_less_distance_is_never_less(proof: Proof) -> None:
-    """The same packets with the same draws from nearer and nearer: far steps, against which shadowing is small."""
+    """The same packets with the same draws from nearer and nearer; shadowing, a matter of place, is off."""
     n = proof.size(150, 1500)
     places = (4000, 2000, 1000, 500, 200, 50, 10)
     counts = [received(n, proof.seed, preset="zigbee", distance=place, power=-10) for place in places]
     far = sum(b < a for a, b in pairwise(counts))
     proof.exact("T25", "distance: steps that lower the share received", far, 0, n)
-    assert counts[0] < counts[-1] == n
+    assert counts[0] < 0.99 * n < counts[-1]
 
 
 def test_scaled_times_scale_delays(proof: Proof) -> None:
