@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+import msgspec
 import pytest
 
 from bench import lateness
@@ -47,14 +48,16 @@ class Table:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         for name, rows in report.user_properties:
             if name == ROWS and report.when == "teardown":
-                self._rows[report.nodeid] = [tuple(row) for row in rows]  # type: ignore[misc]  # from another process
+                self._rows[report.nodeid] = msgspec.convert(rows, list[Row])  # as it came from another process
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Measure what has to do with the wall clock, when all else is over; write the file."""
         proof = Proof(self._seed, is_full=True)
         late = lateness.lateness()
         for share, measured, limit in ((50, late.p50_ms, lateness.P50_MS), (99, late.p99_ms, lateness.P99_MS)):
-            what = f"release less arrival at {lateness.RATE_HZ} packets/s: {share} % quantile in ms, to be below {limit:g}"
+            what = (
+                f"release less arrival at {lateness.RATE_HZ} packets/s: {share} % quantile in ms, to be below {limit:g}"
+            )
             try:
                 proof.below("T26", what, measured, 3 * limit, late.packets)
             except AssertionError as error:
@@ -64,8 +67,7 @@ class Table:
         rows = sorted(((int(row[0][1:]), row) for rows in self._rows.values() for row in rows), key=lambda of: of[:2])
         here = this_machine()
         lines = [
-            f"| {test} | {what} | {statistic} | {measured} | {accepted} | {n:,} | {'holds' if holds else '**fails**'} |"
-            for _, (test, what, statistic, measured, accepted, n, holds) in rows
+            f"| {' | '.join(texts)} | {n:,} | {'holds' if holds else '**fails**'} |" for _, (*texts, n, holds) in rows
         ]
         head = HEAD.format(seed=self._seed, cpu=here.cpu, cores=here.cores, python=here.python)
         self._path.write_text(head + "\n".join(lines) + "\n")

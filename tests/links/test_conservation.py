@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import pairwise
 from typing import Any, Final
 
 import pytest
@@ -145,20 +146,21 @@ def test_what_is_dropped_early_leaves_later_stages_as_they_were() -> None:
         if link.send(alone):
             link.arrive(alone, "")
         assert alone.due_ns == flight.due_ns
-        assert alone.cause == flight.cause or flight.cause == "partition"
+        assert flight.cause in (alone.cause, "partition")
 
 
 # --- metamorphic -----------------------------------------------------------------------------------------------------
 
 
 def received(n: int, seed: int, **changed: Any) -> int:
-    """How many broadcasts of n come through a link over 60 m and shadowed places."""
+    """How many broadcasts of n come through a link, over 60 m with fading if nothing else is said."""
     at = {"power": 5, "distance": 60, "rate": "6 Mbit/s", "preset": "wifi_5_indoor", "factor": 7} | changed
-    more = "burst: null, rates: fixed, " + f"fixed_rate: {at['rate']}" if at["preset"] == "wifi_5_indoor" else "loss: 0 %"
+    wifi = f"burst: null, rates: fixed, fixed_rate: {at['rate']}"
+    more = wifi if at["preset"] == "wifi_5_indoor" else "loss: 0 %"
     more += ", queue: {packets: 1000000, bytes: 1 GiB}, duty_cycle: 100 %"
     if at["preset"] == "lora_eu868":
         more += f", spreading_factor: {at['factor']}"
-    fading = "fading: {kind: rayleigh, coherence: 1 ms}"
+    fading = "fading: {kind: rayleigh, coherence: 1 ms}, shadowing: {on: false}"
     sets = (
         f"network.radios={{r: {{preset: {at['preset']}, tx_power: {at['power']} dBm, {more}, {fading}}}}}",
         "network.robots={'*': [r]}",
@@ -187,16 +189,18 @@ def test_more_signal_is_never_less(proof: Proof, what: str, values: list[dict[st
     n = proof.size(150, 1500)
     counts = [received(n, proof.seed, **value) for value in values]
     assert counts[0] < counts[-1], counts
-    proof.exact("T25", f"{what}: steps that lower the share received", sum(b < a for a, b in zip(counts, counts[1:], strict=False)), 0, n)  # fmt: skip  # noqa: E501
+    falls = sum(b < a for a, b in pairwise(counts))
+    proof.exact("T25", f"{what}: steps that lower the share received", falls, 0, n)
 
 
 def test_less_distance_is_never_less(proof: Proof) -> None:
-    """Without shadowing, which is a matter of place."""
+    """The same packets with the same draws from nearer and nearer; shadowing, a matter of place, is off."""
     n = proof.size(150, 1500)
-    counts = [received(n, proof.seed, preset="zigbee", distance=d, power=-10) for d in (4000, 2000, 1000, 500, 200, 50, 10)]
-    far = sum(b + 3 * (n * 0.25) ** 0.5 < a for a, b in zip(counts, counts[1:], strict=False))
+    places = (4000, 2000, 1000, 500, 200, 50, 10)
+    counts = [received(n, proof.seed, preset="zigbee", distance=place, power=-10) for place in places]
+    far = sum(b < a for a, b in pairwise(counts))
     proof.exact("T25", "distance: steps that lower the share received", far, 0, n)
-    assert counts[0] < counts[-1] == n
+    assert counts[0] < 0.99 * n < counts[-1]
 
 
 def test_scaled_times_scale_delays(proof: Proof) -> None:
@@ -208,7 +212,7 @@ def test_scaled_times_scale_delays(proof: Proof) -> None:
     fast = list(fates(fabric_of(written.format(2, 4, 1000, 30), proof.seed), every(9 * MS, n)))
     assert [f.cause for f in slow] == [f.cause for f in fast] and any(f.cause for f in slow)
     off = max(abs((s.due_ns - s.sent_ns) - 10 * (f.due_ns - f.sent_ns)) for s, f in zip(slow, fast, strict=True))
-    proof.below("T25", "delays at a tenth of the speed against ten times the delay: greatest difference in ns", off, 200, n)
+    proof.below("T25", "delays at a tenth of the speed less ten times the delay, at most (ns)", off, 200, n)
 
 
 def test_after_the_end_of_everything_all_comes_through() -> None:

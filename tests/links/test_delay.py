@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from math import exp, expm1, log, sqrt
+from math import exp, expm1, log, log1p, sqrt
 from typing import Final
 
 import pytest
 
-from foosim.vhub.jitter import quantiles_ns
+from foosim.vhub.jitter import CELLS, quantiles_ns
 from tests.links.offered import MS, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, gamma_cdf, ks, mean_and_deviation, normal_cdf
@@ -25,7 +25,7 @@ def lomax(mean: float, alpha: float, top: float) -> tuple[Law, float, float]:
     """The law, the mean and the deviation of a Lomax number cut at `top`, scaled to a mean (ms)."""
 
     def mean_of(scale: float) -> float:
-        return scale / (alpha - 1) * (1 - (1 + top / scale) ** (1 - alpha))
+        return scale / (alpha - 1) * -expm1((1 - alpha) * log1p(top / scale))
 
     low, high = mean * (alpha - 1), 100 * top
     for _ in range(200):
@@ -91,7 +91,7 @@ def delays_ms(settings: str, n: int, seed: int, delay_ns: int = 7 * MS) -> list[
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_jitter_has_its_law(proof: Proof, shape: str) -> None:
-    n = proof.size(50_000, 1_000_000)
+    n = proof.size(50_000, 300_000)
     cdf, mean, deviation = SHAPES[shape]
     settings = f"jitter: {{shape: {shape}}}"
     drawn = delays_ms(settings, n, proof.seed)
@@ -99,7 +99,7 @@ def test_jitter_has_its_law(proof: Proof, shape: str) -> None:
     above = [x for x in drawn if x > RESOLVED_MS]
     p = ks(above, lambda x: (cdf(x) - least) / (1 - least))
     proof.likely("T8", f"{shape}: Kolmogorov", p, len(above))
-    if least:
+    if least > 1 / CELLS:  # what the table resolves
         z = binomial_z(n - len(above), n, least)
         proof.normal("T8", f"{shape}: share below {RESOLVED_MS * 1e3:g} us", z, n)
     proof.exact("T8", f"{shape}: delays below the constant one", sum(x < 0 for x in drawn), 0, n)
@@ -118,7 +118,7 @@ def test_jitter_has_its_law(proof: Proof, shape: str) -> None:
 
 def test_the_greater_of_a_least_delay_and_an_exponential_one(proof: Proof) -> None:
     """Where it is the least, it is that exactly, as often as it should; above, it is exponential."""
-    n, least, mean = proof.size(50_000, 1_000_000), 2.0, 5.0
+    n, least, mean = proof.size(50_000, 300_000), 2.0, 5.0
     drawn = delays_ms("jitter: {shape: shifted_exp, min: 2 ms, mean: 5 ms}", n, proof.seed)
     assert min(drawn) == least
     above = [x - least for x in drawn if x > least + 1e-3]
@@ -135,7 +135,7 @@ def test_the_greater_of_a_least_delay_and_an_exponential_one(proof: Proof) -> No
 
 def test_jitter_from_a_table(proof: Proof) -> None:
     """A file in netem's form; what it puts below 0 is 0."""
-    n = proof.size(50_000, 1_000_000)
+    n = proof.size(50_000, 300_000)
     table = " ".join(str(round(-8192 * sqrt(3) * (1 - 2 * k / 4095))) for k in range(4096))
     settings = "order: free, jitter: {{shape: table, file: uniform.dist, mean: {} ms, sd: 1 ms}}"
     drawn = {}

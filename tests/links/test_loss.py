@@ -72,10 +72,12 @@ def chain_z(lost: list[bool], loss: float, eigenvalue: float) -> float:
     return (sum(lost) / n - loss) / sqrt(loss * (1 - loss) / n * (1 + eigenvalue) / (1 - eigenvalue))
 
 
-@pytest.mark.parametrize(("loss", "burst"), [(0.01, 4.0), (0.05, 3.0), (0.1, 5.0), (0.003, 1.33), (0.2, 1.5), (0.6, 1.5)])
+@pytest.mark.parametrize(
+    ("loss", "burst"), [(0.01, 4.0), (0.05, 3.0), (0.1, 5.0), (0.003, 1.33), (0.2, 1.5), (0.6, 1.5)]
+)
 def test_bursts_of_packets(proof: Proof, loss: float, burst: float) -> None:
     """The mean loss, the mean length of losses in a row, and the law of these: geometric."""
-    n = proof.size(100_000, 2_000_000)
+    n = proof.size(100_000, 1_000_000)
     lost = losses(f"burst: {{loss: {100 * loss:g} %, mean_burst: {burst:g}}}", n, proof.seed)
     r = 1 / burst
     p = r * loss / (1 - loss)
@@ -95,7 +97,7 @@ def test_bursts_of_packets(proof: Proof, loss: float, burst: float) -> None:
 
 def test_bursts_that_lose_a_part(proof: Proof) -> None:
     """In a bad state that loses 60 %, the mean loss and the mean losses in a row are still the configured ones."""
-    n, loss, burst, bad = proof.size(200_000, 2_000_000), 0.05, 1.8, 0.6
+    n, loss, burst, bad = proof.size(200_000, 1_000_000), 0.05, 1.8, 0.6
     settings = f"burst: {{loss: {100 * loss} %, mean_burst: {burst}, bad_loss: {100 * bad} %}}"
     lost = losses(settings, n, proof.seed)
     share, r = loss / bad, 1 - (1 - 1 / burst) / bad
@@ -111,7 +113,7 @@ def test_bursts_that_lose_a_part(proof: Proof) -> None:
 
 def test_the_expert_form_of_two_states(proof: Proof) -> None:
     """p, r, h, k of netem's gemodel: the mean loss, and losses in a row by L / (L - P2)."""
-    n, p, r, h, k = proof.size(200_000, 2_000_000), 0.02, 0.25, 0.3, 0.99
+    n, p, r, h, k = proof.size(200_000, 1_000_000), 0.02, 0.25, 0.3, 0.99
     settings = "gilbert_elliott: {p: 2 %, r: 25 %, h: 30 %, k: 99 %}"
     lost = losses(settings, n, proof.seed)
     bad, good_loss, bad_loss = p / (p + r), 1 - k, 1 - h
@@ -138,10 +140,10 @@ def stationary(steps: list[list[float]]) -> list[float]:
 
 def test_the_expert_form_of_four_states(proof: Proof) -> None:
     """States 1 good, 2 a delivery within a burst, 3 a burst, 4 a single loss; lost are 3 and 4."""
-    n = proof.size(200_000, 2_000_000)
+    n = proof.size(200_000, 1_000_000)
     p13, p31, p32, p23, p14 = 0.01, 0.2, 0.1, 0.4, 0.005
     settings = "markov4: {p13: 1 %, p31: 20 %, p32: 10 %, p23: 40 %, p14: 0.5 %}"
-    steps = [
+    steps: list[list[float]] = [
         [1 - p13 - p14, 0, p13, p14],
         [0, 1 - p23, p23, 0],
         [p31, p32, 1 - p31 - p32, 0],

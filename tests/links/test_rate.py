@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
+from itertools import pairwise
 from math import exp, lgamma, log
 from typing import Final
 
@@ -41,7 +42,7 @@ def test_a_saturated_link_delivers_its_rate(proof: Proof, rate: str, bps: int) -
     proof.ratio("T13", f"throughput of {rate}, saturated", bits / (last_ns - first_ns) * S, bps, 0.001, len(sent))
     # a burst: more bits than the rate gives, in any time that begins anywhere
     excess = most = 0.0
-    for (before_ns, _), (at_ns, size) in zip(sent, sent[1:], strict=False):
+    for (before_ns, _), (at_ns, size) in pairwise(sent):
         excess = max(0.0, excess + 8 * size - (at_ns - before_ns) * bps / S)
         most = max(most, excess)
     proof.below("T13", f"burst of {rate} beyond its rate (bits; one packet of the longest)", most, 8 * 1538, len(sent))

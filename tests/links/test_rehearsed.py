@@ -1,6 +1,6 @@
-"""Fates of whole runs (T22): the same on one, two and three nodes, at another pace, with nodes that come and go.
+"""Fates of whole runs (T22): the same on one, two and three nodes, at another pace, with a node that is lost.
 
-The football table, its cameras and players on the air: Wi-Fi with fading, LoRa, IEEE 802.15.4, losses in bursts, events.
+The football table, its camera and players on the air: Wi-Fi with fading, IEEE 802.15.4, LoRa; with events.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
     [
         ("burst: {loss: 60 %, mean_burst: 1.4}", "so much loss comes in bursts of at least 1.5 packets, 1.4"),
         ("burst: {loss: 98 %, mean_burst: 2}", "so much loss comes in bursts of at least 49 packets, 2"),
-        ("burst: {loss: 5 %, mean_burst: 2, bad_loss: 50 %}", "with this bad_loss bursts are shorter than 2 packets, 2"),
+        ("burst: {loss: 5 %, mean_burst: 2, bad_loss: 50 %}", "with this bad_loss bursts are shorter than 2 packets"),
         ("burst: {loss: 5 %, mean_bad: 1 s, dwell: {alpha: 2, max: 1 s}}", "dwell.max: not above mean_bad, '1 s'"),
         ("jitter: {shape: pareto, mean: 51 ms, max: 100 ms}", "jitter.mean: above half of max, 100 ms, '51 ms'"),
         ("jitter: {shape: pareto, mean: 6 s}", "jitter.mean: above half of max, 10 s, '6 s'"),
