@@ -13,7 +13,7 @@ SEED ?= 17
 WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test play minutes swarm swarm-gate faults fuzz machines lint bench clean environment
+.PHONY: help up test play minutes swarm swarm-gate faults fuzz stats machines lint bench clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
@@ -23,6 +23,7 @@ help:
 	@echo 'make swarm   runs under random faults, by seed (SEEDS=100; ARGS: --seed N, --json)'
 	@echo 'make faults  faults on real processes at random times, with their figures (N=20; ARGS: --seed S, --only KIND)'
 	@echo 'make fuzz    hostile bytes on every channel and in every file (N=200000 each; SEED=17; ARGS: -k NAME)'
+	@echo 'make stats   the links against their laws, at full size, by a seed that it prints (SEED=n repeats one)'
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
 	@echo 'make machines  further cuts between machines: needs root, see docs/testing.md'
 	@echo 'make lint    ruff and mypy alone'
@@ -50,6 +51,12 @@ faults: environment
 # Tests that take an hour are no longer hung than those that take a second.
 fuzz: environment
 	@$(PYTEST) -o timeout=0 tests/laws/test_fuzz.py tests/laws/test_fuzz_files.py --fuzz-payloads $(or $(N),200000) --fuzz-seed $(SEED) $(ARGS)
+
+# A seed that nobody has chosen, unless somebody has.
+stats: environment
+	@seed=$(if $(filter file,$(origin SEED)),$$(od -An -N3 -tu4 /dev/urandom | tr -d ' '),$(SEED)); \
+	echo "make stats SEED=$$seed repeats this"; \
+	$(PYTEST) -o timeout=0 tests/links --links-full --links-seed $$seed --links-table docs/network-validation.md $(ARGS)
 
 swarm-gate: environment
 	@$(PYTHON) -m bench.gate $(ARGS)

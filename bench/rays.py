@@ -32,7 +32,6 @@ class Rays:
     """Means, in us for each pair."""
 
     one_by_one_us: float
-    at_once_us: float
     fixed_us: float
     again_us: float
     placing_us: float
@@ -88,23 +87,19 @@ def rays(seconds: float = 3.0) -> Rays:
         ((rng.uniform(-20, 20), rng.uniform(-10, 10), 0.5), (rng.uniform(-20, 20), rng.uniform(-10, 10), 0.5), ("", ""))
         for _ in range(PAIRS)
     ]
-    spent = dict.fromkeys(("one_by_one", "at_once", "fixed", "again", "placing"), 0.0)
+    spent = dict.fromkeys(("one_by_one", "fixed", "again", "placing"), 0.0)
     ticks, found = max(1, round(seconds * TICKS_PER_S)), 0
     for tick in range(ticks):
         numbers = numbers_at(layout, tick)
         pairs = pairs_at(layout, numbers, rng)
-        elsewhere = pairs_at(layout, numbers, rng)
-        sight, another, third = (geometry.sight(layout, numbers) for _ in range(3))
+        sight, third = geometry.sight(layout, numbers), geometry.sight(layout, numbers)
         spent["one_by_one"] += _spent(_each, sight, pairs)
         spent["again"] += _spent(_each, sight, pairs)
-        spent["at_once"] += _spent(Sight.between_many, another, elsewhere)
         spent["placing"] += _spent(_each, third, fixed[:1])
         spent["fixed"] += _spent(_each, third, fixed)
         found += sum(len(sight.between(*pair)) for pair in pairs)
     each = {name: round(1e6 * total / ticks / PAIRS, 2) for name, total in spent.items()}
-    return Rays(
-        each["one_by_one"], each["at_once"], each["fixed"], each["again"], each["placing"], found / ticks / PAIRS
-    )
+    return Rays(each["one_by_one"], each["fixed"], each["again"], each["placing"], found / ticks / PAIRS)
 
 
 def _each(sight: Sight, pairs: list[Pair]) -> None:
@@ -123,7 +118,7 @@ def lines(found: Rays) -> list[str]:
     """Return the figures for people."""
     return [
         f"{SHELVES} shelves, {VEHICLES} vehicles, {PAIRS} pairs a tick, {found.crossings:.1f} crossings each",
-        f"pair by pair {found.one_by_one_us:.1f} us (to stay below {LIMIT_US:.0f}), at once {found.at_once_us:.1f} us",
+        f"pair by pair {found.one_by_one_us:.1f} us (to stay below {LIMIT_US:.0f})",
         f"of it for placing the vehicles {found.placing_us:.1f} us",
         f"between fixed antennas {found.fixed_us:.1f} us",
         f"again in the same tick {found.again_us:.2f} us (to stay below {LIMIT_AGAIN_US:.0f})",

@@ -56,13 +56,15 @@ class ProcessCost:
 
 @dataclass(slots=True)
 class Watched:
-    """A run that is over: its result, the looks at it, when it had its first tick, and what the helpers printed."""
+    """A run that is over: its result, the looks at it, when it had its first tick, what the helpers printed, and what
+    was read from its capture."""
 
     result: dict[str, Any]
     looks: list[Look]
     first_tick_s: float
     capture_mb: float
     printed: list[str] = field(default_factory=list)
+    found: Any = None
 
     @property
     def tick_s(self) -> float:
@@ -131,8 +133,11 @@ def watch(
     every_s: float = 0.25,
     helpers: Helpers | None = None,
     pki: Path | None = None,
+    read: Callable[[Path], Any] | None = None,
 ) -> Watched:
     """Run the table with a capture, with the helpers beside it, with certificates where `pki` has them.
+
+    `read` is given the finished capture.
 
     Raises BenchError when it did not end in order.
     """
@@ -164,4 +169,5 @@ def watch(
         if not watching.looks:
             raise BenchError("the run was over before it was seen running")
         size_mb = capture.stat().st_size / 1e6
-    return Watched(outcome.result, watching.looks, watching.first_tick_s - begun_s, size_mb, printed)
+        found = None if read is None else read(capture)
+    return Watched(outcome.result, watching.looks, watching.first_tick_s - begun_s, size_mb, printed, found)

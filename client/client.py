@@ -25,20 +25,20 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
 
 from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded, UnknownName
 from foosim.client.packets import Outgoing, check_packet, check_subscription
-from foosim.client.payloads import Command, Value, channel_kind, decode_payload, encode_command
+from foosim.client.payloads import Command, Drive, Value, channel_kind, command_channels, decode_payload, encode_command
 from foosim.client.player import NS_PER_S, Newest, Sample
 from foosim.protocol import channels, limits
 from foosim.protocol.channels import VHUB, Plane
-from foosim.protocol.deployment import Deployment, RodRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Malformed
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.messages import Received
-from foosim.protocol.names import CHANNEL_POSITION, is_name
+from foosim.protocol.names import CHANNEL_DRIVE, CHANNEL_POSITION, is_name
 from foosim.protocol.process import new_boot
 
 if TYPE_CHECKING:
@@ -103,7 +103,20 @@ class Actuator:
         The rod keeps its last command. Raises BadValue for what is out of its reach or not finite, NotJoined, RunEnded.
         """
         payload = encode_command(self._client.deployment, self._robot, Command(float(slide), float(spin)))
-        self._client._command(self._robot, payload)
+        self._client._command(self._robot, payload, CHANNEL_POSITION)
+
+
+class DriveActuator:
+    """The two wheels of a rover."""
+
+    def __init__(self, client: Client, robot: str) -> None:
+        self._client = client
+        self._robot = robot
+
+    def set(self, left: float, right: float) -> None:
+        """Say how fast the wheels shall roll, in m/s; the rover keeps its last command. Otherwise as for a rod."""
+        payload = encode_command(self._client.deployment, self._robot, Drive(float(left), float(right)))
+        self._client._command(self._robot, payload, CHANNEL_DRIVE)
 
 
 class Robot:
@@ -117,13 +130,16 @@ class Robot:
         def sensor(channel: str) -> Sample | None:
             return client._sample(name, channel)
 
-        def actuator(channel: str) -> Actuator:
-            return Actuator(client, name)
+        makes = {CHANNEL_POSITION: Actuator, CHANNEL_DRIVE: DriveActuator}
+
+        def actuator(channel: str) -> Any:
+            return makes[channel](client, name)
 
         self.sensors: Final[Named[Sample | None]] = Named(f"{name} has no such sensor", robot.sensors, sensor)
-        """The newest sample of each, None until one has come; its `value` is a RodPosition or a BallPosition."""
-        moved = [CHANNEL_POSITION] if isinstance(robot, RodRobot) else []
-        self.actuators: Final[Named[Actuator]] = Named(f"{name} has no such actuator", moved, actuator)
+        """The newest sample of each, None until one has come; its `value` is of the channel's kind (`payloads`)."""
+        moved = command_channels(robot)
+        self.actuators: Final[Named[Any]] = Named(f"{name} has no such actuator", moved, actuator)
+        """A rod's `position` is an Actuator, a rover's `drive` a DriveActuator."""
 
     def send(self, channel: str, payload: bytes) -> None:
         """Send a packet to the robot; see `Client.send`."""
@@ -208,7 +224,7 @@ class Client:
         self._newest = Newest({})
         self._branch = link.core.branch
         self._period: int | None = None
-        self._commands: dict[str, bytes] = {}
+        self._commands: dict[str, Outgoing] = {}
         self._outgoing: deque[Outgoing] = deque()
 
     # --- what it is --------------------------------------------------------------------------------------------------
@@ -354,8 +370,7 @@ class Client:
 
     def _answer(self) -> None:
         """Send what was set in the loop's body, commands last and in their robots' name order."""
-        commands = [Outgoing(robot, CHANNEL_POSITION, payload) for robot, payload in sorted(self._commands.items())]
-        packets = [*self._outgoing, *commands]
+        packets = [*self._outgoing, *(command for _, command in sorted(self._commands.items()))]
         self._outgoing.clear()
         self._commands.clear()
         if self._core.go is None:  # the run has ended since
@@ -370,12 +385,12 @@ class Client:
         self._period = period
         self._link.perform()
 
-    def _command(self, robot: str, payload: bytes) -> None:
+    def _command(self, robot: str, payload: bytes, channel: str) -> None:
         if self._period:
             self._check_sending()
-            self._commands[robot] = payload
+            self._commands[robot] = Outgoing(robot, channel, payload)
         else:
-            self.send(robot, CHANNEL_POSITION, payload)
+            self.send(robot, channel, payload)
 
     def _check_sending(self) -> None:
         if self._link.closed:

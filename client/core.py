@@ -1,10 +1,11 @@
 """The core of a client: takes messages and the time, and keeps its side of the talk with the vHub.
 
-Hello until it is answered, Join until the vHub is heard. In lockstep `go` is the Go that waits for an answer, and
-`done` answers it: stop and wait, so that a Go that comes again gets the same bytes again. A free-running client takes
-`arrivals` and sends when it likes; what it sent is kept until the vHub has recorded it. Downlinks are numbered: repeats
-are dropped, gaps counted. When the vHub is gone (`hub_gone`) all starts again with hello, and goes on where it was; or
-where the run does, if that has lost its last ticks and goes on as a branch from before them.
+Hello until it is answered, Join until something new is heard, and again whenever nothing new has come for a second. In
+lockstep `go` is the Go that waits for an answer, and `done` answers it: stop and wait, so that a Go that comes again
+gets the same bytes again. A free-running client takes `arrivals` and sends when it likes; what it sent is kept until
+the vHub has recorded it. Downlinks are numbered: repeats are dropped, gaps counted. When the vHub is gone (`hub_gone`)
+all starts again with hello, and goes on where it was; or where the run does, if that has lost its last ticks and goes
+on as a branch from before them.
 Neighbours: `player` and `client` drive it, `packets` says what it may send; `vhub.sessions` is the other side.
 """
 
@@ -102,8 +103,6 @@ class ClientCore:
         self._again_ns = now_ns
         self._again_after_ns = AGAIN_NS
         self._join = b""
-        self._is_heard = False
-        """Whether anything was heard since the Join was said."""
         self._lost_ns = NEVER_NS
         self._gone = 0
         """How often the vHub was gone. What one of before said to a hello of before is no answer."""
@@ -160,7 +159,7 @@ class ClientCore:
     @property
     def _hello_ns(self) -> int:
         """When hello or Join is said next."""
-        waits = self.welcome is None or self.is_away or (self._join and not self._is_heard)
+        waits = self.welcome is None or self.is_away or self._join
         return self._again_ns if waits and not self.refusal and not self.ended else NEVER_NS
 
     def deadline_ns(self) -> int:
@@ -205,7 +204,6 @@ class ClientCore:
         items = [Subscription(source, channel) for source, channel in wanted]
         self._join = encode(Join(self.name, self.boot, period_ticks, items))
         self._period = period_ticks
-        self._is_heard = False
         if not self.is_away:
             self._publish(self._join)
         self._again_after_ns = AGAIN_NS
@@ -281,7 +279,6 @@ class ClientCore:
         self._lost_ns = NEVER_NS
         self._returns += 1
         if self._join:
-            self._is_heard = False
             self._publish(self._join)
             self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
         self._recorded(welcome.sequence)
@@ -334,13 +331,19 @@ class ClientCore:
 
     def _on_heard(self, heard: Heard) -> None:
         if self._is_present(heard):
+            self._hears()
             self._recorded(heard.acknowledged)
 
     def _is_present(self, message: Go | Down | Heard) -> bool:
-        """Whether a message is of the present branch; note that the vHub is heard."""
-        self._is_heard = self._is_heard or message.branch == self.branch
+        """Whether a message is of the present branch."""
         self._repeated += message.branch != self.branch
         return message.branch == self.branch
+
+    def _hears(self) -> None:
+        """Something new has come, so the Join is known. A repeat is no sign of that: it may be of a vHub before."""
+        if not self.is_away:
+            self._again_after_ns = limits.WANT_EVERY_NS_MAX
+            self._again_ns = self._now_ns + self._again_after_ns
 
     def _on_go(self, go: Go) -> None:
         if not self._is_present(go):
@@ -388,6 +391,7 @@ class ClientCore:
 
     def _take_number(self, number: int) -> None:
         self._downlinks += 1
+        self._hears()
         if number <= self._downlink:
             self._gaps.remove(number)
             self._missing -= 1

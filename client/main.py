@@ -1,12 +1,16 @@
-"""The process `foosim-player`: a player that the deployment declares, between its class and the radio plane.
+"""The process `foosim-player`: players that the deployment declares, between their classes and the radio plane.
 
-One address is all that it needs: its class, rate, robots and parameters come with the welcome. Neighbours: `core`,
-`player` (the loop that the rehearsal shares), `protocol.loop`.
+One address is all that it needs: class, rate, robots and parameters come with the welcome. Several players in a process
+have a thread, a session and a presence each, and are to the run what they would be alone. Neighbours: `core`, `player`
+(the loop that the rehearsal shares), `protocol.loop`.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -95,22 +99,60 @@ class PlayerProcess:
             (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
 
 
-def run_player(name: str, connect: str, world: str = "", pki: Path | None = None, progress: Path | None = None) -> int:
-    """Run a declared player until its run ends; return the exit code. `pki` has its certificate, or its password.
+class Fleet:
+    """The players of one process, each in a thread. The first one that fails, or is refused, stops all."""
 
-    Raises Refused when there is nobody to connect to, PlayerError when its class cannot be loaded or fails.
+    def __init__(self, players: Sequence[PlayerProcess]) -> None:
+        self._players = players
+
+    def run(self) -> int:
+        """Take part until the end; return the greatest exit code. Raises what a player that failed raised."""
+        with ThreadPoolExecutor(len(self._players)) as pool:
+            running = [pool.submit(player.run) for player in self._players]
+            for ended in as_completed(running):
+                if ended.exception() is not None or ended.result() != DONE:
+                    self.stop()
+        failed = [error for ended in running if (error := ended.exception()) is not None]
+        if failed:
+            raise failed[0]
+        return max(ended.result() for ended in running)
+
+    def stop(self) -> None:
+        """Have `run` return soon; a signal handler may call this."""
+        for player in self._players:
+            player.stop()
+
+
+def run_players(
+    names: Sequence[str], connect: str, world: str = "", pki: Path | None = None, progress: Path | None = None
+) -> int:
+    """Run declared players until their run ends; return the exit code. `pki` has their certificates, or passwords.
+
+    Raises Refused when there is nobody to connect to, PlayerError when a class cannot be loaded or fails.
     """
-    if not is_name(name):
-        raise BadValue("not a name for a player", name)
-    credentials = load_credentials(pki, identity.client(name))
-    security = None if credentials is None else Security(credentials)
+    for name in names:
+        if not is_name(name):
+            raise BadValue("not a name for a player", name)
+        if names.count(name) > 1:
+            raise BadValue("a player that is named twice", name)
     use_client_runtime()
-    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    with Session.client(connect, CONNECT_S, limits.RADIO_MESSAGE_BYTES_MAX, stop.is_set, security) as session:
-        player = PlayerProcess(name, session, inbox, world, credentials, progress)
-        stop.then(player.stop)
-        return player.run()
+    with ExitStack() as stack:
+        players: list[PlayerProcess] = []
+        for name in names:
+            credentials = load_credentials(pki, identity.client(name))
+            security = None if credentials is None else Security(credentials)
+            limit = limits.RADIO_MESSAGE_BYTES_MAX
+            session = stack.enter_context(Session.client(connect, CONNECT_S, limit, stop.is_set, security))
+            inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+            first = progress if not players else None  # the others end when its loop does not go round any more
+            players.append(PlayerProcess(name, session, inbox, world, credentials, first))
+        if len(players) == 1:
+            stop.then(players[0].stop)
+            return players[0].run()
+        fleet = Fleet(players)
+        stop.then(fleet.stop)
+        return fleet.run()
 
 
 app = new_app()
@@ -118,20 +160,22 @@ app = new_app()
 
 @app.command()
 def player(
-    name: Annotated[str, typer.Option(help="Its name, as the deployment declares it under players.")],
+    name: Annotated[
+        list[str], typer.Option(help="Its name, as the deployment declares it under players; may be repeated.")
+    ],
     connect: Annotated[str, typer.Option(help="Address of the vHub's radio plane: tcp/HOST:PORT.")],
     world: Annotated[str, typer.Option(help="Refuse any other world than this one.")] = "",
     pki: PkiOption = None,
     progress_file: ProgressOption = None,
     version: VersionOption = False,
 ) -> None:
-    """Play in a run: load the class that the deployment names and let it act.
+    """Play in a run: load the class that the deployment names and let it act; of several players, each its own.
 
     The process ends with the run; it exits with 0 when the run ended, with 1 when the player failed or the vHub was
     gone for longer than a run waits for it, and with 3 when the vHub would not have it.
     """
     die_with_parent()
-    raise typer.Exit(run_player(name, connect, world, pki, progress_file))
+    raise typer.Exit(run_players(name, connect, world, pki, progress_file))
 
 
 def main() -> None:

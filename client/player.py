@@ -16,12 +16,11 @@ from typing import Any, Final, Protocol, cast
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PacketError, PlayerError, UnknownName
 from foosim.client.packets import Outgoing, check_packet
-from foosim.client.payloads import Command, Value, channel_kind, decode_payload, encode_command
+from foosim.client.payloads import Command, Drive, Value, channel_kind, command_channel, decode_payload, encode_command
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment import Player as Declaration
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.messages import Received
-from foosim.protocol.names import CHANNEL_POSITION
 
 NS_PER_S: Final = 1_000_000_000
 
@@ -41,7 +40,9 @@ class Sample:
 Samples = Mapping[tuple[str, str], Sample]
 """The newest sample of each (endpoint, channel) that has arrived up to now; what has not come yet is absent."""
 Commands = Mapping[str, Command]
-"""What each robot shall do, by name; a robot that is left out keeps its last command."""
+"""What each rod shall do, by name; a robot that is left out keeps its last command."""
+Drives = Mapping[str, Drive]
+"""The same for rovers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +52,14 @@ class Turn:
     A packet without a destination is a broadcast to all that hear the player's channel.
     """
 
-    commands: Commands
+    commands: Commands | Drives
     packets: Sequence[Outgoing] = ()
 
 
 class Player(Protocol):
     """A controller. It sees packets only: samples are as old as the network made them, and some never come."""
 
-    def act(self, tick: int, samples: Samples) -> Commands | Turn:
+    def act(self, tick: int, samples: Samples) -> Commands | Drives | Turn:
         """Return commands at `tick`, or a Turn that has packets, too.
 
         Equal calls in equal order must give equal results: use no clock, no dice.
@@ -161,6 +162,11 @@ class PlayerLoop:
                 core.send(self._act(max(core.tick, 0)), now_ns)
                 self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
 
+    @property
+    def player(self) -> Player | None:
+        """The player that acts; None before the run has let it in."""
+        return self._player
+
     def deadline_ns(self) -> int:
         """When a free-running player acts next."""
         return NEVER_NS if self.core.ended or self.core.is_away else self._beat_ns
@@ -234,13 +240,13 @@ class PlayerLoop:
         for robot, command in sorted(commands.items(), key=_by_name):
             if robot not in declared.robots:
                 raise PlayerError(f"{where}: {UnknownName('not one of its robots', robot, declared.robots)}")
-            if not isinstance(command, Command):
+            if not isinstance(command, Command | Drive):
                 raise PlayerError(f"{where}: {robot} gets a {type(command).__name__}, not a Command")
             try:
                 payload = encode_command(deployment, robot, command)
+                packets.append(Outgoing(robot, command_channel(deployment, robot, command), payload))
             except Refused as error:
                 raise PlayerError(f"{where}: {error}") from error
-            packets.append(Outgoing(robot, CHANNEL_POSITION, payload))
         return packets
 
 

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from foosim.node.core import NodeCore
-from foosim.node.engines import ENGINES, build_in_steps, prepare_spares
+from foosim.node.engines import build_in_steps, make_engine, prepare_spares
 from foosim.node.engines.interface import Engine, EngineFactory
 from foosim.node.step import Stepper, Work
 from foosim.protocol.deployment import Deployment
@@ -98,7 +98,7 @@ class Solver:
         """Build an engine at once."""
         deployment = self._core.deployment
         assert deployment is not None
-        return (self._factory or ENGINES[deployment.engine])(deployment, layout)
+        return (self._factory or make_engine)(deployment, layout)
 
     # --- solving -----------------------------------------------------------------------------------------------------
 
@@ -120,7 +120,7 @@ class Solver:
 
 
 def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
-    """Return the digest of a fixed small run: a kicked ball among turning rods, 32 ticks.
+    """Return the digest of a fixed small run: a kicked ball among turning rods, or rovers in curves, 32 ticks.
 
     It is the same for every layout: what was added to the deployment's world stays parked. The meshes of the scenery,
     as they were read here, are part of it.
@@ -128,10 +128,7 @@ def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
     deployment: Deployment = stepper.deployment
     layout = stepper.layout
     numbers = initial_numbers(deployment, layout)
-    ball = layout["ball"].offsets["linear_velocity"]
-    numbers[ball : ball + 3] = [1.0, 0.3, 0.0]
-    for rod in layout.rods:
-        numbers[rod.offsets["wanted"] + 1] = 1.0
+    stepper.world.stir(numbers)
     base = build_layout(deployment)
     declared = [entity for entity in layout.entities if entity.name in base]
     bodies = tuple(entity for entity in declared if entity.has_body)

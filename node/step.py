@@ -1,7 +1,7 @@
 """The pure parts of one tick: sense, edit, command, check. `core` puts them in order, the shell's engine solves.
 
-`step` knows neither node, owner nor epoch: it is given the entities to compute. Neighbours: `edits`, `rules`,
-`sensors`, `actuators`, `engines`.
+`step` knows neither node, owner nor epoch: it is given the entities to compute. Neighbours: `edits`, `world`
+(what differs between kinds of world), `sensors`, `engines`.
 """
 
 from __future__ import annotations
@@ -12,25 +12,19 @@ from math import isfinite
 
 import msgspec
 
-from foosim.node.actuators.position import CHANNEL as POSITION
-from foosim.node.actuators.position import PositionActuator
 from foosim.node.edits import edit
 from foosim.node.engines.interface import Engine
-from foosim.node.rules import TableRules
 from foosim.node.sensors import Sensor, make_sensor
+from foosim.node.world import world_of
 from foosim.protocol import limits
-from foosim.protocol.deployment import BallSensor, Deployment, RodRobot, RodSensor, period_ticks
+from foosim.protocol.deployment import Deployment, period_ticks
+from foosim.protocol.deployment import Sensor as SensorSpec
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.messages import Delivered, Edit, OutboxPacket, RobotPacket
 from foosim.protocol.sampling import Sampling
 
 ECHO = "echo"
-ROD_SPEED_FACTOR = 1.5
-"""A rod's declared speed limit is this many times its drive's: a ball may push it faster than its motor does."""
-
-STOP_DEPTH_M = 0.01
-"""How far a rod may be beyond its stroke: joint stops give way a little."""
 
 _outbox_decoder = msgspec.msgpack.Decoder(list[OutboxPacket])
 _outbox_encoder = msgspec.msgpack.Encoder()
@@ -54,9 +48,8 @@ class Stepper:
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         self.deployment = deployment
         self.layout = layout
-        self.rules = TableRules.of(deployment)
+        self.world = world_of(deployment, layout)
         self.substeps = deployment.substeps
-        self._actuators = {entity.index: PositionActuator(deployment, entity) for entity in layout.rods}
         self._sensors: dict[str, list[tuple[str, int, int, Sensor]]] = {}
         for robot in layout.robots:
             self._sensors[robot.name] = [
@@ -64,32 +57,11 @@ class Stepper:
                     channel,
                     period_ticks(settings.rate_hz, deployment.tick_ns),
                     robot.offsets[f"sampled.{channel}"],
-                    make_sensor(settings, layout, robot, channel, deployment.seed),
+                    make_sensor(settings, deployment, layout, robot, channel),
                 )
                 for channel, settings in _sensors_of(deployment, robot.name)
             ]
         self.sampling = Sampling(deployment)
-        drive = deployment.table.drive
-        self._slide_speed_max = drive.slide.speed * ROD_SPEED_FACTOR
-        self._spin_speed_max = drive.spin.speed * ROD_SPEED_FACTOR
-        self._ball_speed_max = deployment.table.ball.speed_limit
-        table = deployment.table
-        margin = table.rules.out_margin
-        self._x_max = table.field.length / 2 + margin
-        self._y_max = table.field.width / 2 + margin
-        self._z_min, self._z_max = -margin, table.walls.height + margin
-        tick_s = deployment.tick_ns / 1e9
-        self._slide_reach_m, self._spin_reach_rad = self._slide_speed_max * tick_s, self._spin_speed_max * tick_s
-        self._rods: dict[int, tuple[int, int, float]] = {}
-        for entity in layout.rods:
-            spec = deployment.robots[entity.name]
-            assert isinstance(spec, RodRobot)
-            self._rods[entity.index] = (
-                entity.offsets["joint_positions"],
-                entity.offsets["joint_velocities"],
-                table.lines[spec.line].half_stroke + STOP_DEPTH_M,
-            )
-        self._ball_reach_m = self._ball_speed_max * tick_s
 
     def sense(self, frame: Frame, robots: Iterable[Entity]) -> tuple[list[RobotPacket], list[int]]:
         """Return what these robots send at the frame's tick, and the counters of the sensors that sampled."""
@@ -119,7 +91,7 @@ class Stepper:
     def edited(self, frame: Frame, edits: Sequence[Edit]) -> tuple[Layout, list[float]]:
         """Return layout and numbers of the frame after the order's edits and the world's rules."""
         layout, numbers = edit(frame, edits, self.deployment)
-        self.rules.apply(numbers, layout)
+        self.world.apply_rules(numbers, layout)
         return layout, numbers
 
     def deliver(self, packets: Sequence[Delivered], solved: Sequence[int], numbers: list[float]) -> dict[int, bytes]:
@@ -149,9 +121,8 @@ class Stepper:
                 return False
             outboxes[entity.index] = waiting
             return True
-        if packet.channel == POSITION and entity.index in self._actuators:
-            return self._actuators[entity.index].accept(packet.payload, numbers)
-        return False
+        actuator = self.world.actuators.get(entity.index)
+        return actuator is not None and packet.channel == actuator.channel and actuator.accept(packet.payload, numbers)
 
     def solve(self, engine: Engine, work: Work) -> None:
         """Load, command, step, read: write the next state of every body of `work` into its numbers."""
@@ -164,13 +135,14 @@ class Stepper:
             bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] == 0.0]
         if not bodies:
             return
-        rods = [entity for entity in bodies if entity.model == "rod"]
+        actuators = self.world.actuators
+        driven = [entity for entity in bodies if entity.index in actuators]
         engine.load(bodies, numbers)
-        engine.command(rods, [self._actuators[entity.index].command(numbers) for entity in rods])
+        engine.command(driven, [actuators[entity.index].command(numbers) for entity in driven])
         engine.step(self.substeps)
         before = numbers.copy()
         engine.read(bodies, numbers)
-        if not (isfinite(sum(numbers)) and all(self._plausible(entity, numbers, before) for entity in bodies)):
+        if not (isfinite(sum(numbers)) and all(self.world.plausible(entity, numbers, before) for entity in bodies)):
             self._quarantine(work, before)
 
     def _quarantine(self, work: Work, before: list[float]) -> None:
@@ -186,7 +158,7 @@ class Stepper:
                 if before[entity.offsets["quarantined"]] == 0.0
                 and not (
                     all(map(isfinite, numbers[entity.start : entity.split]))
-                    and self._plausible(entity, numbers, before)
+                    and self.world.plausible(entity, numbers, before)
                 )
             ]
             if not bad:
@@ -197,39 +169,15 @@ class Stepper:
             for entity in bad:
                 numbers[entity.offsets["quarantined"]] = 1.0
 
-    def _plausible(self, entity: Entity, numbers: list[float], before: list[float]) -> bool:
-        """Whether an entity's new, finite state is in the world, within its speed limit and its reach."""
-        rod = self._rods.get(entity.index)
-        if rod is not None:
-            slide, speed, slide_max = rod
-            return (
-                -slide_max <= numbers[slide] <= slide_max
-                and abs(numbers[slide] - before[slide]) <= self._slide_reach_m
-                and abs(numbers[slide + 1] - before[slide + 1]) <= self._spin_reach_rad
-                and -self._slide_speed_max <= numbers[speed] <= self._slide_speed_max
-                and -self._spin_speed_max <= numbers[speed + 1] <= self._spin_speed_max
-            )
-        start = entity.offsets["position"]
-        velocity = entity.offsets["linear_velocity"]
-        x, y, z = numbers[start : start + 3]
-        vx, vy, vz = numbers[velocity : velocity + 3]
-        dx, dy, dz = x - before[start], y - before[start + 1], z - before[start + 2]
-        return (
-            abs(x) <= self._x_max
-            and abs(y) <= self._y_max
-            and self._z_min <= z <= self._z_max
-            and vx * vx + vy * vy + vz * vz <= self._ball_speed_max * self._ball_speed_max
-            and dx * dx + dy * dy + dz * dz <= self._ball_reach_m * self._ball_reach_m
-        )
-
 
 def _clear_log(entity: Entity, numbers: list[float]) -> None:
     """Empty the contact log of a body that was not solved: a contact happens once."""
-    start = entity.offsets["contacts"]
-    numbers[start : start + 3] = (0.0, 0.0, -1.0)
+    start = entity.offsets.get("contacts")
+    if start is not None:
+        numbers[start : start + 3] = (0.0, 0.0, -1.0)
 
 
-def _sensors_of(deployment: Deployment, robot: str) -> list[tuple[str, RodSensor | BallSensor]]:
+def _sensors_of(deployment: Deployment, robot: str) -> list[tuple[str, SensorSpec]]:
     """Return (channel, settings) of a robot's sensors, in channel order."""
     return sorted(deployment.robots[robot].sensors.items(), key=lambda item: item[0])
 

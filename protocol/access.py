@@ -2,9 +2,9 @@
 table of channels, which alone spells the keys.
 
 A node writes and hears what nodes do, under its own name; a client writes its own transmit key and hears its own
-receive key; an operator writes requests and hears their answers. What is not granted is denied. The routers of the two
-planes enforce it, each for those who connect to it, so it says nothing of a router's own messages. Zenoh tells nobody
-what it denies. Neighbours: `identity`, `channels`, `session_settings` (hands it to Zenoh).
+receive key; an operator writes requests and hears their answers, and hears replays. What is not granted is denied.
+The routers of the planes enforce it, each for those who connect to it, so it says nothing of a router's own messages.
+Zenoh tells nobody what it denies. Neighbours: `identity`, `channels`, `session_settings` (hands it to Zenoh).
 """
 
 from __future__ import annotations
@@ -14,24 +14,30 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from foosim.protocol import channels, identity
-from foosim.protocol.channels import ALIVE, CHANNELS, SUPERVISOR, VHUB, Channel, Plane
+from foosim.protocol.channels import ALIVE, CHANNELS, REPLAY, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.deployment import Deployment
 
 Reads = Sequence[tuple[Channel, bool]]
 
 EVERYBODY: Final = "all"
 """As the table of channels says it of a channel that all processes of the simulation plane write."""
-ROUTERS: Final = {Plane.SIMULATION: SUPERVISOR, Plane.RADIO: VHUB}
+ROUTERS: Final = {Plane.SIMULATION: SUPERVISOR, Plane.RADIO: VHUB, Plane.REPLAY: REPLAY}
 """Whose session is the router of a plane."""
 _READS: Final[dict[str, Reads]] = {
     "node": channels.NODE_READS,
     VHUB: channels.VHUB_READS,
     SUPERVISOR: channels.SUPERVISOR_READS,
     "client": channels.CLIENT_READS,
-    "operator": channels.OPERATOR_READS,
+    REPLAY: channels.REPLAY_READS,
+    "operator": (*channels.OPERATOR_READS, *channels.LISTENER_READS),
 }
-_PLANES: Final = {"node": Plane.SIMULATION, VHUB: Plane.SIMULATION, "operator": Plane.SIMULATION, "client": Plane.RADIO}
-"""Who connects to which plane's router."""
+_PLANES: Final = {
+    "node": (Plane.SIMULATION,),
+    VHUB: (Plane.SIMULATION,),
+    "operator": (Plane.SIMULATION, Plane.REPLAY),
+    "client": (Plane.RADIO,),
+}
+"""Who connects to which planes' routers. A replay has everybody's packets, so it is for operators."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +69,14 @@ class Access:
 
 def access_to(plane: Plane, deployment: Deployment) -> Access:
     """Return who may do what on a plane of a run."""
-    roles = [role for role, its in _PLANES.items() if its is plane]
-    grants = [grant(who) for who in identity.identities_of(deployment) if _role(who) in roles]
+    roles = [role for role, its in _PLANES.items() if plane in its]
+    grants = [grant(who, plane) for who in identity.identities_of(deployment) if _role(who) in roles]
     return Access(plane, tuple(grants), plane is Plane.RADIO and deployment.access.radio == "password")
 
 
-def grant(who: str) -> Grant:
-    """Return what an identity may do."""
+def grant(who: str, plane: Plane) -> Grant:
+    """Return what an identity may do on a plane to which it connects."""
     role, name = identity.parse_identity(who)
-    plane = _PLANES[role]
     # An operator has many sessions at once, each with an end of its own to its name, behind a dot.
     key_name = f"{name}.$*" if role == "operator" else name
     written = [channel for channel in CHANNELS if channel.plane is plane and _writes(role, channel)]

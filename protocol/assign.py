@@ -2,7 +2,8 @@
 
 An island is a set of bodies that could touch each other within the tick: their bounding volumes, grown by *declared*
 speed limit x tick, overlap (not by present speed: a resting ball leaves a kick at 15 m/s). It has one solver, the
-owner of the rod nearest to one of its balls, ties by name. The choice never changes a result. Only + - x and
+owner of the rod nearest to one of its balls, ties by name. A rover is an island of its own, since it meets the others
+where they were at the tick's start; its owner solves it. The choice never changes a result. Only + - x and
 comparisons, so that all CPUs agree. Neighbours: `layout`, `barrier`; `step` knows neither node, owner nor epoch.
 """
 
@@ -23,7 +24,8 @@ MARGIN_M = 0.001
 @dataclass(frozen=True, slots=True)
 class Reach:
     """Bounding volumes. `ball_m` is the radius of a grown ball; `rods` are (index, name, x of the axis) in order of x,
-    with one half width and one band of z; `balls` are (index, start of the position)."""
+    with one half width and one band of z; `balls` are (index, start of the position); `alone` are (index, name) of what
+    touches nobody."""
 
     ball_m: float
     rods: tuple[tuple[int, str, float], ...]
@@ -32,11 +34,12 @@ class Reach:
     z_low_m: float
     z_high_m: float
     balls: tuple[tuple[int, int], ...]
+    alone: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Island:
-    """Indices of its entities, ascending, and the rod (its name) whose owner solves it; empty without a rod."""
+    """Indices of its entities, ascending, and the robot (its name) whose owner solves it; empty without one."""
 
     entities: tuple[int, ...]
     nearest: str
@@ -58,6 +61,9 @@ def line_x_m(deployment: Deployment, robot: RodRobot) -> float:
 
 def reach_of(deployment: Deployment, layout: Layout) -> Reach:
     """Return the bounding volumes of a layout's bodies."""
+    if deployment.is_hall:
+        alone = tuple((entity.index, entity.name) for entity in layout.rovers)
+        return Reach(0.0, (), (), 0.0, 0.0, 0.0, (), alone)
     table = deployment.table
     rod = table.rod
     half = rod.foot.length / 2
@@ -137,6 +143,7 @@ def islands_of(numbers: Sequence[float], reach: Reach, touching: Touching) -> tu
         ]
         islands.append(Island(tuple(sorted(members)), min(candidates)[1] if candidates else ""))
     islands += [Island((index,), name) for index, name, _ in reach.rods if index not in taken]
+    islands += [Island((index,), name) for index, name in reach.alone]
     return tuple(sorted(islands, key=lambda island: island.entities))
 
 
@@ -152,7 +159,7 @@ class Assignment:
         self._shares: dict[Touching, dict[str, Share]] = {}
 
     def solver_of(self, island: Island) -> str:
-        """Return the node that solves an island: the owner of its nearest rod, else the first node of the roster."""
+        """Return the node that solves an island: its nearest robot's owner, else the first node of the roster."""
         return self.owners[island.nearest] if island.nearest else self.roster[0]
 
     def shares(self, numbers: Sequence[float]) -> dict[str, Share]:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, get_args
 
-from foosim.protocol import asset_messages, hub_messages, limits, messages
+from foosim.protocol import asset_messages, hub_messages, limits, messages, replay_messages
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import Malformed
 
-Plane = Enum("Plane", ["SIMULATION", "RADIO"])
+Plane = Enum("Plane", ["SIMULATION", "RADIO", "REPLAY"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +67,13 @@ def _radio(
     return Channel(name, key, message, Plane.RADIO, writers, readers, rate, True, bytes_max)
 
 
+def _replay(
+    name: str, message: Any, writers: str, readers: str, rate: str, bytes_max: int = limits.MESSAGE_BYTES_MAX
+) -> Channel:
+    key = f"foosim/replay/{name}/{{name}}"
+    return Channel(name, key, message, Plane.REPLAY, writers, readers, rate, True, bytes_max)
+
+
 _SMALL: Final = limits.SMALL_MESSAGE_BYTES_MAX
 
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL)
@@ -103,6 +110,10 @@ CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the n
 UP: Final = _radio("up", messages.Join | messages.Up | messages.Done, "client", "vhub", "the client's rate")
 DOWN: Final = _radio("down", messages.Go | messages.Down | messages.Heard, "vhub", "the named one", "the client's rate")
 
+PLAYED: Final = _replay("played", replay_messages.Played, "replay", "operator", "as captured")
+REPLAY_REQUEST: Final = _replay("request", messages.Request, "operator", "replay", "a request", bytes_max=_SMALL)
+REPLAY_ANSWER: Final = _replay("answer", messages.Answer, "replay", "the named one", "an answer")
+
 CHANNELS: Final[tuple[Channel, ...]] = (
     HELLO,
     RECALL,
@@ -132,6 +143,9 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     CLIENT_REFUSAL,
     UP,
     DOWN,
+    PLAYED,
+    REPLAY_REQUEST,
+    REPLAY_ANSWER,
 )
 
 _NAMES: Final = {
@@ -167,6 +181,8 @@ SUPERVISOR_READS: Final = tuple((channel, False) for channel in (
 ))  # fmt: skip
 CLIENT_READS: Final = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
 OPERATOR_READS: Final = ((ANSWER, True),)
+REPLAY_READS: Final = ((REPLAY_REQUEST, False),)
+LISTENER_READS: Final = ((PLAYED, False), (REPLAY_ANSWER, True))
 """What each role reads: (channel, whether only what is addressed to it by name)."""
 
 NODE_WAITS: Final = (ORDER, PART, DELIVERIES)
@@ -178,9 +194,12 @@ CLIENT_WAITS: Final = (DOWN,)
 ALIVE: Final = {
     Plane.SIMULATION: "foosim/simulation/alive/{name}",
     Plane.RADIO: "foosim/radio/alive/{name}",
+    Plane.REPLAY: "foosim/replay/alive/{name}",
 }
 """Liveliness tokens: presence, which says that a process and its link are up, not that it advances."""
 
 VHUB: Final = "vhub"
 """The name under which the vHub takes part in the simulation plane; no node may have it."""
 SUPERVISOR: Final = "supervisor"
+REPLAY: Final = "replay"
+"""The name under which a replay is present on its plane."""

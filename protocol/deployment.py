@@ -3,7 +3,7 @@
 This is the schema. Text becomes a `Deployment` in deployment_file.py only, because what one field cannot know (every
 robot has one owner, every selector matches an endpoint, every rate is a whole number of ticks) is checked there too,
 by references.py. Quantities are strings with units in the file and SI numbers here; times are integer nanoseconds
-whose names end in `_ns` (see units.py). The table's parameters are in table.py.
+whose names end in `_ns` (see units.py). The table's parameters are in table.py, a hall's in hall.py.
 """
 
 import json
@@ -17,9 +17,12 @@ from pydantic import BeforeValidator, Field, JsonValue, PrivateAttr, StringConst
 from foosim.protocol import limits, names, units
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.errors import BadValue
+from foosim.protocol.hall import Hall
 from foosim.protocol.hosts import Host, Listen, Name, Placed
+from foosim.protocol.mesh import Mesh
 from foosim.protocol.names import LineName, Team
 from foosim.protocol.network import LinkRule, Network, Selector
+from foosim.protocol.rovers import RoverRobot, RoverSensor, StationRobot
 from foosim.protocol.scene import Shape
 from foosim.protocol.scenery import (
     SCENERY_MAX,
@@ -37,8 +40,8 @@ from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse
 
 __all__ = [
     "AccessSpec", "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "LinkRule",
-    "Network", "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "Sensor",
-    "deployment_schema", "deployment_schema_text", "parse_pace", "period_ticks",
+    "Network", "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "RoverRobot", "Sensor",
+    "StationRobot", "deployment_schema", "deployment_schema_text", "parse_pace", "period_ticks",
 ]  # fmt: skip
 
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
@@ -74,7 +77,7 @@ class BallSensor(Part):
     noise: LengthNoise
 
 
-Sensor = RodSensor | BallSensor
+Sensor = RodSensor | BallSensor | RoverSensor
 
 
 class RodRobot(Part):
@@ -93,7 +96,7 @@ class CameraRobot(Part):
     sensors: dict[Name, BallSensor] = Field(max_length=16)
 
 
-Robot = Annotated[RodRobot | CameraRobot, Field(discriminator="model")]
+Robot = Annotated[RodRobot | CameraRobot | RoverRobot | StationRobot, Field(discriminator="model")]
 
 
 class NodeSpec(Placed):
@@ -108,13 +111,15 @@ class Player(Placed):
     """A controller that `up` starts: a class with `act(tick, samples) -> commands`.
 
     It may command its `robots` and hears their channels, and those of others that `hears` selects. One that is `on` a
-    robot is on board of it: its packets leave from and come to where the robot is.
+    robot is on board of it: its packets leave from and come to where the robot is. Players that name the same `process`
+    share one; else each has its own.
     """
 
     class_: ClassPath = Field(alias="class")
     rate_hz: Rate = Field(alias="rate")
     lockstep: bool = True
     on: RobotName | None = None
+    process: Name | None = None
     robots: dict[RobotName, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     hears: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
@@ -178,7 +183,10 @@ def _int_only(value: object) -> object:
 
 
 class Deployment(Part):
-    """A whole run: the world, who computes it, who plays in it, what lies between, and how it is recorded."""
+    """A whole run: the world, who computes it, who plays in it, what lies between, and how it is recorded.
+
+    The world is a football table or a hall with mobile robots: one of `table` and `hall` is given.
+    """
 
     format: Annotated[Literal[1], BeforeValidator(_int_only, json_schema_input_type=Literal[1])]
     world: Name
@@ -189,7 +197,8 @@ class Deployment(Part):
     pace: PaceField
     mixed_cpu: bool = False
     on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
-    table: Table
+    table_: Table | None = Field(default=None, alias="table")
+    hall_: Hall | None = Field(default=None, alias="hall")
     assets: AssetFolder = "."
     scenery: dict[Name, Scenery] = Field(default={}, max_length=SCENERY_MAX)
     robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
@@ -204,6 +213,23 @@ class Deployment(Part):
     access: AccessSpec = Field(default_factory=AccessSpec)
     deadlines: Deadlines = Field(default_factory=Deadlines)
     _contents: Contents = PrivateAttr(default_factory=Contents)
+
+    @property
+    def is_hall(self) -> bool:
+        """Whether the world is a hall with mobile robots; else it is a football table."""
+        return self.hall_ is not None
+
+    @property
+    def table(self) -> Table:
+        """The football table of a world that is one."""
+        assert self.table_ is not None, "this world has no table"
+        return self.table_
+
+    @property
+    def hall(self) -> Hall:
+        """The hall of a world that is one."""
+        assert self.hall_ is not None, "this world is no hall"
+        return self.hall_
 
     def with_assets(self, files: Mapping[str, bytes]) -> "Deployment":
         """The same with the contents of the files that its scenery names; raises AssetError."""
@@ -225,8 +251,12 @@ class Deployment(Part):
         """The content of the file with this digest (hex), of those that it was given."""
         return self._contents.by_digest.get(digest)
 
+    def mesh_of(self, thing: str) -> Mesh | None:
+        """The triangles of a thing of the scenery that is a mesh, None as long as its file was not given."""
+        return self._contents.meshes.get(thing)
+
     def scenery_shapes(self) -> list[Shape]:
-        """The scenery beside the table, in name order; files that its meshes are in were given."""
+        """The scenery beside table or hall, in name order; files that its meshes are in were given."""
         meshes = self._contents.meshes
         return [scenery_shape(name, thing, meshes.get(name)) for name, thing in sorted(self.scenery.items())]
 
@@ -243,6 +273,13 @@ class Deployment(Part):
         on_board = [(name, player.on) for name, player in self.players.items()]
         on_board += [(name, client.on) for name, client in self.clients.items()]
         return {name: robot for name, robot in on_board if robot is not None}
+
+    def player_processes(self) -> dict[str, list[str]]:
+        """The players of each process that `up` starts for them, by its name: a player's own if it shares none."""
+        found: dict[str, list[str]] = {}
+        for name, player in sorted(self.players.items()):
+            found.setdefault(player.process or name, []).append(name)
+        return dict(sorted(found.items()))
 
     def heard_by(self, name: str) -> list[tuple[str, str]]:
         """The (endpoint, channel) that a player subscribes to, sorted: its robots' and what `hears` selects."""

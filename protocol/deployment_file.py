@@ -21,6 +21,7 @@ from pydantic import ValidationError
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import DeploymentError, describe
+from foosim.protocol.hall_start import start_findings
 from foosim.protocol.network import Network
 from foosim.protocol.network_references import check_network, check_network_alone
 from foosim.protocol.references import Finding, check_references, path_text
@@ -114,6 +115,28 @@ def check_open_meshes(text: str, name: str, deployment: Deployment) -> None:
         raise DeploymentError(_report([_problem(tree, finding) for finding in findings]))
 
 
+def with_network(text: str, name: str, other: tuple[str, str] | None, sets: Sequence[str]) -> str:
+    """The canonical text of the deployment in `text` with another network, and after settings.
+
+    `other` is the text and name of a file with a `network:` section, alone or in a deployment; None keeps the network.
+    Raises DeploymentError with all problems, each in its file.
+    """
+    tree, problems = read_tree(text, locate_in(name))
+    if other is not None and isinstance(tree, Fields):
+        there, there_problems = read_tree(other[0], locate_in(other[1]))
+        problems = [*problems, *there_problems]
+        if isinstance(there, Fields) and "network" in there.values:
+            tree.values["network"], tree.keys["network"] = there.values["network"], there.keys["network"]
+        elif there is not None:
+            problems.append(Problem(there.place, describe("missing key", "network")))
+    if tree is not None:
+        tree, set_problems = place_sets(tree, sets)
+        problems = [*problems, *set_problems]
+    _check(tree, problems)
+    assert tree is not None, "checked"
+    return write_yaml(plain(tree))
+
+
 def read_deployment_text(path: Path) -> str:
     """The text of a deployment file, bounded before it is read; raises DeploymentError."""
     place = Place(0, 1, 1, str(path))
@@ -144,6 +167,8 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
             deployment = Deployment.model_validate(data)
         except ValidationError as error:
             findings += islice(schema_findings(error), PROBLEMS_MAX + 1)
+        if deployment is not None and not findings:
+            findings = list(start_findings(deployment))
         found += [_problem(tree, finding) for finding in findings]
     if found or deployment is None:
         raise DeploymentError(_report(found))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from foosim.protocol import codec, messages
 from foosim.protocol.errors import Malformed
-from foosim.protocol.layout import ADDABLE, BALL, ROBOTS, Entity, Layout
+from foosim.protocol.layout import ADDABLE, BALL, ROBOTS, WORLD, Entity, Layout
 
 assert sys.byteorder == "little", "numbers travel as raw little-endian float64"
 
@@ -78,9 +78,11 @@ class Frame:
         return [messages.Outbox(index, packets) for index, packets in self.outboxes.items()]
 
     @property
-    def score(self) -> tuple[int, int]:
-        """Goals of red and of blue."""
-        red, blue = self.vector("world", "score", 2)
+    def score(self) -> tuple[int, int] | None:
+        """Goals of red and of blue; None in a world without a table."""
+        if WORLD not in self.layout:
+            return None
+        red, blue = self.vector(WORLD, "score", 2)
         return int(red), int(blue)
 
 
@@ -116,17 +118,18 @@ def chain_next(chain: bytes, digest: bytes) -> bytes:
 def fitting_edits(layout: Layout, edits: Sequence[messages.Edit]) -> list[messages.Edit]:
     """Return the edits that do something to a world with this layout, in their order.
 
-    An addition of a name that is taken, the removal of what was not added, a push of what is no free body and a freeze
-    of what is no robot change nothing, and what happens to the network is the vHub's: a function of the order alone,
-    the same for all who read it.
+    An addition of a name that is taken or to a world without a table, the removal of what was not added, a push of what
+    is no free body and a freeze of what is no robot change nothing, and what happens to the network is the vHub's: a
+    function of the order alone, the same for all who read it.
     """
     models = dict(layout.models)
+    addable = ADDABLE if WORLD in layout else frozenset[str]()
     fitting: list[messages.Edit] = []
     for edit in edits:
         if isinstance(edit, messages.Disrupt):
             continue
         if isinstance(edit, messages.Add):
-            if edit.name in models or edit.model not in ADDABLE:
+            if edit.name in models or edit.model not in addable:
                 continue
             models[edit.name] = edit.model
         elif isinstance(edit, messages.Remove):

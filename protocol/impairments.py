@@ -66,13 +66,16 @@ class ShiftedExponentialJitter(Part):
     mean_ns: Spread = Field(alias="mean")
 
 
+PARETO_MAX: Final = "10 s"
+
+
 class ParetoJitter(Part):
-    """A Lomax (Pareto II) distribution from 0 with the mean `mean`, cut at `max`: `alpha` above 1 is its tail."""
+    """A Lomax (Pareto II) distribution from 0, cut at `max`, with the mean `mean`: `alpha` above 1 is its tail."""
 
     shape: Literal["pareto"]
     mean_ns: Spread = Field(alias="mean")
     alpha: Annotated[float, Field(ge=1.01, le=100.0)] = 2.5
-    max_ns: Spread = default("10 s", "max")
+    max_ns: Spread = default(PARETO_MAX, "max")
 
 
 class Component(Part):
@@ -122,6 +125,9 @@ class ParetoDwell(Part):
     max_ns: Dwell = Field(alias="max")
 
 
+BURST_MAX: Final = 1e6
+
+
 class Burst(Part):
     """Gilbert-Elliott by what it does: `loss` is the mean loss, `mean_bad` the mean length of a bad time.
 
@@ -131,7 +137,7 @@ class Burst(Part):
 
     loss: Share
     mean_bad_ns: Dwell | None = Field(default=None, alias="mean_bad")
-    mean_burst: Annotated[float, Field(ge=1.0, le=1e6)] | None = None
+    mean_burst: Annotated[float, Field(ge=1.0, le=BURST_MAX)] | None = None
     bad_loss: Probability = default("100 %")
     bad_extra_delay_ns: Delay = default("0 s", "bad_extra_delay")
     dwell: ParetoDwell | None = None

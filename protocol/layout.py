@@ -20,7 +20,7 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import AddedEntity
 
 WORLD: Final = "world"
-"""Name of the entity that has no body: score and the rules' memory."""
+"""Name of a table's entity that has no body: score and the rules' memory."""
 
 _BODY = (("position", 3), ("orientation", 4), ("linear_velocity", 3), ("angular_velocity", 3))
 _CONTACTS = ("contacts", 3)
@@ -37,18 +37,34 @@ _SOLVER_FIELDS: Final[Mapping[str, tuple[tuple[str, int], ...]]] = {
     ),
     "camera": (("down", 1), ("refused", 1)),
     "world": (("score", 2), ("kickoffs", 1)),
+    "rover": (
+        ("position", 3),
+        ("orientation", 4),
+        ("heading", 1),
+        ("wheel_speeds", 2),
+        ("wheel_travel", 2),
+        ("blocked", 1),
+        ("quarantined", 1),
+        ("down", 1),
+        ("wanted", 2),
+        ("charge", 1),
+        ("refused", 1),
+    ),
+    "station": (("down", 1), ("refused", 1)),
 }
 """The slots that the solver writes, by model. `contacts` is (count, impulse in N s, last substep or -1) of the tick;
 `wanted` is the actuator's memory (slide in m, spin in rad); `refused` counts packets that the robot refused;
 `still_ticks`, `out_ticks` and `wait_ticks` are the memory of the rules about dead balls, balls off the table and
-kick-off. Orientations are quaternions x, y, z, w; positions and velocities are in the world frame, SI units."""
+kick-off. A rover's `wanted` and `wheel_speeds` are those of the left and right wheel's rim (m/s), `wheel_travel` is how
+far they have turned (m), `blocked` whether it was kept from where it went in the tick, `charge` its energy in J.
+Orientations are quaternions x, y, z, w; positions and velocities are in the world frame, SI units."""
 
-BODIES: Final = frozenset({"ball", "rod"})
-ROBOTS: Final = frozenset({"rod", "camera"})
+BODIES: Final = frozenset({"ball", "rod", "rover"})
+ROBOTS: Final = frozenset({"rod", "camera", "rover", "station"})
 ADDABLE: Final = frozenset({"ball"})
 """Models of which a running world can have more."""
 BALL: Final = "ball"
-"""Name of the ball that every table has; further ones have other names and can be removed again."""
+"""Name of the ball that every table has, and no hall; further ones have other names and can be removed again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +137,10 @@ class Layout:
         return tuple(entity for entity in self.entities if entity.model == "rod")
 
     @cached_property
+    def rovers(self) -> tuple[Entity, ...]:
+        return tuple(entity for entity in self.entities if entity.model == "rover")
+
+    @cached_property
     def digest(self) -> bytes:
         """BLAKE2b, 32 bytes, of every entity's name, model and slots."""
         hasher = blake2b(digest_size=32)
@@ -134,12 +154,14 @@ class Layout:
 
 def build_layout(deployment: Deployment, added: Iterable[tuple[str, str]] = ()) -> Layout:
     """Return the layout of a deployment's world with `added` (name, model) entities, or raise `Malformed`."""
-    models = {BALL: "ball", WORLD: "world"}
+    models = {} if deployment.is_hall else {BALL: "ball", WORLD: "world"}
     sensors: dict[str, Sequence[str]] = {}
     for name, robot in deployment.robots.items():
         models[name] = robot.model
         sensors[name] = tuple(robot.sensors)
     for name, model in added:
+        if deployment.is_hall:
+            raise Malformed(f"{model} {name} cannot be added: nothing can be to a hall")
         if model not in ADDABLE or name in models:
             raise Malformed(f"{model} {name} cannot be added: {' or '.join(sorted(ADDABLE))} with a free name can be")
         models[name] = model

@@ -54,10 +54,7 @@ class Thaw(Message, frozen=True):
 
 
 class Disrupt(Message, frozen=True):
-    """Do to the network what `event` says, as JSON like an event of a deployment without its time: it is the tick's.
-
-    Nodes do not look at it; the vHub does from frame k+1 on, when order k carries it.
-    """
+    """Do to the network what `event` (JSON as in a deployment, without a time) says: order k's, from frame k+1 on."""
 
     event: Annotated[str, Meta(max_length=limits.EVENT_BYTES_MAX)]
 

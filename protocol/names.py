@@ -31,10 +31,11 @@ TEAMS: Final[tuple[Team, ...]] = ("red", "blue")
 # called like the first, no node, player or client like the second.
 ENTITY_NAMES_RESERVED: Final = ("ball", "world")
 PROCESS_NAMES_RESERVED: Final = ("supervisor", "vhub")
-# Channels that every robot, or every rod, has: no sensor may be called so.
+# Channels that every robot, every rod, or every rover has: no sensor may be called so.
 CHANNEL_ECHO: Final = "echo"
 CHANNEL_POSITION: Final = "position"
-CHANNEL_NAMES_RESERVED: Final = (CHANNEL_ECHO, CHANNEL_POSITION)
+CHANNEL_DRIVE: Final = "drive"
+CHANNEL_NAMES_RESERVED: Final = (CHANNEL_ECHO, CHANNEL_POSITION, CHANNEL_DRIVE)
 
 SIMILAR: Final = 0.6
 """From here on two texts are alike: 0 is nothing in common, 1 is equal but for capitals."""

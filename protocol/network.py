@@ -17,8 +17,8 @@ from pydantic import BeforeValidator, Field, PlainValidator, StringConstraints
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
 from foosim.protocol.hosts import Name
-from foosim.protocol.impairments import Impairments, default
-from foosim.protocol.radios import Place, PresetName, Radio
+from foosim.protocol.impairments import Delay, Impairments, default
+from foosim.protocol.radios import PresetName, Radio, Site
 from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity, custom_error
 
@@ -155,6 +155,10 @@ class Defaults(Part):
     preset: PresetName = "perfect"
     in_flight_on_partition: Literal["drop", "deliver"] = "drop"
     """What becomes of a packet that is on its way when a partition between its ends begins."""
+    phase_ns: Delay = default("0 s", "phase")
+    """How far apart the clocks of radios are: the packets of each come to it later by a time of its own, at most this.
+
+    Without it all that is sent at one tick is sent at the same instant, and contends."""
 
 
 class Network(Part):
@@ -166,7 +170,7 @@ class Network(Part):
     radios: dict[Name, Radio] = Field(default={}, max_length=RADIOS_MAX)
     robots: dict[Selector, Annotated[list[Name], Field(max_length=16)]] = Field(default={}, max_length=LINK_RULES_MAX)
     """The radios of the endpoints that each selector matches; the first selector that matches is an endpoint's."""
-    places: dict[Selector, Place] = Field(default={}, max_length=LINK_RULES_MAX)
+    places: dict[Selector, Site] = Field(default={}, max_length=LINK_RULES_MAX)
     """Where endpoints without a body are (x, y, z in the world)."""
     links: list[LinkRule] = Field(default=[], max_length=LINK_RULES_MAX)
     events: list[Event] = Field(default=[], max_length=EVENTS_MAX)

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
-from foosim.protocol.impairments import BURSTS
+from foosim.protocol.impairments import BURST_MAX, BURSTS, PARETO_MAX
 from foosim.protocol.names import nearest_name
 from foosim.protocol.network import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_MAX, REST
 from foosim.protocol.presets import PRESETS, preset_settings
@@ -32,6 +32,7 @@ def check_network(data: object) -> Iterator[Finding]:
         return
     yield from _radios(view)
     yield from _carriers(view, endpoints)
+    yield from _phase(view)
     yield from _placeless(view, endpoints)
     yield from _links(view, endpoints)
     yield from _events(view, endpoints)
@@ -77,6 +78,17 @@ def _carriers(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
         if names.is_selector(glob) and not any(fnmatchcase(endpoint, glob) for endpoint in endpoints):
             nearest = quoted(nearest_name(glob, endpoints))
             yield Finding(("network", "places", glob), NO_ENDPOINT, glob, nearest, at="key")
+
+
+def _phase(view: View) -> Iterator[Finding]:
+    """Packets of one tick are sent before those of the next."""
+    try:
+        phase_ns, tick_ns = units.parse_ns(view.get("network", "defaults", "phase")), view.tick_ns()
+    except BadValue:
+        return
+    if tick_ns is not None and phase_ns > tick_ns:
+        text = view.get("network", "defaults", "phase")
+        yield Finding(("network", "defaults", "phase"), "more than the tick", text, repr(units.format_ns(tick_ns)))
 
 
 def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
@@ -139,6 +151,7 @@ def _impairments(view: View, location: Location) -> Iterator[Finding]:
     for key in written[1:]:
         yield Finding((*location, key), f"beside {written[0]}: a link has one model of bursts", key, at="key")
     yield from _burst(view, (*location, "burst"))
+    yield from _markov4(view, (*location, "markov4"))
     yield from _jitter(view, (*location, "jitter"))
 
 
@@ -158,6 +171,46 @@ def _burst(view: View, location: Location) -> Iterator[Finding]:
     loss, bad = _share(burst.get("loss")), _share(burst.get("bad_loss", "100 %"))
     if loss is not None and bad is not None and loss >= bad:
         yield Finding((*location, "loss"), "not below bad_loss, which is lost in bad times", burst.get("loss"))
+    elif loss is not None and bad is not None and lengths == ["mean_burst"]:
+        yield from _chain(location, loss, bad, burst["mean_burst"])
+    if lengths == ["mean_bad"]:
+        yield from _dwell(view, location)
+
+
+def _chain(location: Location, loss: Fraction, bad: Fraction, mean: object) -> Iterator[Finding]:
+    """There is a chain of two states with this loss and this mean number of losses in a row.
+
+    With s = loss / bad_loss and r the chance to leave the bad state, p = r s / (1 - s) is a chance, too: that bounds r,
+    and mean = 1 / (1 - (1 - r) bad_loss) lies between those of the greatest r and of none.
+    """
+    if not isinstance(mean, int | float) or not 1 <= mean <= BURST_MAX or loss <= 0:
+        return
+    share = loss / bad
+    least = 1 / (1 - max(Fraction(0), 2 - 1 / share) * bad)
+    if mean < least:
+        what = f"so much loss comes in bursts of at least {float(least):.4g} packets"
+        yield Finding((*location, "mean_burst"), what, mean)
+    elif bad < 1 and mean >= 1 / (1 - bad):
+        what = f"with this bad_loss bursts are shorter than {float(1 / (1 - bad)):.4g} packets"
+        yield Finding((*location, "mean_burst"), what, mean)
+
+
+def _dwell(view: View, location: Location) -> Iterator[Finding]:
+    try:
+        mean_ns = units.parse_ns(view.get(*location, "mean_bad"))
+        max_ns = units.parse_ns(view.get(*location, "dwell", "max"))
+    except BadValue:
+        return
+    if max_ns <= mean_ns:
+        yield Finding((*location, "dwell", "max"), "not above mean_bad", view.get(*location, "dwell", "max"))
+
+
+def _markov4(view: View, location: Location) -> Iterator[Finding]:
+    """What leaves a state is at most certain."""
+    for one, other in (("p13", "p14"), ("p31", "p32")):
+        first, second = (_share(view.get(*location, key)) for key in (one, other))
+        if first is not None and second is not None and first + second > 1:
+            yield Finding((*location, other), f"more than 100 % with {one}", view.get(*location, other))
 
 
 def _share(text: object) -> Fraction | None:
@@ -177,6 +230,8 @@ def _jitter(view: View, location: Location) -> Iterator[Finding]:
         if None not in shares and sum(share or 0 for share in shares) != 1:
             yield Finding((*location, "parts"), "shares that do not add up to 100 %", len(shares))
         return
+    if shape == "pareto":
+        yield from _pareto(view, location)
     if shape not in ("gamma", "lognormal"):
         return
     try:
@@ -186,6 +241,17 @@ def _jitter(view: View, location: Location) -> Iterator[Finding]:
     if not mean_ns <= JITTER_RATIO_MAX * sd_ns <= JITTER_RATIO_MAX * 3 * mean_ns:
         what = f"not between 1/{JITTER_RATIO_MAX} of the mean and 3 times the mean"
         yield Finding((*location, "sd"), what, view.get(*location, "sd"))
+
+
+def _pareto(view: View, location: Location) -> Iterator[Finding]:
+    """The cut leaves room for the mean."""
+    jitter = view.mapping(*location)
+    try:
+        mean_ns, max_ns = units.parse_ns(jitter.get("mean")), units.parse_ns(jitter.get("max", PARETO_MAX))
+    except BadValue:
+        return
+    if max_ns < 2 * mean_ns:
+        yield Finding((*location, "mean"), f"above half of max, {jitter.get('max', PARETO_MAX)}", jitter.get("mean"))
 
 
 def _events(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:

@@ -75,6 +75,7 @@ def _material(**keys: Any) -> RadioMaterial:
 
 UNKNOWN: Final = _material(loss="5 dB")
 """A body of which nothing is known: the loss of an internal wall in ns-3 (`InternalWallLoss`, building models)."""
+CONCRETE: Final = _material(**{"is": "concrete"})
 METAL: Final = _material(**{"is": "metal"})
 WOOD: Final = _material(**{"is": "wood"})
 PLASTIC: Final = _material(loss="0.5 dB")

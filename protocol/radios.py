@@ -17,11 +17,13 @@ from foosim.protocol.units import Quantity
 
 Frequency = Annotated[float, Quantity(units.FREQUENCY, "1 kHz", "100 GHz")]
 Bandwidth = Annotated[float, Quantity(units.FREQUENCY, "1 kHz", "10 GHz")]
-PowerLevel = Annotated[float, Quantity(units.POWER, "-200 dBm", "100 dBm")]
+PowerLevel = Annotated[float, Quantity(units.POWER_LEVEL, "-200 dBm", "100 dBm")]
 Gain = Annotated[float, Quantity(units.GAIN, "-50 dBi", "60 dBi")]
 Level = Annotated[float, Quantity(units.LEVEL, "0 dB", "100 dB")]
 Offset = Annotated[float, Quantity(units.LENGTH, "-100 m", "100 m")]
 Place = Annotated[list[Offset], Field(min_length=3, max_length=3)]
+Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
+Site = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Distance = Annotated[float, Quantity(units.LENGTH, "1 mm", "100 km")]
 Spread = Annotated[int, Quantity(units.TIME, "1 ns", "60 s")]
 
@@ -36,7 +38,7 @@ Environment = Literal[
 
 
 class Antenna(Part):
-    """Where the antenna is on its endpoint's body (x, y, z in the body's frame), and its gain in every direction."""
+    """Where the antenna is: x, y, z beside that of its body, in the body's frame; and its gain in every direction."""
 
     gain_dbi: Gain = default("0 dBi", "gain")
     mount: Place = Field(default=["0 m", "0 m", "0 m"], validate_default=True)
@@ -98,7 +100,9 @@ class RadioKeys(Impairments):
     """The Wi-Fi access category: its window and its waiting time."""
     retries: Annotated[int, Field(ge=0, le=31)] = 7
     published: Literal["broadcast", "unicast"] = "broadcast"
-    """How a packet goes that is for all who subscribe: once for all without acknowledgement, or once for each."""
+    """How a packet goes that is for all who subscribe: once for all without acknowledgement, or once for each.
+
+    Over LTE it is once for each."""
     spreading_factor: Annotated[int, Field(ge=7, le=12)] = 7
     coding_rate: Annotated[int, Field(ge=1, le=4)] = 1
     """Of LoRa: 4 / (4 + this)."""

@@ -24,6 +24,10 @@ TEXTS_MAX: Final = 4096
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
 
 
+WORLD_OF_MODEL: Final[Mapping[str, str]] = {"rod": "table", "camera": "table", "rover": "hall", "station": "hall"}
+"""The kind of world that a model of robot is for."""
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
     """A problem at a location in the data: at the value there, at its key, or at the mapping that lacks the key."""
@@ -39,7 +43,7 @@ def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found as they are asked for."""
     view = View(data)
     between = (_names, _hosts, _robots, _nodes, _players, _hears, _on, _rates, _clients, _deadlines)
-    for check in (*between, _lines, _shapes, _scenery):
+    for check in (_world, *between, _lines, _shapes, _hall, _scenery):
         yield from check(view)
 
 
@@ -91,10 +95,10 @@ class View:
         items = value if isinstance(value, list) else [value]
         return [(index, item) for index, item in enumerate(items[:TEXTS_MAX]) if isinstance(item, str)]
 
-    def length(self, *path: str) -> Fraction | None:
-        """A length in metres, exact; None if it is not one."""
+    def length(self, *path: str, world: str = "table") -> Fraction | None:
+        """A length of the table (or hall) in metres, exact; None if it is not one."""
         try:
-            return units.parse(self.get("table", *path), units.LENGTH)
+            return units.parse(self.get(world, *path), units.LENGTH)
         except BadValue:
             return None
 
@@ -103,6 +107,23 @@ class View:
             return units.parse_ns(self.get("tick")) or None
         except BadValue:
             return None
+
+
+def _world(view: View) -> Iterator[Finding]:
+    """There is one world, a table or a hall, and robots are in the kind of world that they are for."""
+    given = [kind for kind in WORLD_OF_MODEL.values() if view.get(kind) is not None]
+    if len({*given}) > 1:
+        yield Finding(("hall",), "a hall beside a table: a world is one of them", "hall", at="key")
+    if not given:
+        if not isinstance(view.data, dict):
+            return
+        yield Finding(("table",), "missing key of a world, which is a table or a hall", "table", at="missing")
+        return
+    for name in view.robots:
+        model = view.get("robots", name, "model")
+        needed = WORLD_OF_MODEL.get(model) if isinstance(model, str) else None
+        if needed is not None and needed not in given:
+            yield Finding(("robots", name, "model"), f"a robot of a {needed} in a world without one", model)
 
 
 def _names(view: View) -> Iterator[Finding]:
@@ -123,6 +144,24 @@ def _names(view: View) -> Iterator[Finding]:
                 yield Finding((section, name), f"a name that is also one of {other}", name, at="key")
             for scope in scopes:
                 scope.setdefault(name, section)
+    yield from _processes(view, processes)
+
+
+def _processes(view: View, taken: Mapping[str, str]) -> Iterator[Finding]:
+    """A process that players share has a name of its own, and is in one place."""
+    places: dict[str, tuple[Any, Any]] = {}
+    for player in view.players:
+        process = view.get("players", player, "process")
+        if not isinstance(process, str):
+            continue
+        location: Location = ("players", player, "process")
+        if process in names.PROCESS_NAMES_RESERVED:
+            yield Finding(location, "a reserved name", process)
+        elif process in taken:
+            yield Finding(location, f"a name that is also one of {taken[process]}", process)
+        place = view.get("players", player, "host"), view.get("players", player, "label")
+        if places.setdefault(process, place) != place:
+            yield Finding(location, "a process whose players are not all on the same host", process)
 
 
 def _hosts(view: View) -> Iterator[Finding]:
@@ -318,10 +357,33 @@ def _shapes(view: View) -> Iterator[Finding]:
             yield Finding(("table", *small), what, view.get("table", *small))
 
 
+def _hall(view: View) -> Iterator[Finding]:
+    """A rover's parts fit each other, and it fits into the hall."""
+    rover: Location = ("hall", "rover")
+    radius, track = view.length("rover", "radius", world="hall"), view.length("rover", "drive", "track", world="hall")
+    sides = [side for name in ("length", "width") if (side := view.length(name, world="hall")) is not None]
+    if radius is not None and sides and 2 * radius > min(sides):
+        yield Finding((*rover, "radius"), "more than half of the hall's least side", view.get(*rover, "radius"))
+    if radius is not None and track is not None and track > 2 * radius:
+        what = "the wheels would be outside of the rover: more than twice its radius"
+        yield Finding((*rover, "drive", "track"), what, view.get(*rover, "drive", "track"))
+    empty = view.get(*rover, "battery", "empty")
+    try:
+        below = units.parse(empty, units.VOLTAGE) < units.parse(view.get(*rover, "battery", "full"), units.VOLTAGE)
+    except BadValue:
+        return
+    if not below:
+        yield Finding((*rover, "battery", "empty"), "not below the full battery's voltage", empty)
+
+
 def _scenery(view: View) -> Iterator[Finding]:
-    """The pure engine has no meshes; what waves cross is of a material, or has a loss."""
+    """The pure engine has no meshes, a hall no ball that feels surfaces; waves cross a material, or have a loss."""
     for name in view.mapping("scenery"):
-        if view.get("engine") == "pure" and view.get("scenery", name, "shape") == "mesh":
+        if view.get("table") is None:
+            surface = view.get("scenery", name, "surface")
+            if surface is not None:
+                yield Finding(("scenery", name, "surface"), "a surface for a ball, in a world without one", surface)
+        elif view.get("engine") == "pure" and view.get("scenery", name, "shape") == "mesh":
             what = "the engine pure has no meshes (boxes and cylinders it has, and the engine bullet has all)"
             yield Finding(("scenery", name, "shape"), what, "mesh", "'box'")
         yield from _radio(view, ("scenery", name, "radio"))

@@ -3,7 +3,8 @@
 Engines build their bodies from a `Scene`, viewers draw it, sensors and the vHub place links with it, so there is one
 description of each. Frame of reference: the world's (x along the field, y across, z up), SI units, quaternions
 x, y, z, w. What enters a frame or a fate is computed here with + - * / and `math.sqrt`, `math.sin`, `math.cos` only,
-in one spelling. Neighbours: `table_scene` makes the football table, `layout` has the slots of an entity.
+in one spelling. Neighbours: `scenes` makes one (`table_scene` the football table, `hall_scene` a hall), `layout` has
+the slots of an entity.
 """
 
 from __future__ import annotations
@@ -72,11 +73,12 @@ class Link:
     """A rigid part that hangs on the link before it (the first on the body's base) by one joint.
 
     `free` has six degrees of freedom, `prismatic` slides along `axis` within `limits` (m), `revolute` turns about it
-    (rad, without limits). The link's frame is the joint's; `inertia` is the diagonal about the centre of mass.
+    (rad, without limits), `fixed` does nothing. The link's frame is the joint's; `inertia` is the diagonal about the
+    centre of mass.
     """
 
     name: str
-    joint: Literal["free", "prismatic", "revolute"]
+    joint: Literal["free", "prismatic", "revolute", "fixed"]
     shapes: tuple[Shape, ...]
     mass: float
     inertia: Vector
@@ -87,12 +89,16 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A chain of links on a base that stands at `position`, upright. A free body's position comes from its slots."""
+    """A chain of links on a base that stands at `position`, upright. A free body's position comes from its slots.
+
+    Radio waves leave from `antenna`, a place in its last link.
+    """
 
     name: str
     model: str
     position: Vector
     links: tuple[Link, ...]
+    antenna: Vector = ORIGIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,11 +154,18 @@ def forward_kinematics(body: Body, entity: Entity, numbers: Sequence[float]) -> 
             dx, dy, dz = rotate(orientation, (way * link.axis[0], way * link.axis[1], way * link.axis[2]))
             position = (position[0] + dx, position[1] + dy, position[2] + dz)
             joint += 1
-        else:
+        elif link.joint == "revolute":
             orientation = multiply(orientation, turn(link.axis, numbers[joint]))
             joint += 1
         poses.append((link.name, position, orientation))
     return poses
+
+
+def antenna_position(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
+    """Return where a body's antenna is, from the frame's numbers."""
+    _, position, orientation = forward_kinematics(body, entity, numbers)[-1]
+    dx, dy, dz = rotate(orientation, body.antenna)
+    return position[0] + dx, position[1] + dy, position[2] + dz
 
 
 def place(shape: Shape, position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:

@@ -1,9 +1,9 @@
-"""Fixed things that a deployment puts into its world beside the table: boxes, cylinders, and meshes from files.
+"""Fixed things that a deployment puts into its world beside table or hall: boxes, cylinders, and meshes from files.
 
 This is their schema, and how they become shapes of the scene. A mesh's file is named by a path inside the deployment's
 asset folder; its digest is written beside it when a run is planned, so that the deployment's text alone says which
 world is meant, on every machine. Neighbours: `deployment` (which holds them), `assets` (reads the files), `mesh` (what
-is in them), `table_scene` (adds the shapes to the scene).
+is in them), `table_scene` and `hall_scene` (add the shapes to the scene).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.mesh import MESH_READERS, AssetError, Mesh, check_digest, digest_of, is_closed, read_mesh
 from foosim.protocol.radio_materials import UNKNOWN, Radio
 from foosim.protocol.scene import Box, Colour, Cylinder, Quaternion, Shape, Vector, multiply, turn
-from foosim.protocol.table import Length, Part, Position
+from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity, custom_error
 
 PATH_LENGTH_MAX: Final = 200
@@ -77,6 +77,8 @@ AssetFolder = Annotated[str, AfterValidator(_folder)]
 AssetPath = Annotated[str, AfterValidator(_asset_path)]
 MeshPath = Annotated[str, AfterValidator(_mesh_path)]
 Digest = Annotated[str, AfterValidator(_digest)]
+Length = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "1000 m")]
+Position = Annotated[float, Quantity(units.LENGTH, "-1000 m", "1000 m")]
 Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
 Share = Annotated[float, Field(ge=0, le=1)]
 SurfaceName = Literal["floor", "walls", "goal", "ramps"]
@@ -102,7 +104,7 @@ class Material(Part):
 class Placed(Part):
     """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw).
 
-    `radio` is what waves that cross it lose: 5 dB if it is not said.
+    `surface` is what it is to a table's ball, `radio` what waves that cross it lose: 5 dB if it is not said.
     """
 
     x: Position = _default("0 m")
@@ -111,7 +113,7 @@ class Placed(Part):
     roll: Turn = _default("0 deg")
     pitch: Turn = _default("0 deg")
     yaw: Turn = _default("0 deg")
-    surface: SurfaceName
+    surface: SurfaceName = "walls"
     material: Material = Field(default_factory=Material)
     radio: Radio | None = None
 

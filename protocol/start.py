@@ -12,12 +12,13 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment import Deployment, RoverRobot
 from foosim.protocol.errors import BadValue, Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.protocol.layout import Entity, Layout, build_layout
 from foosim.protocol.message_types import Numbers
 from foosim.protocol.messages import Added, AddedEntity, Origin, Outboxes
+from foosim.protocol.scene import turn
 
 
 def place_ball(
@@ -36,6 +37,18 @@ def place_ball(
     numbers[entity.offsets["contacts"] + 2] = -1.0
 
 
+def place_rover(numbers: list[float], entity: Entity, deployment: Deployment) -> None:
+    """Set a rover to where it starts, standing still, charged as its deployment says."""
+    robot = deployment.robots[entity.name]
+    assert isinstance(robot, RoverRobot)
+    numbers[entity.start : entity.split] = [0.0] * (entity.split - entity.start)
+    start, turned = entity.offsets["position"], entity.offsets["orientation"]
+    numbers[start : start + 2] = robot.x, robot.y
+    numbers[turned : turned + 4] = turn((0.0, 0.0, 1.0), robot.heading)
+    numbers[entity.offsets["heading"]] = robot.heading
+    numbers[entity.offsets["charge"]] = robot.charge * deployment.hall.rover.battery.capacity
+
+
 def kickoff_ticks(deployment: Deployment) -> int:
     """Return how many ticks a ball rests at the kick-off spot."""
     return max(1, deployment.table.rules.kickoff_delay_ns // deployment.tick_ns)
@@ -46,8 +59,11 @@ def kickoff_spot(deployment: Deployment) -> tuple[float, float, float]:
 
 
 def initial_numbers(deployment: Deployment, layout: Layout) -> list[float]:
-    """Return the numbers of a world at rest: rods centred, figures down, the ball at the kick-off spot."""
+    """Return the numbers of a world at rest: rods centred, figures down, the ball at the kick-off spot; or rovers
+    where the deployment says."""
     numbers = [0.0] * layout.size
+    for entity in layout.rovers:
+        place_rover(numbers, entity, deployment)
     for entity in layout.rods:
         numbers[entity.offsets["contacts"] + 2] = -1.0
     for entity in layout.balls:

@@ -43,7 +43,7 @@ _TO_CORNER: Final[dict[tuple[float, float], tuple[float, float]]] = {
 """Sine and cosine of half the angle from +x to each corner (45, 135, 225 - 360 and 315 - 360 degrees)."""
 
 
-def build_scene(deployment: Deployment, layout: Layout) -> Scene:
+def table_scene(deployment: Deployment, layout: Layout) -> Scene:
     """Return the scene of a layout's bodies on the deployment's table."""
     table = deployment.table
     bodies = {}

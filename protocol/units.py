@@ -75,12 +75,15 @@ FORCE: Final = Dimension("force", _sizes(N="1", mN="1e-3", kN="1e3"))
 TORQUE: Final = Dimension("torque", {"N m": Fraction(1), "mN m": Fraction(1, 1000)})
 IMPULSE: Final = Dimension("impulse", {"N s": Fraction(1), "mN s": Fraction(1, 1000)})
 LEVEL: Final = Dimension("level", _sizes(dB="1"))
+ENERGY: Final = Dimension("energy", _sizes(J="1", kJ="1e3", Wh="3600", kWh="3.6e6"))
+POWER: Final = Dimension("power", _sizes(W="1", mW="1e-3", kW="1e3"))
+VOLTAGE: Final = Dimension("voltage", _sizes(V="1", mV="1e-3", kV="1e3"))
 PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)})
 FREQUENCY: Final = Dimension("frequency", _sizes(Hz="1", kHz="1e3", MHz="1e6", GHz="1e9"))
 BITRATE: Final = Dimension(
     "bit rate", _sizes(**{"bit/s": "1", "kbit/s": "1e3", "Mbit/s": "1e6", "Gbit/s": "1e9"}), "int"
 )
-POWER: Final = Dimension("power level", _sizes(dBm="1"))
+POWER_LEVEL: Final = Dimension("power level", _sizes(dBm="1"))
 GAIN: Final = Dimension("antenna gain", _sizes(dBi="1"))
 
 

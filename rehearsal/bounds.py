@@ -30,6 +30,9 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Fabric.states": limits.CLIENTS_MAX,
     "Fabric._links": limits.CLIENTS_MAX,
     "Fabric.radios": limits.CLIENTS_MAX,
+    "HubState._receivers": limits.ENTITIES_MAX,
+    "HubState._flights": 1 << 14,  # by tick all that arrives then: each of many clients may hear all others
+    "Process.report": limits.CLIENTS_MAX,  # a line a link
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers of something else than ticks."""

@@ -209,10 +209,18 @@ def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
 # --- people ----------------------------------------------------------------------------------------------------------
 
 
+OF_TABLE: Final = ("red.goal", "red.attack", "blue.defence", "camera")
+
+
 def _move(dice: Dice, names: Sequence[str]) -> Fault:
-    robot, node = dice.one_of(("red.goal", "red.attack", "blue.defence", "camera")), dice.one_of(names)
-    request = partial(ask, verb="move", robot=robot, node=node)
-    return Fault(_tick(dice), "move", f"move {robot} to {node}", request)
+    robot, node = dice.one_of(OF_TABLE), dice.one_of(names)
+
+    def do(system: System) -> None:
+        others = sorted(system.supervisor.owners)  # of a hall, the robots in the same places of the list
+        chosen = robot if robot in others else others[OF_TABLE.index(robot) % len(others)]
+        ask(system, "move", robot=chosen, node=node)
+
+    return Fault(_tick(dice), "move", f"move {robot} to {node}", do)
 
 
 def _add(dice: Dice, names: Sequence[str]) -> Fault:
@@ -235,12 +243,12 @@ def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
 
     def do(system: System) -> None:
         asked = [ask(system, "pause"), ask(system, "step", count=ticks)]
-        system.later(for_ms * MS, partial(_when_answered, system, asked, go_on))
+        system.later(for_ms * MS, partial(when_answered, system, asked, go_on))
 
     def go_on(system: System) -> None:
         asked = [] if system.healed else [ask(system, "rate", pace=pace)]
         asked.append(ask(system, "resume"))
-        system.later(300 * MS, partial(_when_answered, system, asked, be_fast))
+        system.later(300 * MS, partial(when_answered, system, asked, be_fast))
 
     def be_fast(system: System) -> None:
         if not system.healed:
@@ -249,12 +257,12 @@ def _tempo(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "tempo", f"pause for {for_ms} ms, step {ticks}, then {pace}", do)
 
 
-def _when_answered(system: System, asked: Sequence[str], do: Callable[[System], None]) -> None:
+def when_answered(system: System, asked: Sequence[str], do: Callable[[System], None]) -> None:
     """Go on when all that was asked for before is answered: what comes late would undo what comes after."""
     if all(identity in system.answers for identity in asked):
         do(system)
     else:
-        system.later(ASK_AGAIN_NS, partial(_when_answered, system, asked, do))
+        system.later(ASK_AGAIN_NS, partial(when_answered, system, asked, do))
 
 
 # --- supervisor and vHub ----------------------------------------------------------------------------------------------

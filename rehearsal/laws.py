@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import CHAIN_START, Frame, basis_of, chain_next, edits_content
+from foosim.protocol.frame import CHAIN_START, basis_of, chain_next, edits_content
 from foosim.protocol.messages import (
     Answer,
     Commit,
@@ -35,6 +35,7 @@ from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.packet_laws import PacketLaws, hold
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import System
+from foosim.rehearsal.world_bounds import strays
 from foosim.supervisor.records import CommitRecord, HeadRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
@@ -54,14 +55,16 @@ class Laws:
         self.epoch = 0
         self.flipped: Collection[str] = ()
         """Nodes whose memory a fault has changed."""
-        self._table = deployment.table
         self._replica = replica
         self._deployment = deployment
         self._chains = {0: CHAIN_START}
         """By tick, over all frames up to it."""
         self._frames = {0: initial_frame(deployment)}
         """Those of the last ticks that are captured."""
-        self._branch = 0
+        self._branch = 0, 0
+        """Number and tick of the last branch."""
+        self._is_begun = False
+        """Whether no epoch is in it yet."""
         self._digests = {0: initial_frame(deployment).digest}
         self._rosters: dict[int, list[str]] = {}
         self._epochs: set[bytes] = set()
@@ -116,7 +119,7 @@ class Laws:
             self._commits_one(record.commit, decode(Commit, record.commit))
         elif isinstance(record, Epoch):
             self._begins(record, traced.payload)
-        elif isinstance(record, HeadRecord) and record.branch[0] > self._branch:
+        elif isinstance(record, HeadRecord) and record.branch[0] >= self._branch[0] and record.branch != self._branch:
             self._branches(*record.branch)
             self._tells_again([entry.message() for entry in record.recovered if entry.outage_ns < 0])
         elif isinstance(record, OrderedRecord):
@@ -187,17 +190,21 @@ class Laws:
         hold(owners.keys() == self._deployment.robots.keys(), f"epoch {epoch.epoch} has not all robots")
         hold(not {*epoch.roster} & {*self._stopped}, f"epoch {epoch.epoch} is with a node that is stopped")
         hold({*owners.values()} <= {*epoch.roster}, f"epoch {epoch.epoch}: an owner takes no part")
+        branch = (epoch.epoch if self._is_begun else self._branch[0]), self._branch[1]
+        hold((epoch.branch, epoch.branch_tick) == branch, f"epoch {epoch.epoch} is not of branch {branch}")
+        if self._is_begun:
+            self._branch, self._is_begun = branch, False
+            self.packets.branch(epoch.branch)
         self.epoch = epoch.epoch
         self._rosters[epoch.epoch] = sorted(epoch.roster)
         self._epochs.add(raw)
 
     def _branches(self, number: int, tick: int) -> None:
         """A branch begins where the vHub stands; all behind is void, but for what was asked for at its tick."""
-        hold(number > self.epoch, f"branch {number} in epoch {self.epoch}")
         hold(
             tick == self.packets.closed, f"branch {number} from tick {tick}, the vHub has closed {self.packets.closed}"
         )
-        self._branch = number
+        self._branch, self._is_begun = (number, tick), True
         for known in (self._commits, self._digests, self._chains):
             for behind in [each for each in known if each > tick]:
                 known.pop(behind)
@@ -241,7 +248,7 @@ class Laws:
         hold(part.node in self._rosters.get(part.epoch, ()), f"{part.node} has no part in epoch {part.epoch}")
         hold(part.epoch >= self._said_epoch.get(part.node, 0), f"{part.node} goes back to epoch {part.epoch}")
         self._said_epoch[part.node] = part.epoch
-        if part.tick <= self.committed or part.epoch < self._branch:
+        if part.tick <= self.committed or part.epoch < self._branch[0]:
             return
         said = self._parts.setdefault((part.epoch, part.tick), {}).setdefault(part.node, (traced.payload, part))
         hold(said[0] == traced.payload, f"{part.node} has two parts {part.tick} in epoch {part.epoch}")
@@ -298,22 +305,11 @@ class Laws:
         hold(again.digest == closing.digest, f"frame {frame.tick} is another one than its orders and deliveries give")
         hold(closing.digest == self._digests[frame.tick], f"frame {frame.tick} is not the committed one")
         self.packets.senses(again, self._replica)
-        self._in_bounds(again)
+        stray = strays(self._deployment, again)
+        hold(not stray, f"at tick {frame.tick} {', '.join(stray)}")
         self.ticks = frame.tick
         self._frames[frame.tick] = again
         self._frames.pop(frame.tick - FRAMES_KEPT, None)
-
-    def _in_bounds(self, frame: Frame) -> None:
-        """What is not in quarantine is in the world and no faster than the model promises."""
-        margin, limit = self._table.rules.out_margin, self._table.ball.speed_limit
-        for ball in frame.layout.balls:
-            if frame.at(ball.name, "quarantined") == 0.0:
-                x, y, _ = frame.vector(ball.name, "position", 3)
-                speed = sum(value * value for value in frame.vector(ball.name, "linear_velocity", 3))
-                inside = (
-                    abs(x) <= self._table.field.length / 2 + margin and abs(y) <= self._table.field.width / 2 + margin
-                )
-                hold(inside and speed <= limit * limit, f"{ball.name} is out of its bounds at tick {frame.tick}")
 
     def end(self, system: System, nodes: int) -> None:
         """When all has healed: everybody is back, everything is answered, and the journals give what is there."""

@@ -18,6 +18,7 @@ from foosim.rehearsal.faults import TICKS
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.swarm import fly
 from foosim.rehearsal.system import Settings
+from foosim.supervisor.display import score_text
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
@@ -83,11 +84,12 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     if json:
         typer.echo(encode_json(result).decode())
     else:
-        score = result["score"]
         seconds = (result["ticks"] - result["first_tick"]) * result["tick_ns"] / 1e9
-        typer.echo(f"{seconds:.2f} s simulated at {result['rtf']}x, red {score['red']} : {score['blue']} blue")
+        score = f", {score_text(result)}" if result["score"] else ""
+        typer.echo(f"{seconds:.2f} s simulated at {result['rtf']}x{score}")
         packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
-        typer.echo(f"{result['handovers']} hand-overs of the ball, packets {packets}")
+        handovers = f"{result['handovers']} hand-overs of the ball, " if result["score"] else ""
+        typer.echo(f"{handovers}packets {packets}")
         typer.echo(f"digest of all ticks {result['digest']['chain']}")
     raise typer.Exit(FAILED if result["failed"] else DONE)
 

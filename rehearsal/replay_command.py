@@ -1,11 +1,14 @@
-"""The command `foosim-replay`: what a capture holds, and whether it repeats. A shell over `verify` and the reader."""
+"""The command `foosim-replay`: what a capture holds, whether it repeats, and all else that is done with one.
+
+Here are `info`, `verify` and `recover`, shells over the reader, `verify` and the recovery. Neighbours:
+`capture_commands` (export, cut, diff), `play_command` (play, control), `whatif_command`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import msgspec
 import typer
@@ -13,52 +16,37 @@ import typer
 from foosim.protocol import limits
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
-from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.errors import BadValue, Failed
+from foosim.protocol.journal import JournalError
+from foosim.rehearsal import capture_commands, play_command, whatif_command
+from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture
-from foosim.vhub.capture_reader import CaptureInfo, capture_info
+from foosim.vhub.capture_info import CaptureInfo, capture_info
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.rows import CaptureError
 
 app = new_app()
 
 
-class BadCapture(Refused):
-    """A file that is no capture, or is damaged, is bad input."""
-
-    exit_code = 2
-
-
-@contextmanager
-def _read() -> Iterator[None]:
-    """Have what is wrong with the file end the command as bad input."""
-    try:
-        yield
-    except CaptureError as error:
-        raise BadCapture(str(error)) from None
-
-
-Capture = Annotated[Path, typer.Argument(help="The capture, an MCAP file.", show_default=False)]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
-
-
 @app.callback()
 def foosim_replay(version: VersionOption = False) -> None:
-    """Look into a capture, and simulate it again.
+    """Look into a capture, play it, compare it, take parts of it, and simulate it again.
 
-    Exit codes: 0 done, 1 differs or failed, 2 bad input (no capture, a damaged one).
+    Exit codes: 0 done, 1 differs or failed, 2 bad input (no capture, a damaged one), 3 refused, or recovered with loss.
     """
 
 
 @app.command()
 def info(capture: Capture, json: Json = False) -> None:
-    """Show what a capture holds: run, duration, digests, nodes and their arithmetic, packets, recoveries, topics."""
-    with _read():
+    """Show what a capture holds: run, duration, digests, nodes and their arithmetic, packets by fate, cause and
+    channel, recoveries, topics, files and versions.
+    """
+    with reading():
         found = capture_info(capture)
     typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
 
 
 def _describe(found: CaptureInfo) -> str:
-    packets = found.packets
     state = (
         "finished" if found.finished else f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
     )
@@ -70,14 +58,24 @@ def _describe(found: CaptureInfo) -> str:
         f"  digest of all ticks {found.chain}",
         f"  nodes {', '.join(found.nodes) or 'not known'}",
         f"  arithmetic {', '.join(found.arithmetic) or 'not known'}",
-        f"  packets {', '.join(f'{count} {fate}' for fate, count in packets.items())}",
+        f"  clients {', '.join(found.clients) or 'none'}",
+        f"  packets {_counted(found.packets)}",
+        *([f"  dropped by {_counted(found.causes)}"] if found.causes else []),
+        *([f"  on channels {_counted(found.channels)}"] if found.channels else []),
+        f"  payloads {found.payload_bytes / 1e6:.1f} MB",
         f"  recoveries {found.recoveries}",
         "  topics",
         *(f"    {topic}: {count}" for topic, count in found.topics.items()),
+        *(["  files of the deployment"] if found.files else []),
+        *(f"    {name}: {size} bytes" for name, size in found.files.items()),
         "  versions",
         *(f"    {name}: {number}" for name, number in sorted(found.versions.items())),
     ]
     return "\n".join(lines)
+
+
+def _counted(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
 def _span(found: CaptureInfo) -> str:
@@ -97,7 +95,7 @@ def verify(
     """
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
-    with _read():
+    with reading():
         found = verify_capture(capture, nodes)
     typer.echo(encode_json(_as_json(found)).decode() if json else _verdict(found))
     if found.tick >= 0 and found.other_arithmetic:
@@ -138,16 +136,43 @@ def recover(
     journals: Annotated[
         Path | None, typer.Option(help="The folder of its vHub's journal, e.g. RUN/journals.", show_default=False)
     ] = None,
+    json: Json = False,
 ) -> None:
     """Make a capture valid that its writer left unfinished; what a journal has is added.
 
     It is changed in place: cut behind the last whole chunk, completed, and ended. Bytes that are damaged and not just
     cut are only given up when the journal has what they held. `foosim-supervisor up` does this by itself with what
-    earlier ones of the same user left.
+    earlier ones of the same user left. Exit codes: 0 the capture has all that was recorded, 1 it could not be
+    recovered and is as it was, 3 it is a capture again, without what no journal told.
     """
-    with _read():
+    try:
         found = recover_capture(capture, journals)
-    typer.echo(f"capture {capture} is finished already" if found is None else str(found))
+    except (CaptureError, JournalError) as error:
+        raise Failed(str(error)) from None
+    if json:
+        content = {
+            "finished_before": found is None,
+            "whole": found is None or found.is_whole,
+            "tick": None if found is None else found.tick,
+            "torn_bytes": 0 if found is None else found.torn_bytes,
+            "added_ticks": 0 if found is None else found.added_ticks,
+            "problem": "" if found is None else found.problem,
+        }
+        typer.echo(encode_json(content).decode())
+    else:
+        typer.echo(f"capture {capture} is finished already" if found is None else str(found))
+    raise typer.Exit(DONE if found is None or found.is_whole else WITH_LOSS)
+
+
+WITH_LOSS: Final = 3
+
+_COMMANDS: Final = (
+    *(play_command.play, play_command.control),
+    *(capture_commands.export, capture_commands.cut, capture_commands.diff),
+    whatif_command.whatif,
+)
+for command in _COMMANDS:
+    app.command()(command)
 
 
 def main() -> None:

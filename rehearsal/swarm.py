@@ -36,6 +36,7 @@ from foosim.rehearsal.faults import (
     Fault,
     ask,
     revive,
+    when_answered,
 )
 from foosim.rehearsal.laws import Laws
 from foosim.rehearsal.packet_laws import Broken, hold
@@ -60,11 +61,11 @@ PROBER: Final = "prober"
 SMALL: Final = (
     "engine=pure",
     "substeps=1",
-    "table.rules.kickoff_delay=20 ms",
     f"clients={{{PROBER}: {{lockstep: true, rate: 50 Hz}}}}",
 )
-"""What is computed is the same, with fewer steps to it; the ball rolls from the start, and robots are asked for echoes.
-"""
+"""What is computed is the same, with fewer steps to it, and robots are asked for echoes."""
+OF_TABLE: Final = ("table.rules.kickoff_delay=20 ms",)
+"""The ball of a table rolls from the start."""
 PATIENT: Final = (
     "deadlines.tick_lost=5 s",
     "deadlines.lockstep_fast=24 h",
@@ -130,7 +131,7 @@ def _later(fault: Fault, ticks: int) -> Fault:
 class Prober:
     """A lockstep client that asks robots for echoes, each with a number of its own, and counts what comes back."""
 
-    ROBOTS: Final = ("blue.goal", "camera", "red.midfield")
+    OF_TABLE: Final = ("blue.goal", "camera", "red.midfield")
 
     def __init__(self, core: ClientCore) -> None:
         self._core = core
@@ -139,6 +140,7 @@ class Prober:
         self._back: dict[bytes, int] = {}
         """The echoes that have come, with the tick at which they did."""
         self._branch = 0
+        self._robots: list[str] = []
 
     def step(self, now_ns: int) -> None:
         """Join, and answer each Go with a question."""
@@ -149,7 +151,9 @@ class Prober:
             self._joined = True
             rate_hz = core.deployment.clients[PROBER].rate_hz
             assert rate_hz is not None
-            core.join(core.deployment.ticks(rate_hz), [(robot, CHANNEL_ECHO) for robot in self.ROBOTS])
+            deployment = core.deployment
+            self._robots = sorted(deployment.robots)[:3] if deployment.is_hall else list(self.OF_TABLE)
+            core.join(core.deployment.ticks(rate_hz), [(robot, CHANNEL_ECHO) for robot in self._robots])
         if core.branch != self._branch:
             self._branch, last = core.branch, core.branch_ns // core.deployment.tick_ns
             self._back = {payload: tick for payload, tick in self._back.items() if tick <= last}
@@ -158,7 +162,7 @@ class Prober:
                 if packet.payload in self._back:
                     raise Broken(f"echo {packet.payload.decode()} comes back twice")
                 self._back[packet.payload] = core.go.tick
-            robot = self.ROBOTS[self._sent % len(self.ROBOTS)]
+            robot = self._robots[self._sent % len(self._robots)]
             self._sent += 1
             core.done([Outgoing(robot, CHANNEL_ECHO, f"{robot} {self._sent}".encode())])
 
@@ -205,8 +209,9 @@ class Flown:
 @lru_cache(maxsize=4 * WORLDS)
 def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
     """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
-    text = with_nodes(text, name, nodes, [f"seed={seed}", *SMALL, *PATIENT])
-    return text, with_nodes(text, name, 1, ["players={}", "clients={}"])
+    of_world = () if load_deployment(text, name).is_hall else OF_TABLE
+    text = with_nodes(text, name, nodes, [f"seed={seed}", *SMALL, *of_world, *PATIENT])
+    return text, with_nodes(text, name, 1, ["players={}", "clients={}", "network={}"])
 
 
 class Flight:
@@ -279,6 +284,10 @@ class Flight:
         for name, process in list(system.processes.items()):
             process.slow_ns = 0
             system.resume(name)
+        stops = [identity for identity, verb in system.asked.items() if verb == "stop"]
+        when_answered(system, stops, self._start_all)
+
+    def _start_all(self, system: System) -> None:
         for number in range(1, self.plan.nodes + 1):
             ask(system, "start", node=f"n{number}")
             revive(system, f"n{number}")

@@ -17,7 +17,7 @@ from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.start import Start, added_to, first_chain, start_with
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
-from foosim.vhub.capture_reader import CaptureData, CapturedTick, open_capture, origin_of
+from foosim.vhub.capture_reader import CaptureData, CapturedTick, check_whole, open_capture, origin_of, read_about
 from foosim.vhub.rows import CaptureError
 
 
@@ -47,7 +47,8 @@ class Verified:
 
 
 def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
-    """Verify a capture file. Raises CaptureError for one that cannot be read."""
+    """Verify a capture file. Raises CaptureError for one that cannot be read, or was cut out of another."""
+    check_whole(read_about(Path(path)))
     capture = open_capture(path)
     about = capture.about
     start = start_of(capture)
@@ -62,7 +63,7 @@ def start_of(capture: CaptureData) -> Start | None:
     origin = origin_of(capture.about)
     if origin is None:
         return None
-    first = capture.frame_blocks[0].frame(0) if capture.frame_blocks and len(capture.frame_blocks[0]) else None
+    first = capture.first_frame()
     if first is None or first.digest != origin.digest:
         raise CaptureError(f"{capture.path}: it does not have frame {origin.tick}, with which its run began")
     return start_with(first, origin.source, origin.chain, added_to(capture.deployment, first.layout))

@@ -63,6 +63,15 @@ class Branches:
         proceed = Proceed(channels.VHUB, standing.boot, max(core.epoch, self.number))
         core.actions.append(Publish(channels.PROCEED, channels.VHUB, encode(proceed)))
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether the branch has begun and no epoch is in it yet: nobody else knows of it."""
+        return self.number > self._core.epoch
+
+    def enter(self, epoch: int) -> None:
+        """Name the branch that has begun after the first epoch in it."""
+        self.number = self._core.arrivals.branch = epoch
+
     def is_behind(self, standing: Standing) -> bool:
         """Whether somebody knows more, or may, than the vHub that goes on from a journal."""
         core = self._core
@@ -88,9 +97,12 @@ class Branches:
     def begin(self, standing: Standing, now_ns: int) -> None:
         """Begin a branch behind the vHub's last closed tick, with the epoch that is opened next.
 
-        It is one record of the journal, with what people are told of it.
+        It is one record of the journal, with what people are told of it. Whoever ends before that epoch, the supervisor
+        or the vHub, asks or is asked again: the branch that has begun where the vHub stands is that one.
         """
         core, frame = self._core, self._frame(standing)
+        if self.is_pending and standing.branch < self.number and frame.tick == self.tick:
+            return
         tick, before = frame.tick, core.frame.tick
         core.epoch = max(core.epoch, standing.epoch)
         reason = f"branch from tick {tick}: " + (

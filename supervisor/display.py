@@ -45,6 +45,19 @@ def pace_text(status: dict[str, Any]) -> str:
     return pace if rate is None else f"{pace} {rate:.2f}x"
 
 
+def world_texts(status: dict[str, Any]) -> list[str]:
+    """Return what there is to say of the world: score and ball of a table, the rovers of a hall."""
+    of_table = [score_text(status), ball_text(status)] if status["score"] else []
+    return of_table + ([rovers_text(status)] if status["rovers"] else [])
+
+
+def rovers_text(status: dict[str, Any]) -> str:
+    """`20 rovers, 18 drive, rover07 has 34 % of its charge`."""
+    rovers = status["rovers"]
+    count, drive, least, charge = (rovers[key] for key in ("count", "drive", "least", "charge"))
+    return f"{count} rovers, {drive} drive, {least} has {charge:.0%} of its charge"
+
+
 def score_text(status: dict[str, Any]) -> str:
     """`red 2 : 1 blue`."""
     return f"red {status['score']['red']} : {status['score']['blue']} blue"
@@ -90,8 +103,7 @@ def plain_line(status: dict[str, Any]) -> str:
         f"{simulated_s(status):.2f} s",
         pace_text(status),
         lag_text(status),
-        score_text(status),
-        ball_text(status),
+        *world_texts(status),
         f"packets {packets['offered']} offered, {packets['delivered']} delivered, {packets['dropped']} dropped",
         recording_text(status),
         "load " + " ".join(f"{name} {process['busy']:.0%}" for name, process in status["processes"].items()),
@@ -117,7 +129,7 @@ def _head(status: dict[str, Any]) -> Text:
     lines = [
         f"{status['world']} · run {status['run']} · {simulated_s(status):.2f} s · tick {status['ticks']} "
         f"· {pace_text(status)}",
-        f"{score_text(status)} · {ball_text(status)} · {status['handovers']} hand-overs, {status['moves']} moves",
+        " · ".join([*world_texts(status), f"{status['handovers']} hand-overs, {status['moves']} moves"]),
     ]
     lag = lag_text(status)
     waiting = f"waiting for {status['waiting_for']}" if status["state"] in ("starting", "paused") else ""

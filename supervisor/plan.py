@@ -18,6 +18,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.hall_start import start_findings
 from foosim.protocol.hosts import places
 from foosim.protocol.journal import journal_files
 from foosim.protocol.messages import Origin
@@ -138,6 +139,12 @@ def check_certificates(plan: Plan) -> list[str]:
     return [warning for warning in warnings if warning]
 
 
+def check_starts(deployment: Deployment) -> None:
+    """Raise BadValue for a rover that starts in a mesh, whose file has been read by now."""
+    for finding in start_findings(deployment):
+        raise BadValue(f"{'.'.join(map(str, finding.location))}: {finding.what}", finding.value)
+
+
 def make_plan(options: RunOptions) -> Plan:
     """Check everything that was asked for before anything is started; raises Refused."""
     name = str(options.file)
@@ -145,6 +152,7 @@ def make_plan(options: RunOptions) -> Plan:
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
     check_models(deployment, name, text)
+    check_starts(deployment)
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
     pace = deployment.pace if options.pace is None else parse_pace(options.pace)

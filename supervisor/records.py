@@ -156,14 +156,15 @@ class History:
 
 
 Solved = tuple[list[str], str]
-"""The nodes that solved a body on the way to a frame, and who solved the ball (empty for the first frame)."""
+"""The nodes that solved a body on the way to a frame, and who solved the ball (empty for the first frame, and where
+there is none)."""
 
 
 def solved_by(barrier: Barrier, frame: Frame) -> Solved:
     """Return the nodes that solved a body on the way to a frame, and who solved the ball."""
     entities = frame.layout.entities
     names = [name for name, part in barrier.parts.items() if any(entities[index].has_body for index in part.solved)]
-    return sorted(names), barrier.solver_of(frame.layout[BALL].index)
+    return sorted(names), barrier.solver_of(frame.layout[BALL].index) if BALL in frame.layout else ""
 
 
 def fold(deployment: Deployment, records: Iterable[bytes]) -> History:

@@ -181,8 +181,9 @@ class Requests:
     def resume(
         self, edits: dict[int, list[Edit]], answers: dict[tuple[str, str], Answer], issued: Issued, disruptions: int
     ) -> None:
-        """Take what a journal says of requests."""
-        self._edits, self._answers, self.issued, self.disruptions = edits, answers, issued, disruptions
+        """Take what a journal says of requests; of answers the last ones, as many as are kept."""
+        self._edits, self.issued, self.disruptions = edits, issued, disruptions
+        self._answers = dict(list(answers.items())[-ANSWERS_KEPT:])
 
     def set_back(self, tick: int) -> None:
         """The last commit is that of another tick now: what was issued from there on is to come (again)."""
@@ -235,6 +236,8 @@ class Requests:
     # --- the world ---------------------------------------------------------------------------------------------------
 
     def _add(self, request: Request, arguments: dict[str, Any], now_ns: int) -> None:
+        if self._core.deployment.is_hall:
+            raise Refused("this world is a hall: balls are added to a table")
         layout = self._next_layout()
         taken = {*layout.names, *(waiting.edit.name for waiting in self._pending)}
         name = _name(arguments, "name", _free_name(taken))
@@ -381,7 +384,7 @@ def _chosen(what: str, name: str, choices: Sequence[str]) -> str:
         return name
     nearest = nearest_name(name, choices)
     hint = f", nearest is {nearest}" if nearest else ""
-    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices)}{hint}")
+    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices) or 'none'}{hint}")
 
 
 def _integer(arguments: dict[str, Any], name: str, low: int, high: int) -> int:

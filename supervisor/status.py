@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_json
+from foosim.protocol.frame import Frame
 from foosim.protocol.hosts import places
+from foosim.protocol.layout import BALL
+from foosim.protocol.names import TEAMS
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -41,7 +44,6 @@ def result(core: SupervisorCore) -> dict[str, Any]:
     hub = core.roster.by_name.get(VHUB)
     report = {} if hub is None else hub.report
     wall_ns = core.committed_ns - core.started_ns
-    red, blue = frame.score
     lags = core.pacer.lags
     fast = core.pacer.is_fast
     origin = core.settings.origin
@@ -70,7 +72,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         "recoveries": core.recovery.as_json(),
         "moves": core.account.moves,
         "handovers": core.account.handovers,
-        "score": {"red": red, "blue": blue},
+        "score": _score(frame),
         "capture": (report.get("capture") or None) if hub is not None and hub.farewell else None,
         "reason": core.end.reason if core.end is not None else None,
         "failed": core.end.failed if core.end is not None else False,
@@ -82,7 +84,6 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
     hub = core.roster.by_name.get(VHUB)
     report = {} if hub is None else hub.report
     pacer = core.pacer
-    ball = core.frame.vector("ball", "position", 3)
     waiting_for = ", ".join(core.watch.waiting_for(core))
     return {
         **result(core),
@@ -93,7 +94,8 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "released": core.released,
         "late": {"lag_ms": pacer.last_lag_ns / 1e6, "waited_for": core.watch.late, "tick": core.watch.late_tick},
         "waiting_for": waiting_for,
-        "ball": {"position": [round(value, 4) for value in ball], "solver": core.account.ball_solver},
+        "ball": _ball(core),
+        "rovers": _rovers(core),
         "processes": _processes(core, waiting_for),
         "starts": dict(core.roster.starts),
         "links": report.get("links", []),
@@ -108,6 +110,30 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "refusals": report.get("refusals", {}),
         "clients": report.get("clients", []),
     }
+
+
+def _score(frame: Frame) -> dict[str, int] | None:
+    """Return the goals of both teams; None without a table."""
+    return None if frame.score is None else dict(zip(TEAMS, frame.score, strict=True))
+
+
+def _ball(core: SupervisorCore) -> dict[str, Any] | None:
+    """Return where the ball is, and who solves it; None without a table."""
+    if BALL not in core.frame.layout:
+        return None
+    position = core.frame.vector(BALL, "position", 3)
+    return {"position": [round(value, 4) for value in position], "solver": core.account.ball_solver}
+
+
+def _rovers(core: SupervisorCore) -> dict[str, Any] | None:
+    """Return how many rovers there are and drive, and which has the least charge (a share); None without a hall."""
+    frame, rovers = core.frame, core.frame.layout.rovers
+    if not rovers:
+        return None
+    capacity = core.deployment.hall.rover.battery.capacity
+    least, name = min((frame.at(rover.name, "charge"), rover.name) for rover in rovers)
+    drive = sum(any(frame.vector(rover.name, "wheel_speeds", 2)) for rover in rovers)
+    return {"count": len(rovers), "drive": drive, "least": name, "charge": round(least / capacity, 4)}
 
 
 def _processes(core: SupervisorCore, waiting_for: str) -> dict[str, Any]:

@@ -32,8 +32,6 @@ class TakeOver:
         deadlines = core.deployment.deadlines
         self._core = core
         self._standing: Standing | None = None
-        self._branches = False
-        """Whether what comes is a branch."""
         self._nodes_ns = now_ns + deadlines.heartbeat_ns + REJOIN_NS
         self._hub_ns = now_ns + deadlines.orphan_ns
         self._roster = [] if history.epoch is None else list(history.epoch.roster)
@@ -53,7 +51,6 @@ class TakeOver:
             return False
         if core.branches.is_behind(standing):
             core.branches.begin(standing, now_ns)
-            self._branches = True
         elif core.branches.is_further(standing):
             core.branches.stand(standing)
             core.say("warning", f"goes on from the vHub's commit {core.frame.tick}, the journal lost what led to it")
@@ -82,9 +79,10 @@ class TakeOver:
         core.take_over = None
         core.is_open = True
         beats = [process.heartbeat for process in core.roster.by_name.values()]
+        is_branch = core.branches.is_pending
         core.epoch = max([core.epoch, *(beat.epoch for beat in beats if beat is not None)])  # both journals may lack it
-        if self._branches:
-            core.branches.number = core.epoch + 1
+        if is_branch:
+            core.branches.enter(core.epoch + 1)
         core.pacer.start(now_ns, core.frame.tick)
         core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))
         core.recovery.note(channels.SUPERVISOR, channels.SUPERVISOR, "started again")

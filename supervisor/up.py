@@ -178,9 +178,9 @@ class Up:
         info = self._await(self._info_with_radio)
         if info is None:
             return False
-        for name in sorted(self.plan.deployment.players):
-            command = ["foosim-player", "--name", name, "--connect", info.radio, *self._pki_arguments(name)]
-            self._launch(name, command)
+        for process, players in self.plan.deployment.player_processes().items():
+            names = [word for name in players for word in ("--name", name)]
+            self._launch(process, ["foosim-player", *names, "--connect", info.radio, *self._pki_arguments(process)])
         return True
 
     def _vhub_command(self, info: RunInfo) -> list[str]:

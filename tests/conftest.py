@@ -8,11 +8,16 @@ measures in wall time is off, because the machines that run the tests are shared
 import os
 import subprocess
 from collections.abc import Callable, Iterator
+from copy import deepcopy
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
+
+from foosim.protocol.deployment_file import apply_sets
+from foosim.protocol.yaml_tree import locate_in, plain, read_tree, write_yaml
 
 settings.register_profile(
     "foosim", derandomize=True, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
@@ -22,7 +27,10 @@ settings.load_profile("foosim")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """What `make fuzz` chooses; by default the share of it that `make test` has."""
+    """What `make fuzz` and `make stats` choose; by default the share of them that `make test` has."""
+    parser.addoption("--links-seed", type=int, default=1, help="of the networks and packets of tests/links")
+    parser.addoption("--links-full", action="store_true", help="tests/links at full size, one failure in a million")
+    parser.addoption("--links-table", default="", help="the file that the figures of tests/links are written into")
     parser.addoption("--fuzz-payloads", type=int, default=100, help="payloads for each target of the fuzz tests")
     parser.addoption("--fuzz-seed", type=int, default=17, help="what the payloads are drawn from")
     parser.addoption("--fuzz-block", type=int, default=-1, help="bring the payloads of this block alone")
@@ -32,7 +40,34 @@ def pytest_report_header(config: pytest.Config) -> str:
     """The settings under which hypothesis runs, and the fuzz tests' seed, in the first lines of the output."""
     current = settings()
     seed, payloads = config.getoption("--fuzz-seed"), config.getoption("--fuzz-payloads")
-    return f"hypothesis: derandomize={current.derandomize}, deadline={current.deadline}; fuzz: {seed=}, {payloads=}"
+    links = f"links: seed={config.getoption('--links-seed')}, full={config.getoption('--links-full')}"
+    hypothesis = f"hypothesis: derandomize={current.derandomize}, deadline={current.deadline}"
+    return f"{hypothesis}; fuzz: {seed=}, {payloads=}; {links}"
+
+
+WAREHOUSE = Path(__file__).parent.parent / "deploy" / "warehouse.yaml"
+
+
+@pytest.fixture(scope="session")
+def fleet_text() -> Callable[..., str]:
+    """The text of a small hall: so many of the warehouse's rovers, with their controllers, and settings."""
+
+    tree, _ = read_tree(WAREHOUSE.read_text(), locate_in(WAREHOUSE.name))
+    assert tree is not None
+    whole: Any = plain(tree)
+
+    def text(rovers: int, *sets: str) -> str:
+        data = deepcopy(whole)
+        gone = {f"{kind}{number:02d}" for kind in ("rover", "pilot") for number in range(rovers + 1, 21)}
+        for section in ("robots", "players"):
+            data[section] = {name: about for name, about in data[section].items() if name not in gone}
+        if rovers == 1:
+            del data["players"]["pilot01"]["hears"]["pilot*"]  # there is no other one
+        for node in data["nodes"].values():
+            node["robots"] = [robot for robot in node["robots"] if robot not in gone]
+        return apply_sets(write_yaml(data), WAREHOUSE.name, sets)
+
+    return text
 
 
 class WireTogether(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types

@@ -8,6 +8,7 @@ from typing import Final
 
 S: Final = "foosim/simulation"
 R: Final = "foosim/radio"
+P: Final = "foosim/replay"
 
 
 def may_put(identity: str, key: str) -> bool:
@@ -21,7 +22,8 @@ def may_put(identity: str, key: str) -> bool:
             of_vhub = ("hello", "fetch", "ready", "standing", "want", "heartbeat", "farewell")
             return key in {f"{S}/deliveries", *(f"{S}/{what}/vhub" for what in of_vhub)}
         case "operator":
-            return key.startswith(f"{S}/request/{name}.") and "/" not in key[len(f"{S}/request/") :]
+            stem = f"{P}/request/" if key.startswith(P) else f"{S}/request/"
+            return key.startswith(f"{stem}{name}.") and "/" not in key[len(stem) :]
         case "client":
             return key in {f"{R}/hello/{name}", f"{R}/up/{name}"}
     return False
@@ -40,7 +42,7 @@ def may_hear(identity: str, key: str) -> bool:
             to_it = {f"{S}/{what}/vhub" for what in ("build", "piece", "refusal", "proceed", "commit")}
             return key in to_all | to_it or key.startswith((f"{S}/samples/", f"{S}/want/"))
         case "operator":
-            return key.startswith(f"{S}/answer/{name}.")
+            return key.startswith((f"{S}/answer/{name}.", f"{P}/answer/{name}.", f"{P}/played/"))
         case "client":
             return key in {f"{R}/{what}/{name}" for what in ("welcome", "refusal", "down")}
     return False
@@ -54,4 +56,6 @@ def may_be_present(identity: str, key: str) -> bool:
 
 def may_watch(identity: str, key: str) -> bool:
     """Whether this identity hears of a presence under a key: of its router's."""
+    if key == f"{P}/alive/replay":
+        return identity.startswith("operator.")
     return key == (f"{R}/alive/vhub" if identity.startswith("client.") else f"{S}/alive/supervisor")

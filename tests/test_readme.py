@@ -19,10 +19,10 @@ from types import ModuleType
 from typing import Any, Final
 
 import pytest
-import yaml
 
-from foosim.client.payloads import decode_payload
+from foosim.client.payloads import Command, decode_payload
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.yaml_tree import locate_in, plain, read_tree
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.vhub.capture_reader import open_capture
@@ -104,7 +104,8 @@ def test_the_readmes_player_plays(house: Path) -> None:
     sent = capture.packets.where(capture.packets.source == "player-red")
     rods = [f"red.{line}" for line in ("goal", "defence", "midfield", "attack")]
     assert set(sent.destination) == set(rods)
-    assert {decode_payload("position", payload)[1] for payload in sent.payload} == {0.5, -1.2}
+    commands = [decode_payload("position", payload) for payload in sent.payload]
+    assert {command.spin for command in commands if isinstance(command, Command)} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
 
 
@@ -118,11 +119,16 @@ def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: st
 
 
 def test_a_players_declaration_is_valid() -> None:
-    (text,) = blocks(ROOT / "docs" / "writing_a_player.md", "yaml")
-    ((name, declared),) = yaml.safe_load(text)["players"].items()
     table = (ROOT / "deploy" / "table.yaml").read_text()
-    changed = apply_sets(table, "table.yaml", [f"players.{name}={json.dumps(declared)}"])
-    assert load_deployment(changed, "table.yaml").players[name].class_ == "follower:Follower"
+    classes = []
+    for text in blocks(ROOT / "docs" / "writing_a_player.md", "yaml"):
+        tree, _ = read_tree(text, locate_in("page"))  # not PyYAML's own: there the key `on` would be true
+        assert tree is not None
+        content: Any = plain(tree)
+        ((name, declared),) = content["players"].items()
+        changed = apply_sets(table, "table.yaml", [f"players.{name}={json.dumps(declared)}"])
+        classes.append(load_deployment(changed, "table.yaml").players[name].class_)
+    assert classes == ["follower:Follower", "scouting:Scout"]
 
 
 # --- what is named exists --------------------------------------------------------------------------------------------

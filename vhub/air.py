@@ -17,8 +17,9 @@ from foosim.vhub.packet import Flight
 from foosim.vhub.propagation import Propagation, zeptowatt
 from foosim.vhub.radio.errors import LORA_ISOLATION_DB
 
-DEAF: Final = 2**60
-"""In units of 1e-21 W: the interference of a station with itself."""
+DEAF: Final = 2**62
+"""In units of 1e-21 W: the interference of a station with itself. That of others stays below: it is cut there, since
+sums of cut numbers do not depend on their order either, and a state has 64 bits for them."""
 NEGLIGIBLE_CDB: Final = 1000
 """What is weaker than noise by this does not count."""
 NOTHING_CDBM: Final = -(10**6)
@@ -50,13 +51,15 @@ class Air:
 
         It waits for all that it hears; who has something queued or on air when it is ready contends.
         """
-        place, sense_cdbm = of.antenna(source), of.sense_cdbm
+        place = of.antenna(source)
         start_ns = ready_ns
         heard: set[str] = set()
         for known in self.state.on_air:
             if known.source == source or known.until_ns <= ready_ns:
                 continue
-            if known.source not in heard and _power_cdbm(known, source, place, of) < sense_cdbm:
+            if known.source not in heard and not of.hears(
+                known.position, place, known.source, source, known.power_cdbm
+            ):
                 continue
             heard.add(known.source)
             start_ns = max(start_ns, known.until_ns)
@@ -66,7 +69,8 @@ class Air:
         """Take a transmission: it spoils what is on air beside it."""
         self.state.on_air.append(known)
         for flight, of in self._flights:
-            _spoil(flight, known, of)
+            if not flight.cause:  # the inputs of a fate do not change behind it
+                _spoil(flight, known, of)
 
     def listen(self, flight: Flight, of: Propagation) -> None:
         """Take a packet on air, which those who are on air beside it spoil."""
@@ -91,7 +95,8 @@ def _spoil(flight: Flight, known: Transmission, of: Propagation) -> None:
     power_cdbm = _power_cdbm(known, flight.destination, of.antenna(flight.destination), of)
     if power_cdbm <= of.noise_cdbm - NEGLIGIBLE_CDB:
         return
-    flight.interference += zeptowatt(power_cdbm)
+    if flight.interference < DEAF:
+        flight.interference = min(DEAF - 1, flight.interference + zeptowatt(power_cdbm))
     if of.settings.medium == "lora":
         isolation_db = LORA_ISOLATION_DB[of.settings.spreading_factor - 7][known.spreading_factor - 7]
         flight.is_spoiled |= flight.received_cdbm - power_cdbm < isolation_db * 100

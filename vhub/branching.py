@@ -13,11 +13,11 @@ from pathlib import Path
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Malformed, Refused
 from foosim.protocol.frame import Frame, chain_next, frame_from_bytes
-from foosim.protocol.layout import BALL, WORLD, Layout
+from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import AddedEntity, Outbox
-from foosim.protocol.start import Start, first_chain, start_with
+from foosim.protocol.start import Start, start_with
 from foosim.protocol.units import format_ns, parse_ns
-from foosim.vhub.capture_reader import Scan, deployment_of, layout_of, origin_of
+from foosim.vhub.capture_reader import Scan, chain_at_start, deployment_of, layout_of
 from foosim.vhub.rows import FRAME, LAYOUT, TICK, CaptureError, FrameRow, LayoutRow, TickRow
 
 
@@ -111,7 +111,7 @@ def _find(path: Path, at_ns: int | None) -> _Found:
             tick, digest = row.tick, bytes.fromhex(row.digest)
             if at_ns is not None and tick * tick_ns > at_ns:
                 break
-            chain = chain_next(chain, digest) if chain else first_chain(origin_of(scan.about))
+            chain = chain_next(chain, digest) if chain else chain_at_start(scan.about)
         elif isinstance(row, FrameRow) and layout is not None and row.tick == tick and chain:
             found = _Found(deployment, layout, row, digest, chain)
     if found is None or (at_ns is not None and tick * tick_ns < at_ns):
@@ -126,7 +126,7 @@ def _seconds(at_ns: int | None) -> str | None:
 
 def _differences(layout: Layout, deployment: Deployment, added: list[AddedEntity]) -> list[str]:
     """Return in words where a captured layout is not that of the deployment with what was added."""
-    wanted = {**{name: robot.model for name, robot in deployment.robots.items()}, BALL: BALL, WORLD: WORLD}
+    wanted = dict(build_layout(deployment).models)
     differing = [
         f"{a.name} was added, the deployment has a {wanted[a.name]} of that name" for a in added if a.name in wanted
     ]

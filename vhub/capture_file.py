@@ -54,6 +54,8 @@ ASSETS: Final = "assets/"
 VERSIONS: Final = "versions.json"
 ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
 """Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
+CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cut_chain"
+"""Which capture a cut is of, the first frame that it has, its digest, and the chain up to it: entries there, too."""
 CHUNK_BYTES: Final = 4 * 1024 * 1024
 """A chunk is ended at this size, or when it is to be flushed; a reader holds one at a time."""
 _LIBRARIES: Final = (
@@ -101,6 +103,19 @@ def origin_metadata(origin: Origin | None) -> dict[str, str]:
         return {}
     digest, chain = origin.digest.hex(), origin.chain.hex()
     return {ORIGIN: origin.source, ORIGIN_TICK: str(origin.tick), ORIGIN_DIGEST: digest, ORIGIN_CHAIN: chain}
+
+
+def declare_topics(mcap: McapWriter) -> dict[str, int]:
+    """Declare all topics, also those that stay empty; return their channels."""
+    channels = {}
+    for topic, kind in ROW_TYPES.items():
+        schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(row_schema(kind)))
+        channels[topic] = mcap.add_channel(topic, "json", schema)
+    for topic, message in VIEW_TYPES.items():
+        view_schema = message.get_schema()
+        content = (view_schema.name, view_schema.encoding, view_schema.data)
+        channels[topic] = mcap.add_channel(topic, "protobuf", content)
+    return channels
 
 
 def library_versions() -> dict[str, str]:
@@ -162,7 +177,7 @@ class CaptureFile:
             found = None if journal_tick is None else self._scanned(journal_tick, journal_end, run, at_once)
             self.mcap = McapWriter(self._write_bytes, PROFILE, None if found is None else found.book)
             if found is None:
-                self._channels = self._declare()
+                self._channels = declare_topics(self.mcap)
                 self._describe(described)
             else:
                 self._channels = {channel.topic: channel.id for channel in found.book.channels}
@@ -295,18 +310,6 @@ class CaptureFile:
             return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise CaptureError(f"{self.path}: cannot be created, {error.strerror}") from None
-
-    def _declare(self) -> dict[str, int]:
-        """Declare all topics, also those that stay empty."""
-        channels = {}
-        for topic, kind in ROW_TYPES.items():
-            schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(row_schema(kind)))
-            channels[topic] = self.mcap.add_channel(topic, "json", schema)
-        for topic, message in VIEW_TYPES.items():
-            view_schema = message.get_schema()
-            content = (view_schema.name, view_schema.encoding, view_schema.data)
-            channels[topic] = self.mcap.add_channel(topic, "protobuf", content)
-        return channels
 
     def _describe(self, described: Described) -> None:
         """Write what a run depended on beside its inputs; the versions last."""

@@ -1,17 +1,17 @@
 """The reader of captures: a finished or an unfinished file as numpy arrays, and what a re-simulation is fed with.
 
-A file is read from start to end, with no more of it in memory than a chunk and the columns that are asked for. What is
-damaged or is no capture raises `CaptureError`; a file whose writer was killed gives everything up to its last whole
-chunk, and says so. Neighbours: `rows`, `capture_columns`, `mcap_file`, `capture_writer`.
+A file is read from start to end, with no more of it in memory than a chunk and the columns that are asked for: frames,
+packets and rows are read when they are used. What is damaged or is no capture raises `CaptureError`; a file whose
+writer was killed gives everything up to its last whole chunk, and says so.
+Neighbours: `rows`, `capture_columns`, `mcap_file`, `capture_writer`, `capture_info`.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,16 +24,19 @@ from foosim.protocol.codec import decode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed, Refused
-from foosim.protocol.frame import CHAIN_START, chain_next
+from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Delivered, Edit, Origin
 from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
+from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import first_chain
-from foosim.protocol.table_scene import build_scene
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
     ASSETS,
+    CUT,
+    CUT_CHAIN,
+    CUT_TICK,
     DEPLOYMENT,
     END_METADATA,
     METADATA,
@@ -68,7 +71,8 @@ from foosim.vhub.rows import (
     edit_of,
 )
 
-_DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
+DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
+"""Decodes and checks a row of each topic."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +101,9 @@ class About:
     versions: dict[str, str] = field(default_factory=dict)
     finished: bool = False
     unfinished_bytes: int = 0
+    start_ns: int = 0
+    end_ns: int = 0
+    """Simulated times of the first and the last message, once the file was read to its end."""
 
     @property
     def deployment_name(self) -> str:
@@ -106,15 +113,17 @@ class About:
 class Scan:
     """One pass over a file: it yields the messages of some topics and gathers what stands beside them (`about`)."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, since_ns: int = 0) -> None:
+        """`since_ns`: what was recorded long before that time is passed by, if it can be (`McapFile`)."""
         self.about = About(path)
         self._path = path
+        self._since_ns = since_ns
 
     def messages(self) -> Iterator[Message]:
         """Yield all messages, from the first on behind the checked metadata."""
         try:
             with self._path.open("rb") as stream:
-                file = McapFile(stream, self._path.stat().st_size, str(self._path))
+                file = McapFile(stream, self._path.stat().st_size, str(self._path), self._since_ns)
                 checked = False
                 for content in file.contents():
                     if isinstance(content, Message):
@@ -129,12 +138,13 @@ class Scan:
         self._check(file.profile)
         self.about.library = file.library
         self.about.finished, self.about.unfinished_bytes = file.finished, file.unfinished_bytes
+        self.about.start_ns, self.about.end_ns = min(file.start_ns, file.end_ns), file.end_ns
 
     def rows(self, topics: frozenset[str]) -> Iterator[tuple[str, Row]]:
         """Yield the rows of some topics."""
         for message in self.messages():
             if message.topic in topics:
-                yield message.topic, self.decode(_DECODERS[message.topic], message)
+                yield message.topic, self.decode(DECODERS[message.topic], message)
 
     def decode(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
         """Return the row that a message holds."""
@@ -174,7 +184,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class CaptureData:
-    """A capture, opened. Packets are read when they are asked for, the inputs of ticks each time from the file."""
+    """A capture, opened. Packets and frames are read when they are asked for, rows each time from the file."""
 
     about: About
     deployment: Deployment
@@ -182,8 +192,6 @@ class CaptureData:
     """Ticks of the frames whose digests are there, ascending; all from 0 on in a whole capture."""
     digests: NDArray[np.uint8]
     """D(tick) of each, (n, 32)."""
-    frame_blocks: tuple[Frames, ...]
-    """Captured frames, a block for each layout."""
     clients: tuple[ClientRow, ...]
     epochs: tuple[EpochRow, ...]
     recoveries: tuple[RecoveryRow, ...]
@@ -195,6 +203,22 @@ class CaptureData:
     @property
     def finished(self) -> bool:
         return self.about.finished
+
+    @cached_property
+    def frame_blocks(self) -> tuple[Frames, ...]:
+        """Captured frames, a block for each layout."""
+        blocks: list[tuple[Layout, list[FrameRow]]] = []
+        for layout, row in _frames(Scan(self.path), self.deployment):
+            if row is None:
+                blocks.append((layout, []))
+            else:
+                blocks[-1][1].append(row)
+        return tuple(frames_of(layout, rows) for layout, rows in blocks)
+
+    def first_frame(self) -> Frame | None:
+        """Return the first captured frame, None when there is none."""
+        found = next(((layout, row) for layout, row in _frames(Scan(self.path), self.deployment) if row), None)
+        return None if found is None else frames_of(found[0], [found[1]]).frame(0)
 
     @property
     def frames(self) -> Frames:
@@ -220,13 +244,7 @@ class CaptureData:
         """Yield what a re-simulation needs, tick by tick."""
         for row in self.rows(TICK):
             assert isinstance(row, TickRow)
-            yield CapturedTick(
-                row.tick,
-                bytes.fromhex(row.digest),
-                tuple(bytes.fromhex(digest) for digest in row.entities),
-                [edit_of(edit) for edit in row.edits],
-                [delivered_of(delivered) for delivered in row.deliveries],
-            )
+            yield captured_tick(row)
 
     def poses(self, name: str) -> Poses:
         """Return the poses of a link (`red.goal/slide`), or of an entity's last link (`ball`, `red.goal`)."""
@@ -245,6 +263,17 @@ class CaptureData:
             hint = f", nearest is {nearest}" if nearest else ""
             raise CaptureError(f"{self.path}: nothing with a body is called {name!r}{hint}")
         return poses_of(found, link)
+
+
+def captured_tick(row: TickRow) -> CapturedTick:
+    """Return what a re-simulation needs of a row."""
+    return CapturedTick(
+        row.tick,
+        bytes.fromhex(row.digest),
+        tuple(bytes.fromhex(digest) for digest in row.entities),
+        [edit_of(edit) for edit in row.edits],
+        [delivered_of(delivered) for delivered in row.deliveries],
+    )
 
 
 def read_about(path: Path) -> About:
@@ -272,46 +301,64 @@ def deployment_of(about: About) -> Deployment:
 def open_capture(path: Path | str) -> CaptureData:
     """Open a capture, also an unfinished one. Raises CaptureError when it is none, or damaged."""
     scan = Scan(Path(path))
-    ticks: list[int] = []
-    digests: list[bytes] = []
-    layouts: list[LayoutRow] = []
-    frames: list[list[FrameRow]] = []
+    ticks: array[int] = array("q")
+    digests = bytearray()
     others: dict[str, list[Any]] = {CLIENTS: [], EPOCHS: [], RECOVERIES: []}
+    layouts = _Layouts(scan)
     for message in scan.messages():
         if message.topic == TICK:
-            tick_row = scan.decode(_DECODERS[TICK], message)
+            tick_row = scan.decode(DECODERS[TICK], message)
+            if ticks and tick_row.tick <= ticks[-1]:
+                raise CaptureError(f"{path}: tick {tick_row.tick} comes behind tick {ticks[-1]}")
             ticks.append(tick_row.tick)
-            digests.append(bytes.fromhex(tick_row.digest))
-        elif message.topic == LAYOUT:
-            layouts.append(scan.decode(_DECODERS[LAYOUT], message))
-            frames.append([])
-        elif message.topic == FRAME:
-            if not frames:
-                raise CaptureError(f"{path}: a frame without a layout before it")
-            frames[-1].append(scan.decode(_DECODERS[FRAME], message))
+            digests += bytes.fromhex(tick_row.digest)
+        elif message.topic in (LAYOUT, FRAME):
+            layouts.take(message)
         elif message.topic in others:
-            others[message.topic].append(scan.decode(_DECODERS[message.topic], message))
-    for before, after in pairwise(ticks):
-        if after <= before:
-            raise CaptureError(f"{path}: tick {after} comes behind tick {before}")
-    deployment = deployment_of(scan.about)
-    blocks = []
-    for layout_row, rows in zip(layouts, frames, strict=True):
-        layout = layout_of(scan.about.path, deployment, layout_row)
-        for row in rows:
-            if len(row.values) != 8 * layout.size or any(o.index >= len(layout.entities) for o in row.outboxes):
-                raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
-        blocks.append(frames_of(layout, rows))
+            others[message.topic].append(scan.decode(DECODERS[message.topic], message))
     return CaptureData(
         scan.about,
-        deployment,
+        layouts.deployment or deployment_of(scan.about),
         np.array(ticks, dtype=np.int64),
-        np.frombuffer(b"".join(digests), dtype=np.uint8).reshape(len(digests), 32),
-        tuple(blocks),
+        np.frombuffer(bytes(digests), dtype=np.uint8).reshape(len(ticks), 32),
         tuple(others[CLIENTS]),
         tuple(others[EPOCHS]),
         tuple(others[RECOVERIES]),
     )
+
+
+class _Layouts:
+    """Reads the frames of a pass over a file, each checked against the layout before it."""
+
+    def __init__(self, scan: Scan, deployment: Deployment | None = None) -> None:
+        self.deployment = deployment
+        self._scan = scan
+        self._layout: Layout | None = None
+
+    def take(self, message: Message) -> tuple[Layout, FrameRow | None]:
+        """Return the layout that a message brings, or a frame with its layout. Raises CaptureError."""
+        scan = self._scan
+        row = scan.decode(DECODERS[message.topic], message)
+        if self.deployment is None:
+            self.deployment = deployment_of(scan.about)
+        path = scan.about.path
+        if isinstance(row, LayoutRow):
+            self._layout = layout_of(path, self.deployment, row)
+            return self._layout, None
+        layout = self._layout
+        if layout is None:
+            raise CaptureError(f"{path}: a frame without a layout before it")
+        if len(row.values) != 8 * layout.size or any(o.index >= len(layout.entities) for o in row.outboxes):
+            raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
+        return layout, row
+
+
+def _frames(scan: Scan, deployment: Deployment) -> Iterator[tuple[Layout, FrameRow | None]]:
+    """Yield each layout, and each frame with its layout."""
+    layouts = _Layouts(scan, deployment)
+    for message in scan.messages():
+        if message.topic in (LAYOUT, FRAME):
+            yield layouts.take(message)
 
 
 def origin_of(about: About) -> Origin | None:
@@ -326,6 +373,27 @@ def origin_of(about: About) -> Origin | None:
         raise CaptureError(f"{about.path}: it does not say in full where its run began: {error}") from None
 
 
+def chain_at_start(about: About) -> bytes:
+    """Return the chain over all frames up to the first one that a capture has. Raises CaptureError."""
+    if CUT not in about.metadata:
+        return first_chain(origin_of(about))
+    try:
+        chain = bytes.fromhex(about.metadata[CUT_CHAIN])
+    except (KeyError, ValueError) as error:
+        raise CaptureError(f"{about.path}: it does not say in full where it was cut: {error}") from None
+    return chain
+
+
+def check_whole(about: About) -> None:
+    """Raise CaptureError for a cut: it lacks the frame that its run began with."""
+    if CUT in about.metadata:
+        source, tick = about.metadata[CUT], about.metadata.get(CUT_TICK)
+        raise CaptureError(
+            f"{about.path}: a cut of {source} from tick {tick} on; a run is verified from where it began: "
+            f"verify {source}, or begin a run with a frame of the cut"
+        )
+
+
 def layout_of(path: Path, deployment: Deployment, row: LayoutRow) -> Layout:
     """Build the layout that a row names, and compare: what the numbers of its frames mean depends on it."""
     try:
@@ -335,79 +403,3 @@ def layout_of(path: Path, deployment: Deployment, row: LayoutRow) -> Layout:
     if layout.digest.hex() != row.digest or layout.size != row.size:
         raise CaptureError(f"{path}: the layout at tick {row.tick} is not what this version builds")
     return layout
-
-
-@dataclass(frozen=True, slots=True)
-class CaptureInfo:
-    """A capture in short, for people and scripts. Digests are hex; `packets` counts fates.
-
-    `first_tick` is that of the frame that the run began with, `ticks` that of the last one. `nodes` are those that took
-    part; `arithmetic` has each digest of a fixed small run of their engine. `recoveries` counts losses and returns.
-    """
-
-    path: str
-    bytes: int
-    finished: bool
-    unfinished_bytes: int
-    library: str
-    metadata: Mapping[str, str]
-    end: Mapping[str, str]
-    versions: Mapping[str, str]
-    first_tick: int
-    ticks: int
-    tick_ns: int
-    duration_ns: int
-    digest: str
-    chain: str
-    nodes: tuple[str, ...]
-    arithmetic: tuple[str, ...]
-    packets: Mapping[str, int]
-    recoveries: int
-    topics: Mapping[str, int]
-
-
-def capture_info(path: Path | str) -> CaptureInfo:
-    """Return a capture in short, by one pass over the file."""
-    path = Path(path)
-    scan = Scan(path)
-    topics: Counter[str] = Counter()
-    fates: Counter[str] = Counter()
-    first, tick, digest, chain = -1, 0, b"", CHAIN_START
-    nodes: set[str] = set()
-    arithmetic: set[str] = set()
-    for message in scan.messages():
-        topics[message.topic] += 1
-        if message.topic == TICK:
-            row = scan.decode(_DECODERS[TICK], message)
-            tick, digest = row.tick, bytes.fromhex(row.digest)
-            chain = chain_next(chain, digest) if first >= 0 else first_chain(origin_of(scan.about))
-            first = tick if first < 0 else first
-        elif message.topic == PACKETS:
-            fates[scan.decode(_DECODERS[PACKETS], message).fate] += 1
-        elif message.topic == EPOCHS:
-            epoch = scan.decode(_DECODERS[EPOCHS], message)
-            nodes.update(epoch.roster)
-            arithmetic.add(epoch.arithmetic)
-    about, first = scan.about, max(0, first)
-    tick_ns = deployment_of(about).tick_ns
-    return CaptureInfo(
-        str(path),
-        path.stat().st_size,
-        about.finished,
-        about.unfinished_bytes,
-        about.library,
-        about.metadata,
-        about.end,
-        about.versions,
-        first,
-        tick,
-        tick_ns,
-        (tick - first) * tick_ns,
-        digest.hex(),
-        chain.hex(),
-        tuple(sorted(nodes)),
-        tuple(sorted(arithmetic - {""})),
-        {"offered": fates.total(), **{fate: fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
-        topics[RECOVERIES],
-        dict(sorted(topics.items())),
-    )

@@ -48,6 +48,11 @@ class Recovered:
     added_ticks: int
     problem: str = ""
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether all that was recorded is there again: the journal had what the file lacked."""
+        return not self.problem
+
     def __str__(self) -> str:
         added = f", {self.added_ticks} of them from its journal" if self.added_ticks else ""
         problem = f"; {self.problem}" if self.problem else ""

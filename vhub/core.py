@@ -52,7 +52,7 @@ from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
 from foosim.vhub.footing import Footing
-from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closing
+from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closings
 from foosim.vhub.packet import Flight
 from foosim.vhub.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
@@ -448,9 +448,10 @@ class HubCore:
 
     def _ask_again(self, now_ns: int) -> None:
         assert self.state is not None
-        tick = self.state.closed + 1
-        kind = channels.SAMPLES.name if tick in self.commits else channels.COMMIT.name
-        if self._world is None and not self.footing.waits:
+        tick, kind = self.state.closed + 1, channels.SAMPLES.name
+        if self.commits.next_tick <= (tick if self.ended is None else self.ended.tick):
+            tick, kind = self.commits.next_tick, channels.COMMIT.name
+        if (self._world is None or kind == channels.COMMIT.name) and not self.footing.waits:
             want = Want(channels.VHUB, kind, tick, self.epoch, [])
             self.actions.append(Publish(channels.WANT, channels.VHUB, encode(want)))
         self._patience.asked(now_ns)
@@ -474,17 +475,15 @@ class HubCore:
             self._end_ns = now_ns + limits.DOWNLINK_KEPT_NS
 
     def _finish(self, now_ns: int) -> None:
-        """Record the last frame and what is still in flight, tell the clients; the shell says farewell."""
+        """Record what is committed and not closed, and what is in flight; tell the clients. The shell says farewell."""
         assert self.state is not None and self.ended is not None
-        last = self.commits.get(self.ended.tick)
-        if last is None and self.state.closed + 1 >= self.ended.tick and now_ns < self._end_ns:
+        lacks = self.ended.tick not in self.commits
+        if lacks and self.state.closed + 1 >= self.ended.tick and now_ns < self._end_ns:
             return
         self.finished = True
         self._release(now_ns)
-        committed = last or self.commits.get(self.state.closed + 1) or self.commits.get(self.state.closed)
-        if committed is not None:
-            half = None if self._world is None else self._world.closing  # a tick that is half closed has fates
-            self.actions.append(Keep(last_closing(self.state, committed, half, now_ns)))
+        half = None if self._world is None else self._world.closing  # a tick that is half closed has fates
+        self.actions += map(Keep, last_closings(self.state, self.commits, self.ended.tick, half, now_ns))
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.draws import draw_key
+from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.frame import Frame
 from foosim.protocol.impairments import Impairments, TableJitter
 from foosim.protocol.network import Network, event_of
@@ -55,6 +55,7 @@ class Fabric:
         """Events that were asked for while the run went on: the tick, and the event as JSON."""
         self._links: dict[tuple[str, str, str], Link] = {}
         """By source, destination and what of the channel decides."""
+        self._phases: dict[str, int] = {}
         self._propagations: dict[str, Propagation] = {}
         for rule in (*self.network.links, *self.network.radios.values()):
             if rule.jitter is not None:  # the tables are made before the run starts: they would hold up a tick
@@ -68,6 +69,17 @@ class Fabric:
         """Take an event that was asked for, as JSON; it happens at a tick."""
         self.asked.append((tick, text))
         self.timeline.add(event_of(text, at_ns))
+
+    def phase_ns(self, source: str) -> int:
+        """Return by how much later than its tick the packets of an endpoint come to its radio."""
+        most_ns = self.network.defaults.phase_ns
+        if not most_ns:
+            return 0
+        found = self._phases.get(source)
+        if found is None:
+            word = draw_words(draw_key(self.seed, "phase", self.world.body(source)), 0)[0]
+            found = self._phases[source] = word * most_ns >> 64
+        return found
 
     def link(self, source: str, destination: str, channel: str) -> Link:
         """Return the link of a packet."""
@@ -95,9 +107,10 @@ class Fabric:
 
     def restore_flight(self, flight: Flight) -> None:
         """Take up a packet in flight of such a state: it may be on air."""
-        settings = self.network.radios.get(flight.radio)
-        if settings is not None and settings.medium not in ("none", "wired"):
-            self._air(flight.radio, settings).restore(flight, self._propagation(flight.radio, settings))
+        profile = self.profiles.find(flight.source, flight.destination, flight.channel)
+        settings, name = profile.settings, profile.radio or profile.rule
+        if settings.medium not in ("none", "wired"):
+            self._air(name, settings).restore(flight, self._propagation(name, settings))
 
     def setup(
         self, source: str, destination: str, profile: Profile, settings: Radio, key: bytes, memory: LinkState

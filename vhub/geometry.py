@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
@@ -23,6 +21,7 @@ from foosim.protocol.radio_materials import RadioMaterial
 from foosim.protocol.scene import (
     ORIGIN,
     UPRIGHT,
+    Body,
     Box,
     Cylinder,
     Link,
@@ -36,15 +35,15 @@ from foosim.protocol.scene import (
     place,
     rotate,
     shape_box,
+    swept_box,
 )
-from foosim.protocol.table_scene import build_scene
+from foosim.protocol.scenes import build_scene
 from foosim.vhub.rays import (
-    Floats,
+    MARGIN_M,
     Span,
     Triangles,
     box_span,
     boxes_around,
-    boxes_met,
     boxes_met_by,
     cylinder_span,
     sphere_span,
@@ -54,8 +53,6 @@ TOUCH_M: Final = 1e-9
 """A way through something that is no longer than this is a touch; shapes of one thing this close are one."""
 PAIRS_KEPT: Final = 4096
 """Pairs of ends of which it is remembered what of the scenery is between them, at least."""
-LINES_AT_ONCE: Final = 2_000
-"""Lines times things that are looked at in one pass: what is computed meanwhile stays in the processor's cache."""
 
 Line = tuple[Vector, Vector]
 """Two ends in the world frame (m)."""
@@ -275,6 +272,26 @@ class _Limb:
         self.radius = sqrt(x * x + y * y + z * z) / 2
 
 
+@dataclass(frozen=True, slots=True)
+class _Reach:
+    """How far a body can reach: about its own origin when it is free to move, else in the world."""
+
+    low: Vector
+    high: Vector
+    is_free: bool
+
+
+def _reach(body: Body) -> _Reach:
+    low, high = swept_box(body)
+    if body.links[0].joint != "free":
+        (lx, ly, lz), (hx, hy, hz), gap = low, high, MARGIN_M
+        return _Reach((lx - gap, ly - gap, lz - gap), (hx + gap, hy + gap, hz + gap), is_free=False)
+    (lx, ly, lz), (hx, hy, hz), (x, y, z) = low, high, body.position
+    far = [max(abs(lx - x), abs(hx - x)), max(abs(ly - y), abs(hy - y)), max(abs(lz - z), abs(hz - z))]
+    radius = sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2]) + MARGIN_M
+    return _Reach((-radius,) * 3, (radius,) * 3, is_free=True)
+
+
 class Geometry:
     """A scene as rays meet it: scenery that stands, and the links of bodies, to be placed for each frame."""
 
@@ -286,6 +303,7 @@ class Geometry:
         self.limbs = {
             body.name: [_Limb(body.name, link, self.groups) for link in body.links] for body in scene.bodies.values()
         }
+        self.reaches = {name: _reach(body) for name, body in sorted(scene.bodies.items())}
 
     def sight(self, layout: Layout, numbers: Sequence[float]) -> Sight:
         """Return what there is to see at a frame: `numbers` are its values, `layout` has the scene's bodies."""
@@ -296,11 +314,22 @@ class Geometry:
 class _Placed:
     """A link at its pose in one frame."""
 
-    body: str
     limb: _Limb
     position: Vector
     orientation: Quaternion
     solids: list[_Solid] | None = None
+
+    def is_near(self, line: Line) -> bool:
+        """Whether a line comes as near as the sphere around the link, or nearly so."""
+        x, y, z = rotate(self.orientation, self.limb.middle)
+        start, end = line
+        px, py, pz = x + self.position[0] - start[0], y + self.position[1] - start[1], z + self.position[2] - start[2]
+        dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+        square = dx * dx + dy * dy + dz * dz
+        share = min(1.0, max(0.0, (px * dx + py * dy + pz * dz) / square)) if square else 0.0
+        qx, qy, qz = px - share * dx, py - share * dy, pz - share * dz
+        reach = self.limb.radius + MARGIN_M
+        return qx * qx + qy * qy + qz * qz <= reach * reach
 
     def in_world(self) -> list[_Solid]:
         if self.solids is None:
@@ -314,9 +343,9 @@ class Sight:
     def __init__(self, geometry: Geometry, layout: Layout, numbers: Sequence[float]) -> None:
         self._geometry, self._layout, self._numbers = geometry, layout, numbers
         self._found: dict[Key, tuple[Crossing, ...]] = {}
-        self._placed: list[_Placed] = []
-        self._is_placed = False
-        self._boxes = geometry.still.boxes
+        self._placed: dict[str, list[_Placed]] = {}
+        self._around: list[tuple[float, float, float, float, float, float, str]] | None = None
+        """Boxes around bodies: least and greatest x, y and z, and the body's name."""
 
     def between(self, a: Vector, b: Vector, ignoring: Collection[str] = ()) -> tuple[Crossing, ...]:
         """Return what the line between two points (m, world frame) crosses, the bodies `ignoring` (entities) aside.
@@ -327,93 +356,77 @@ class Sight:
         the line passes counts. An end that is inside of something is where its chord begins or ends. What is
         transparent is left out.
         """
-        key = ((a, b) if a <= b else (b, a)), frozenset(ignoring)
+        line = (a, b) if a <= b else (b, a)
+        key = line, frozenset(ignoring)
         found = self._found.get(key)
         if found is None:
-            self._look((key,))
-            found = self._found[key]
+            found = self._found[key] = self._look(line, key[1])
         return found
-
-    def between_many(self, pairs: Iterable[tuple[Vector, Vector, Collection[str]]]) -> list[tuple[Crossing, ...]]:
-        """Return `between` of many pairs with what each ignores, which is three times as fast as one by one."""
-        keys = [(((a, b) if a <= b else (b, a)), frozenset(ignoring)) for a, b, ignoring in pairs]
-        self._look([key for key in dict.fromkeys(keys) if key not in self._found])
-        return [self._found[key] for key in keys]
 
     # --- looking -----------------------------------------------------------------------------------------------------
 
-    def _look(self, keys: Iterable[Key]) -> None:
-        """Work out what these lines cross; what of the scenery is remembered is not looked at again."""
-        self._place()
-        still, count = self._geometry.still, len(self._geometry.still.solids)
-        whole: list[Key] = []
-        bodies_alone: list[Key] = []
-        standing: list[tuple[Crossing, ...]] = []
-        for key in keys:
-            known = still.known(key[0])
-            if known is None:
-                whole.append(key)
-            else:
-                bodies_alone.append(key)
-                standing.append(known)
-        for key, near in zip(whole, _near(self._boxes, whole), strict=True):
-            line, ray = key[0], _ray(key[0])
-            solids = [still.solids[index] for index in near if index < count]
-            known = tuple(sorted(still.groups.crossings(ray, solids), key=_by_distance)) if solids else ()
-            still.keep(line, known)
-            self._found[key] = self._with_bodies(ray, known, [index - count for index in near[len(solids) :]], key[1])
-        boxes = self._boxes[:, :, count:]
-        for key, known, near in zip(bodies_alone, standing, _near(boxes, bodies_alone), strict=True):
-            self._found[key] = self._with_bodies(_ray(key[0]), known, near, key[1])
+    def _look(self, line: Line, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
+        """Work out what a line crosses; what of the scenery is remembered is not looked at again."""
+        still = self._geometry.still
+        ray = None
+        standing = still.known(line)
+        if standing is None:
+            solids = [still.solids[index] for index in boxes_met_by(still.boxes, line)]
+            ray = _ray(line)
+            standing = tuple(sorted(still.groups.crossings(ray, solids), key=_by_distance)) if solids else ()
+            still.keep(line, standing)
+        near = self._bodies_near(line)
+        moving = [solid for name in near if name not in ignoring for solid in self._solids(name, line)]
+        if not moving:
+            return standing
+        crossed = self._geometry.groups.crossings(ray or _ray(line), moving)
+        return tuple(sorted((*standing, *crossed), key=_by_distance)) if crossed else standing
 
-    def _with_bodies(
-        self, ray: _Ray, standing: tuple[Crossing, ...], near: Sequence[int], ignoring: frozenset[str]
-    ) -> tuple[Crossing, ...]:
-        """Return what a ray crosses of the scenery, which is known, and of the links with these numbers."""
-        solids: list[_Solid] = []
-        for index in near:
-            placed = self._placed[index]
-            if placed.body not in ignoring:
-                solids += placed.in_world()
-        moving = self._geometry.groups.crossings(ray, solids) if solids else ()
-        return tuple(sorted((*standing, *moving), key=_by_distance)) if moving else standing
+    def _bodies_near(self, line: Line) -> list[str]:
+        """Return the bodies whose box meets the box around a line, in name order."""
+        if self._around is None:
+            self._around = self._boxes_around()
+        (ax, ay, az), (bx, by, bz) = line
+        if ay > by:
+            ay, by = by, ay
+        if az > bz:
+            az, bz = bz, az
+        return [
+            name
+            for low_x, high_x, low_y, high_y, low_z, high_z, name in self._around
+            if high_x >= ax and low_x <= bx and high_y >= ay and low_y <= by and high_z >= az and low_z <= bz
+        ]
 
-    def _place(self) -> None:
-        """Place all links, once."""
-        if self._is_placed:
-            return
-        self._is_placed = True
+    def _boxes_around(self) -> list[tuple[float, float, float, float, float, float, str]]:
+        """Return a box around each body: however a free one is turned, wherever another one's joints are."""
+        geometry, boxes = self._geometry, []
+        for name, reach in geometry.reaches.items():
+            start = self._layout[name].offsets["position"] if reach.is_free else -1
+            x, y, z = self._numbers[start : start + 3] if reach.is_free else ORIGIN
+            (lx, ly, lz), (hx, hy, hz) = reach.low, reach.high
+            boxes.append((x + lx, x + hx, y + ly, y + hy, z + lz, z + hz, name))
+        return boxes
+
+    def _solids(self, name: str, line: Line) -> list[_Solid]:
+        """Return the solids of a body's links that a line comes near to."""
+        placed = self._placed.get(name)
+        if placed is None:
+            placed = self._placed[name] = self._place(name)
+        return [solid for link in placed if link.is_near(line) for solid in link.in_world()]
+
+    def _place(self, name: str) -> list[_Placed]:
+        """Place the links of a body that have shapes."""
         geometry = self._geometry
-        lows: list[Vector] = []
-        highs: list[Vector] = []
-        for name, body in geometry.scene.bodies.items():
-            poses = forward_kinematics(body, self._layout[name], self._numbers)
-            for limb, (_, position, orientation) in zip(geometry.limbs[name], poses, strict=True):
-                if not limb.solids:
-                    continue
-                x, y, z = rotate(orientation, limb.middle)
-                x, y, z, reach = x + position[0], y + position[1], z + position[2], limb.radius
-                lows.append((x - reach, y - reach, z - reach))
-                highs.append((x + reach, y + reach, z + reach))
-                self._placed.append(_Placed(name, limb, position, orientation))
-        self._boxes = np.concatenate((geometry.still.boxes, boxes_around(lows, highs)), axis=2)
+        poses = forward_kinematics(geometry.scene.bodies[name], self._layout[name], self._numbers)
+        return [
+            _Placed(limb, position, orientation)
+            for limb, (_, position, orientation) in zip(geometry.limbs[name], poses, strict=True)
+            if limb.solids
+        ]
 
 
 def _by_distance(crossing: Crossing) -> tuple[float, str]:
     return crossing.entry_m, crossing.name
-
-
-def _near(boxes: Floats, keys: Sequence[Key]) -> list[list[int]]:
-    """Return for each line the boxes (2, 3, m) that it comes near to, in their order."""
-    if len(keys) == 1:
-        return [boxes_met_by(boxes, keys[0][0])]
-    at_once = max(1, LINES_AT_ONCE // max(1, boxes.shape[2]))
-    near: list[list[int]] = [[] for _ in keys]
-    for begin in range(0, len(keys), at_once):
-        ends = np.array([line for line, _ in keys[begin : begin + at_once]]).transpose(1, 2, 0)
-        for line, thing in zip(*boxes_met(boxes, ends[0], ends[1]), strict=True):
-            near[begin + line].append(thing)
-    return near
 
 
 class LineOfSight:

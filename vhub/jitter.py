@@ -86,6 +86,11 @@ ENDS: Final = (2.0**-20, 1.0 - 2.0**-20)
 """The probabilities of the first and last quantile: those at 0 and 1 would be 0 and infinite."""
 
 
+TAIL_END: Final = 2.0**-27
+"""The probability of more than the last quantile of a heavy tail: an eighth of its last cell, so that the straight line
+over that cell has nearly the mean and the spread that the law has there."""
+
+
 def _probabilities() -> tuple[float, ...]:
     return ENDS[0], *(cell / CELLS for cell in range(1, CELLS)), ENDS[1]
 
@@ -120,7 +125,7 @@ def _aboves() -> tuple[float, ...]:
 
 def _tail_aboves() -> tuple[float, ...]:
     """Return the same within the last cell."""
-    return *((CELLS - cell) / CELLS / CELLS for cell in range(1, CELLS)), ENDS[0] / CELLS
+    return *((CELLS - cell) / CELLS / CELLS for cell in range(1, CELLS)), TAIL_END
 
 
 def _quantile(jitter: UniformJitter | LognormalJitter | ShiftedExponentialJitter | ParetoJitter, above: float) -> float:
@@ -129,13 +134,32 @@ def _quantile(jitter: UniformJitter | LognormalJitter | ShiftedExponentialJitter
         return jitter.width_ns * (1.0 - above)
     if isinstance(jitter, ShiftedExponentialJitter):
         return max(float(jitter.min_ns), -jitter.mean_ns * ln(above))
-    if isinstance(jitter, ParetoJitter):  # Lomax: mean = scale / (alpha - 1)
-        scale = jitter.mean_ns * (jitter.alpha - 1.0)
+    if isinstance(jitter, ParetoJitter):
+        scale = _lomax_scale(jitter.mean_ns, jitter.alpha, jitter.max_ns)
         return min(float(jitter.max_ns), scale * (power(above, -1.0 / jitter.alpha) - 1.0))
     ratio = jitter.sd_ns / jitter.mean_ns
     variance = ln(1.0 + ratio * ratio)
     normal = -gaussian(int(above * 2.0**64))
     return jitter.mean_ns * exp(math.sqrt(variance) * normal - variance / 2.0)
+
+
+@lru_cache(maxsize=16)
+def _lomax_scale(mean_ns: int, alpha: float, max_ns: int) -> float:
+    """Return the scale with which a Lomax number, cut at the greatest, has this mean: by bisection.
+
+    Uncut the mean is scale / (alpha - 1); what is above `max_ns` has the share (1 + max / scale)^(1 - alpha) of it.
+    """
+
+    def mean_of(scale: float) -> float:
+        return scale / (alpha - 1.0) * (1.0 - power(1.0 + max_ns / scale, 1.0 - alpha))
+
+    low = high = mean_ns * (alpha - 1.0)
+    while mean_of(high) < mean_ns and high < 1e30:
+        low, high = high, 2.0 * high
+    for _ in range(100):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if mean_of(middle) < mean_ns else (low, middle)
+    return high
 
 
 def _mixture(jitter: MixtureJitter) -> tuple[int, ...]:
@@ -176,7 +200,8 @@ def _from_table(jitter: TableJitter, table: tuple[int, ...]) -> tuple[int, ...]:
 def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
     """Return CELLS + 1 quantiles, in ns, of a gamma distribution; the ends are those at 2^-20 and at 1 - 2^-20.
 
-    A first one at 0 would give narrow distributions a tail that they have not.
+    A first one at 0 would give narrow distributions a tail that they have not. Where the standard deviation is above
+    the mean the tail is heavy: CELLS more follow, within the last cell.
     """
     assert mean_ns > 0 and sd_ns > 0
     shape = (mean_ns / sd_ns) * (mean_ns / sd_ns)
@@ -188,6 +213,12 @@ def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
         x = gamma.quantile(above, x, above - p)
         p = above
         quantiles.append(round(x * scale_ns))
+    if sd_ns > mean_ns:
+        x, p = quantiles[CELLS - 1] / scale_ns, 1.0 - 1.0 / CELLS
+        for more in _tail_aboves():
+            x = gamma.quantile(1.0 - more, x, 1.0 - more - p)
+            p = 1.0 - more
+            quantiles.append(round(x * scale_ns))
     return tuple(quantiles)
 
 

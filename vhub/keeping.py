@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from foosim.protocol.messages import Epoch
-from foosim.vhub.commits import Committed
+from foosim.vhub.commits import Commits, Committed
 from foosim.vhub.packet import IN_FLIGHT
 from foosim.vhub.records import Closing, closing_of
 from foosim.vhub.state import HubState
@@ -48,12 +50,29 @@ class Keeping:
         return taken
 
 
-def last_closing(state: HubState, committed: Committed, half_closed: Closing | None, now_ns: int) -> Closing:
-    """Return what a run ends with: its last frame, the fates of a tick that is half closed, and what is in flight."""
+def last_closings(
+    state: HubState, commits: Commits, end_tick: int, half_closed: Closing | None, now_ns: int
+) -> list[Closing]:
+    """Return what a run ends with: the tick that is half closed, with its fates, and all frames that are committed
+    behind it, up to that of `end_tick`; the last has what is in flight.
+
+    Nodes run ahead of closings as far as deliveries let them, so there may be many. What is not closed is not judged.
+    """
+    closings = [] if half_closed is None else [half_closed]
+    behind = state.closed + len(closings)
+    for tick in range(behind + 1, end_tick + 1):
+        committed = commits.get(tick)
+        if committed is None:
+            break
+        closings.append(_unjudged(state, committed, now_ns))
+    closed = commits.get(state.closed)
+    if not closings and closed is not None:
+        closings.append(_unjudged(state, closed, now_ns))
+    for closing in closings[-1:]:
+        closing.fates += [replace(flight, cause=IN_FLIGHT) for flight in state.in_flight()]
+    return closings
+
+
+def _unjudged(state: HubState, committed: Committed, now_ns: int) -> Closing:
     _, commit, frame = committed
-    flights = state.in_flight()
-    for flight in flights:
-        flight.cause = IN_FLIGHT
-    closing = half_closed or closing_of(frame, commit, state, [], [], now_ns)
-    closing.fates += flights
-    return closing
+    return closing_of(frame, commit, state, [], [], now_ns)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
 from foosim.protocol.radios import Radio
+from foosim.vhub.events import FOREVER_NS
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.profiles import Profile, over
@@ -37,7 +38,7 @@ class Link:
         self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
         self._draws = False
-        self._slots = 0
+        self._slots = self._phase_ns = 0
 
     @property
     def rule(self) -> str:
@@ -45,7 +46,7 @@ class Link:
 
     def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
         """Return the link's settings at a time, and from when and until when they hold."""
-        settings, since_ns, until_ns = self.profile.settings, -1, 2**62
+        settings, since_ns, until_ns = self.profile.settings, -1, FOREVER_NS
         for change in self._fabric.timeline.changes_of(self.rule, self.source, self.destination):
             if change.start_ns <= time_ns < change.end_ns:
                 settings = over(settings, change.changes)
@@ -73,6 +74,7 @@ class Link:
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._draws = self._slots != 0
+        self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """Clogs have changed: give packets on their way, in the order of sending, new due times."""
@@ -89,6 +91,7 @@ class Link:
         state.offered += is_offered
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
         flight.due_ns = flight.sent_ns
+        flight.phase_ns = self._phase_ns
         if self._draws:
             flight.slots = self._slots
             flight.words = draw_words(self._key, flight.sequence, flight.copy)

@@ -19,7 +19,7 @@ import typer
 
 from foosim.protocol import channels, limits, wall
 from foosim.protocol.access import access_to
-from foosim.protocol.actions import Say
+from foosim.protocol.actions import Publish, Say
 from foosim.protocol.addresses import LOOPBACK, Address, check_listen, parse_address
 from foosim.protocol.admission import Admission
 from foosim.protocol.certificates import Credentials, check_host, load_credentials, passwords_file, warn_of_end
@@ -64,6 +64,11 @@ class HubOptions:
     keeps: bool = True
     folder: Path | None = None
     progress: Path | None = None
+
+
+def needs_record(said: Publish) -> bool:
+    """Whether this tells of what has to be in the journal: all does but how the vHub is and what it lacks."""
+    return said.channel not in (channels.HEARTBEAT, channels.WANT)
 
 
 class HubProcess:
@@ -179,7 +184,7 @@ class HubProcess:
         What is committed still goes to the capture.
         """
         core = self.core
-        self._loop.holds_back = lambda said: said.channel is not channels.HEARTBEAT and not core.finished
+        self._loop.holds_back = lambda said: needs_record(said) and not core.finished
         core.lose("the journal", str(error))
 
     def _begin(self, build: Build, now_ns: int) -> None:

@@ -320,10 +320,15 @@ Content = Message | records.Metadata | records.Attachment
 class McapFile:
     """Reads an MCAP file from start to end. What is read of a file without an end stands in `unfinished_bytes`."""
 
-    def __init__(self, stream: BinaryIO, size: int, name: str) -> None:
+    def __init__(self, stream: BinaryIO, size: int, name: str, since_ns: int = 0) -> None:
+        """`since_ns`: chunks whose last message is before that are passed by, if the file declares its channels first.
+
+        A hub's chunks are in the order of their last messages; what is wanted of them may still be before that time.
+        """
         self._stream = stream
         self._size = size
         self._name = name
+        self._since_ns = since_ns
         self._at = 0
         self._topics: dict[int, str] = {}
         self.profile = ""
@@ -333,6 +338,8 @@ class McapFile:
         """Whether the file's end was reached, and was an end."""
         self.unfinished_bytes = 0
         """Bytes behind the last whole record of an unfinished file."""
+        self.start_ns, self.end_ns = sys.maxsize, 0
+        """Times of the first and the last message in the chunks so far, also in those that were passed by."""
 
     def contents(self) -> Iterator[Content]:
         """Yield messages, metadata and attachments in the order of the file."""
@@ -371,18 +378,34 @@ class McapFile:
 
     def _next_record(self) -> tuple[int, bytes] | None:
         """Return opcode and content of the next record, None where the file ends within it."""
-        head = self._stream.read(RECORD.size)
-        if len(head) < RECORD.size:
-            return None
-        opcode, length = RECORD.unpack(head)
-        if length > self._size - self._at - RECORD.size:
-            return None
-        if length > CHUNK_BYTES_MAX:
-            raise CaptureError(
-                f"{self._name}: byte {self._at}: a record of {length} bytes, at most {CHUNK_BYTES_MAX} are read"
-            )
-        content = self._stream.read(length)
-        return (opcode, content) if len(content) == length else None
+        while True:
+            head = self._stream.read(RECORD.size)
+            if len(head) < RECORD.size:
+                return None
+            opcode, length = RECORD.unpack(head)
+            if length > self._size - self._at - RECORD.size:
+                return None
+            if length > CHUNK_BYTES_MAX:
+                raise CaptureError(
+                    f"{self._name}: byte {self._at}: a record of {length} bytes, at most {CHUNK_BYTES_MAX} are read"
+                )
+            is_chunk = opcode == Opcode.CHUNK and length >= CHUNK_FIELDS.size
+            content = self._stream.read(CHUNK_FIELDS.size if is_chunk else length)
+            if is_chunk and not self._is_passed(content):
+                content += self._stream.read(length - len(content))
+            elif is_chunk:
+                self._at += RECORD.size + length
+                self._stream.seek(self._at)
+                continue
+            return (opcode, content) if len(content) == length else None
+
+    def _is_passed(self, head: bytes) -> bool:
+        """Take the times of a chunk, and return whether it is passed by."""
+        if len(head) < CHUNK_FIELDS.size:  # the file became shorter while it was read
+            return False
+        start_ns, end_ns, *_ = CHUNK_FIELDS.unpack(head)
+        self.start_ns, self.end_ns = min(self.start_ns, start_ns), max(self.end_ns, end_ns)
+        return bool(self._topics) and end_ns < self._since_ns
 
     def _read(self, opcode: int, content: bytes) -> Iterator[Content]:
         if opcode == Opcode.CHUNK:

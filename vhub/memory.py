@@ -63,6 +63,12 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     opportunity_bytes: int = 0
     """How far a trace of capacity is used up."""
     last: Sending | None = None
+    """The last transmission."""
+
+    def sending(self, sequence: int, copy: int) -> Sending | None:
+        """Return the last transmission if it is that of a packet: a broadcast's receivers share it."""
+        last = self.last
+        return last if last is not None and last.sequence == sequence and last.copy == copy else None
 
 
 class Transmission(msgspec.Struct, array_like=True, forbid_unknown_fields=True):

@@ -48,12 +48,14 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Which of them its link uses: bit n for slot n."""
     released_wall_ns: int = 0
     radio: str = ""
+    phase_ns: int = 0
+    """By how much later than its tick it came to its radio."""
     queue_bytes: int = 0
     """What waited before it when it came."""
     queue_ns: int = 0
     access_ns: int = 0
     airtime_ns: int = 0
-    """On air or wire, all attempts together."""
+    """On air or wire, the last time; what attempts before it took is in `access_ns`."""
     propagation_ns: int = 0
     jitter_ns: int = 0
     distance_mm: int = 0
@@ -76,6 +78,8 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     is_bad: bool = False
     """Whether the link was in a bad time."""
     bits_flipped: int = 0
+    mangled: bytes = b""
+    """The payload as it arrives, where bits are flipped; what was offered stays."""
     air_start_ns: int = 0
     air_end_ns: int = 0
     """When it was on air the last time; others who are on air between may spoil it."""
@@ -89,6 +93,11 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """For how long clogs put off its due time."""
     outcome: str = ""
     """What the medium found out and the channel says, at sending; empty when it came through."""
+
+
+def content_of(flight: Flight) -> bytes:
+    """Return the payload as it arrives."""
+    return flight.mangled or flight.payload
 
 
 def size_of(flight: Flight) -> int:

@@ -64,12 +64,13 @@ class Profiles:
         """Return the profile of a pair of which it is known which rule matches."""
         network = self._network
         via = None if rule is None else rule.via
-        if via is None and (rule is not None or self.body(source) != self.body(destination)):
+        is_on_board = self.body(source) == self.body(destination)
+        if via is None and not is_on_board:
             common = self._common(source, destination)
             if common == "" and rule is None:
                 return Profile(NO_RADIO, "", preset_radio(PERFECT))
             via = common or None
-        if via is None and rule is None and self.body(source) == self.body(destination):
+        if via is None and rule is None and is_on_board:
             return Profile(ON_BOARD, "", preset_radio(PERFECT))
         base = preset_radio(network.defaults.preset) if via is None else network.radios[via]
         if rule is None:

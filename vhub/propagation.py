@@ -22,6 +22,10 @@ from foosim.vhub.world import World
 BLOCKED: Final = "blocked"
 OUT_OF_RANGE: Final = "out_of_range"
 THERMAL_NOISE_DBM_HZ: Final = -174.0
+NEVER_CDB: Final = 10**6
+"""A loss that nothing gets over."""
+PLACES_KEPT: Final = 4096
+"""Pairs of places of which the bounds of the loss are remembered, at least."""
 ZEPTOWATT_DBM: Final = -180.0
 """1e-21 W: powers of others are summed in whole numbers of it, in any order."""
 
@@ -39,6 +43,11 @@ def zeptowatt(level_cdbm: int) -> int:
 def level_of(power: int) -> float:
     """Return a power in units of 1e-21 W as a level in dBm."""
     return 10.0 * log10(power) + ZEPTOWATT_DBM
+
+
+def _distance_m(a: Vector, b: Vector) -> float:
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +106,7 @@ class Propagation:
         self.sense_cdbm = centi(settings.sense_dbm)
         self._turns = -1
         self._paths: dict[tuple[Vector, Vector, str, str], Path] = {}
+        self._heard: dict[tuple[Vector, Vector], tuple[int, int]] = {}
 
     def antenna(self, endpoint: str) -> Vector:
         """Return where an endpoint's antenna is."""
@@ -107,6 +117,8 @@ class Propagation:
         if self._turns != self.world.turns:
             self._turns = self.world.turns
             self._paths.clear()
+            if len(self._heard) > PLACES_KEPT:
+                self._heard.clear()
         one, other = self.world.body(source), self.world.body(destination)
         key = (a, b, one, other) if a <= b else (b, a, other, one)
         found = self._paths.get(key)
@@ -114,9 +126,42 @@ class Propagation:
             found = self._paths[key] = self._find(key[0], key[1], frozenset((one, other)))
         return found
 
+    def hears(self, a: Vector, b: Vector, source: str, destination: str, power_cdbm: int) -> bool:
+        """Whether who is at `b` senses what is sent with a power at `a`.
+
+        That is what the path says; where walls cannot change it, it is known without looking for them.
+        """
+        key = a, b
+        found = self._heard.get(key)
+        if found is None:
+            found = self._heard[key] = self._least_and_most(*sorted((a, b)))
+        sensed_cdb = power_cdbm + self.gain_cdb - self.sense_cdbm
+        least_cdb, most_cdb = found
+        if sensed_cdb < least_cdb:
+            return False
+        if sensed_cdb >= most_cdb:
+            return True
+        path = self.path(a, b, source, destination)
+        return not path.cause and path.loss_cdb <= sensed_cdb
+
+    def _least_and_most(self, a: Vector, b: Vector) -> tuple[int, int]:
+        """Return the least and the greatest loss between two places, whatever stands between them."""
+        distance_m = _distance_m(a, b)
+        if self._range_m is not None and distance_m > self._range_m:
+            return NEVER_CDB, NEVER_CDB
+        environment, heights, frequency_hz = self._environment, (a[2], b[2]), self.settings.frequency_hz
+        los_db = environment.los_db(distance_m, frequency_hz, heights)
+        shadow_db = shadowing_db(self._key, a, b, self._sigmas[0], self._correlations[0])
+        least_cdb = centi(los_db + shadow_db)
+        if self._strict or not environment.has_nlos_curve:
+            return least_cdb, NEVER_CDB
+        nlos_db = environment.nlos_db(distance_m, frequency_hz, heights)
+        behind_cdb = centi(nlos_db + shadowing_db(self._key, a, b, self._sigmas[1], self._correlations[1]))
+        least_cdb = min(least_cdb, behind_cdb)
+        return least_cdb, max(centi(nlos_db + shadow_db), behind_cdb)
+
     def _find(self, a: Vector, b: Vector, ignoring: frozenset[str]) -> Path:
-        dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-        distance_m = sqrt(dx * dx + dy * dy + dz * dz)
+        distance_m = _distance_m(a, b)
         distance_mm = round(distance_m * 1000.0)
         if self._range_m is not None and distance_m > self._range_m:
             return Path(distance_mm, (), 0, 0, 0, OUT_OF_RANGE)

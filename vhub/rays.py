@@ -96,27 +96,18 @@ def cylinder_span(start: Vector, way: Vector, radius: float, half_length: float)
 
 
 def boxes_around(lows: Sequence[Vector] | Floats, highs: Sequence[Vector] | Floats) -> Floats:
-    """Return boxes (m of them) for `boxes_met`, shape (2, 3, m), with a margin."""
+    """Return boxes (m of them) for `boxes_met_by`, shape (2, 3, m), with a margin."""
     boxes = np.array([lows, highs], dtype=np.float64).reshape(2, -1, 3)
     boxes[0] -= MARGIN_M
     boxes[1] += MARGIN_M
     return np.ascontiguousarray(boxes.transpose(0, 2, 1))
 
 
-def boxes_met(boxes: Floats, starts: Floats, ends: Floats) -> tuple[list[int], list[int]]:
-    """Return the lines and the boxes (2, 3, m) that meet, line by line; `starts` and `ends` have shape (3, n).
+def boxes_met_by(boxes: Floats, line: tuple[Vector, Vector]) -> list[int]:
+    """Return the boxes (2, 3, m) that a line meets.
 
     It only says where to look: a box that a line misses by no more than a margin may be among them.
     """
-    ways = ends - starts
-    steps = np.where(np.abs(ways) < STEP_MIN, STEP_MIN, ways)
-    first, last = _between_sides(boxes[:, :, None], starts[:, :, None], steps[:, :, None])
-    lines, met = (np.maximum(first, -MARGIN_M) <= np.minimum(last, 1.0 + MARGIN_M)).nonzero()
-    return lines.tolist(), met.tolist()
-
-
-def boxes_met_by(boxes: Floats, line: tuple[Vector, Vector]) -> list[int]:
-    """Return the boxes that one line meets, which is quicker for a single one."""
     first, last = _between_sides(boxes, *_as_columns(line[0], [b - a for a, b in zip(*line, strict=True)]))
     met: list[int] = (np.maximum(first, -MARGIN_M) <= np.minimum(last, 1.0 + MARGIN_M)).nonzero()[0].tolist()
     return met
@@ -128,9 +119,9 @@ def _as_columns(start: Vector, way: Sequence[float]) -> tuple[Floats, Floats]:
     return np.array(start)[:, None], np.array(steps)[:, None]
 
 
-def _between_sides(boxes: Floats, starts: Floats, steps: Floats) -> tuple[Floats, Floats]:
-    """Return between which multiples of `steps` from `starts` lines are in boxes (2, 3, ...), one column a line."""
-    sides = (boxes - starts) / steps
+def _between_sides(boxes: Floats, start: Floats, step: Floats) -> tuple[Floats, Floats]:
+    """Return between which multiples of `step` from `start` (columns) a line is in each box (2, 3, m)."""
+    sides = (boxes - start) / step
     first = np.maximum.reduce(np.minimum(sides[0], sides[1]))
     last = np.minimum.reduce(np.maximum(sides[0], sides[1]))
     return first, last

@@ -162,6 +162,11 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     airtime_ns: Counter = 0
     propagation_ns: Counter = 0
     jitter_ns: Counter = 0
+    held_ns: Counter = 0
+    phase_ns: Counter = 0
+    is_bad: bool = False
+    bits_flipped: Counter = 0
+    rate_bps: Counter = 0
     distance_mm: Counter = 0
     walls: list[str] = []
     walls_cdb: int = 0
@@ -171,14 +176,10 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     received_cdbm: int = 0
     snr_cdb: int = 0
     interference_cdbm: int = 0
-    rate_bps: Counter = 0
     error_ppm: Counter = 0
     error_word: WordHex = ""
     contenders: Counter = 0
     retries: Counter = 0
-    is_bad: bool = False
-    bits_flipped: Counter = 0
-    held_ns: Counter = 0
 
 
 class SubscriptionRow(Row, frozen=True):
@@ -331,6 +332,7 @@ def packet_row(flight: Flight) -> PacketRow:
     """Return the row of a packet whose fate is final, or that is in flight at the end."""
     fate = _FATES.get(flight.cause, DROPPED)
     on_its_way = flight.arrival_tick >= 0
+    slots, words = flight.slots, flight.words
     return PacketRow(
         flight.source,
         flight.sequence,
@@ -344,23 +346,11 @@ def packet_row(flight: Flight) -> PacketRow:
         fate,
         flight.cause if fate is DROPPED else "",
         flight.rule,
-        _word(flight, Slot.LOSS),
-        _word(flight, Slot.JITTER) if on_its_way else "",
+        f"{words[Slot.LOSS]:016x}" if slots & _LOSS else "",
+        f"{words[Slot.JITTER]:016x}" if slots & _JITTER and on_its_way else "",
         len(flight.payload),
         flight.payload,
         flight.released_wall_ns,
-        *_inputs(flight),
-    )
-
-
-def _word(flight: Flight, slot: Slot) -> str:
-    """Return a draw that the packet's link uses."""
-    return f"{flight.words[slot]:016x}" if flight.slots >> slot & 1 else ""
-
-
-def _inputs(flight: Flight) -> tuple[Any, ...]:
-    """Return what the stages found, in the order of a row."""
-    return (
         flight.radio,
         flight.published,
         flight.queue_bytes,
@@ -369,6 +359,23 @@ def _inputs(flight: Flight) -> tuple[Any, ...]:
         flight.airtime_ns,
         flight.propagation_ns,
         flight.jitter_ns,
+        flight.held_ns,
+        flight.phase_ns,
+        flight.is_bad,
+        flight.bits_flipped,
+        flight.rate_bps,
+        *(_radio_inputs(flight) if flight.radio else ()),
+    )
+
+
+_LOSS: Final = 1 << Slot.LOSS
+_JITTER: Final = 1 << Slot.JITTER
+
+
+def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
+    """Return what the stages of a radio found, in the order of a row."""
+    threshold = flight.error_threshold
+    return (
         flight.distance_mm,
         list(flight.walls),
         flight.walls_cdb,
@@ -378,14 +385,10 @@ def _inputs(flight: Flight) -> tuple[Any, ...]:
         flight.received_cdbm,
         flight.snr_cdb,
         level_cdbm(flight.interference),
-        flight.rate_bps,
-        flight.error_threshold * 1_000_000 >> 64,
-        _word(flight, Slot.ERROR) if flight.error_threshold else "",
+        threshold * 1_000_000 >> 64,
+        f"{flight.words[Slot.ERROR]:016x}" if threshold else "",
         flight.contenders,
         flight.retries,
-        flight.is_bad,
-        flight.bits_flipped,
-        flight.held_ns,
     )
 
 

@@ -54,3 +54,8 @@ class LinkSetup:
     @property
     def is_radio(self) -> bool:
         return self.settings.medium not in ("none", "wired")
+
+    @property
+    def sends_once(self) -> bool:
+        """Whether a broadcast is sent once for all its receivers; a base station sends to each by itself."""
+        return self.is_radio and self.settings.published == "broadcast" and self.settings.medium != "lte"

@@ -23,7 +23,7 @@ from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.links import Link
 from foosim.vhub.memory import AirState, LinkState, RadioState
-from foosim.vhub.packet import Flight
+from foosim.vhub.packet import Flight, content_of
 from foosim.vhub.room import Room
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
 
@@ -180,25 +180,36 @@ class HubState:
         disruptions = [edit.event for edit in edits if isinstance(edit, Disrupt)]
         if disruptions:
             self._disrupt(tick, disruptions)
-        for packet in packets:
+        for packet in self._in_phase(packets):
             sequence = (tick << OUTBOX_SHIFT) + packet.index
+            flights = []
             for receiver in self._addressed(packet.robot, packet.destination, packet.channel):
                 if receiver not in self._endpoints:
                     self.refuse("no_route")
                     continue
                 published = not packet.destination
-                flight = Flight(packet.robot, receiver, packet.channel, sequence, sent_ns, 0, packet.payload, published)
-                self._send(flight, tick, fates)
+                what = sequence, sent_ns, 0, packet.payload, published
+                flights.append(Flight(packet.robot, receiver, packet.channel, *what))
+            self._send(flights, tick, fates)
         return self._arrive_at_clients(tick, fates)
 
+    def _in_phase(self, packets: Iterable[RobotPacket]) -> Iterable[RobotPacket]:
+        """Return packets in the order in which they come to their radios."""
+        if not self.fabric.network.defaults.phase_ns:
+            return packets
+        return sorted(packets, key=lambda packet: (self.fabric.phase_ns(packet.robot), packet.robot, packet.index))
+
     def close_clients(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]) -> Deliveries:
-        """Phase two: judge what clients sent, in (source, sequence) order. Return the deliveries of the next tick."""
+        """Phase two: judge what clients sent, in (phase, source, sequence) order.
+
+        Return the deliveries of the next tick.
+        """
         tick = frame.tick
         sent_ns = tick * self.tick_ns
         self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
         for cause, count in self.refused_at_door:
             self.refuse(cause, count)
-        for source in sorted(admitted):
+        for source in sorted(admitted, key=lambda name: (self.fabric.phase_ns(name), name)):
             copies = 0
             for sent in sorted(admitted[source], key=lambda packet: packet.sequence):
                 if not self._admit(source, sent):
@@ -208,9 +219,8 @@ class HubState:
                 if copies > limits.PACKETS_PER_MESSAGE_MAX:
                     self.refuse("broadcast_full")
                     continue
-                for receiver in receivers:
-                    what = sent.sequence, sent_ns, sent.stamp_ns, sent.payload, not sent.destination
-                    self._send(Flight(source, receiver, sent.channel, *what), tick, fates)
+                what = sent.sequence, sent_ns, sent.stamp_ns, sent.payload, not sent.destination
+                self._send([Flight(source, receiver, sent.channel, *what) for receiver in receivers], tick, fates)
         self.closed = tick
         deliveries = self._arrive_at_robots(tick + 1, frame, fates)
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
@@ -296,20 +306,24 @@ class HubState:
             self._receivers = {pair: tuple(names) for pair, names in heard.items()}
         return self._receivers.get((source, channel), ())
 
-    def _send(self, flight: Flight, tick: int, fates: list[Flight]) -> None:
-        is_offered, payload = flight.copy == 0, flight.payload
-        self.packets.offered += is_offered
-        if not self.fabric.link(flight.source, flight.destination, flight.channel).send(flight):
-            self.packets.dropped += is_offered
-            fates.append(flight)
-            return
-        is_sensed = flight.source in self._robots and flight.destination in self.members
-        self._let_fly(flight, tick if is_sensed else tick + 1)
-        if flight.is_doubled:
-            self.packets.copies += 1
-            what = flight.sequence, flight.sent_ns, flight.stamp_ns, payload, flight.published
-            twin = Flight(flight.source, flight.destination, flight.channel, *what, copy=1)
-            self._send(twin, tick, fates)
+    def _send(self, flights: Sequence[Flight], tick: int, fates: list[Flight]) -> None:
+        """Judge a packet for each of its receivers, then the copies: all receivers of a broadcast share the air."""
+        twins = []
+        for flight in flights:
+            is_offered = flight.copy == 0
+            self.packets.offered += is_offered
+            if not self.fabric.link(flight.source, flight.destination, flight.channel).send(flight):
+                self.packets.dropped += is_offered
+                fates.append(flight)
+                continue
+            is_sensed = flight.source in self._robots and flight.destination in self.members
+            self._let_fly(flight, tick if is_sensed else tick + 1)
+            if flight.is_doubled:
+                self.packets.copies += 1
+                what = flight.sequence, flight.sent_ns, flight.stamp_ns, flight.payload, flight.published
+                twins.append(Flight(flight.source, flight.destination, flight.channel, *what, copy=1))
+        if twins:
+            self._send(twins, tick, fates)
 
     def _disrupt(self, tick: int, events: Sequence[str]) -> None:
         """Take what was asked of the network; clogs that come or go by it move what is on its way."""
@@ -408,7 +422,7 @@ class HubState:
                     flight.copy,
                     flight.destination,
                     flight.channel,
-                    flight.payload,
+                    content_of(flight),
                 )
             )
         return deliveries
@@ -469,7 +483,7 @@ class HubState:
 
 def received(flights: Iterable[Flight]) -> list[Received]:
     """Return flights as a client gets them."""
-    return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, f.payload) for f in flights]
+    return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, content_of(f)) for f in flights]
 
 
 def _order(flight: Flight) -> tuple[int, str, int, int, str]:

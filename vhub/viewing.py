@@ -37,7 +37,7 @@ from foosim.protocol.layout import Layout
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.scene import Box, Scene, Shape, Sphere, Vector, forward_kinematics
 from foosim.protocol.scene import Quaternion as Turn
-from foosim.protocol.table_scene import build_scene
+from foosim.protocol.scenes import build_scene
 
 WORLD_FRAME: Final = "world"
 SCENERY: Final = "scenery"

@@ -12,7 +12,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.network import Network
 from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate
-from foosim.protocol.table_scene import build_scene
+from foosim.protocol.scenes import build_scene
 from foosim.vhub.geometry import Crossing, LineOfSight, Sight
 
 
@@ -28,6 +28,7 @@ class World:
         self._layout: Layout | None = None
         self._bodies: dict[str, Body] = {}
         self._poses: dict[str, Pose | None] = {}
+        self._standing: dict[str, Vector] = {}
         self._antennas: dict[tuple[str, Vector], Vector] = {}
         self.turns = 0
         """Grows with every frame."""
@@ -50,21 +51,23 @@ class World:
         return frame is not None and body in frame.layout and frame.at(body, "down") != 0.0
 
     def antenna(self, endpoint: str, mount: Vector) -> Vector:
-        """Return the place (m, world frame) of an antenna that is mounted at `mount` in its body's frame."""
+        """Return the place (m, world frame) of an antenna: `mount` beside its body's own antenna, in the body's frame.
+        """
         key = endpoint, mount
         found = self._antennas.get(key)
         if found is None:
-            pose = self._pose(self.body(endpoint))
-            if pose is None:
-                _, position, orientation = "", self._place(endpoint), UPRIGHT
-            else:
+            body = self.body(endpoint)
+            pose = self._pose(body)
+            position, orientation, own = self._place(endpoint), UPRIGHT, ORIGIN
+            if pose is not None:
                 _, position, orientation = pose
-            x, y, z = rotate(orientation, mount)
+                own = self._bodies[body].antenna
+            x, y, z = rotate(orientation, (own[0] + mount[0], own[1] + mount[1], own[2] + mount[2]))
             found = self._antennas[key] = position[0] + x, position[1] + y, position[2] + z
         return found
 
     def _pose(self, robot: str) -> Pose | None:
-        """Return the pose of a robot's first link; None for what has no body."""
+        """Return the pose of a robot's last link; None for what has no body."""
         frame = self._frame
         if frame is None:
             return None
@@ -73,16 +76,18 @@ class World:
         if robot not in self._poses:
             body = self._bodies.get(robot)
             self._poses[robot] = (
-                None if body is None else forward_kinematics(body, frame.layout[robot], frame.numbers)[0]
+                None if body is None else forward_kinematics(body, frame.layout[robot], frame.numbers)[-1]
             )
         return self._poses[robot]
 
     def _place(self, endpoint: str) -> Vector:
         """Return where the deployment says that an endpoint without a body is."""
-        for glob, (x, y, z) in self._places.items():
-            if fnmatchcase(endpoint, glob):
-                return x, y, z
-        return ORIGIN
+        found = self._standing.get(endpoint)
+        if found is None:
+            places = (place for glob, place in self._places.items() if fnmatchcase(endpoint, glob))
+            x, y, z = next(places, ORIGIN)
+            found = self._standing[endpoint] = x, y, z
+        return found
 
     def crossings(self, a: Vector, b: Vector, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
         """Return what the line between two places crosses, some bodies aside."""

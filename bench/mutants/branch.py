@@ -72,7 +72,7 @@ def _hears(planting: Planting) -> None:
     planting.swap(ClientCore, "_is_present", lambda self, message: True)
 
 
-@register("client takes any welcome", "a welcome answers one hello", 79)
+@register("client takes any welcome", "a welcome answers one hello", 221)
 def _any_welcome(planting: Planting) -> None:
     def on_welcome(self: Any, welcome: Any) -> None:
         before(self, replace(welcome, returns=self._gone))

@@ -15,6 +15,7 @@ from foosim.node.core import NodeCore
 from foosim.node.inputs import Inputs
 from foosim.node.sensors import encoder
 from foosim.node.step import Stepper
+from foosim.node.table_world import TableWorld
 from foosim.protocol import channels
 from foosim.protocol.assign import Assignment
 from foosim.protocol.member import Member
@@ -30,7 +31,7 @@ def _old_epochs(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_fenced", fenced)
 
 
-@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 111)
+@register("node takes new epochs early", "messages of a newer epoch are held until the epoch comes", 280)
 def _new_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch <= self.epoch and bool(before(self, channel, message, payload))
@@ -48,7 +49,7 @@ def _epochs_fall(planting: Planting) -> None:
     before: Any = planting.swap(NodeCore, "_on_epoch", on_epoch)
 
 
-@register("node does not compare bases", "a node collects parts with its own basis only", 58)
+@register("node does not compare bases", "a node collects parts with its own basis only", 217)
 def _any_basis(planting: Planting) -> None:
     planting.swap(NodeCore, "_take_part", lambda self, barrier, part: barrier.add(part))
 
@@ -121,7 +122,7 @@ def _running_noise(planting: Planting) -> None:
 
 @register("no quarantine", "a result that cannot be is not taken", 5)
 def _no_quarantine(planting: Planting) -> None:
-    planting.swap(Stepper, "_plausible", lambda self, entity, numbers, before: True)
+    planting.swap(TableWorld, "plausible", lambda self, entity, numbers, before: True)
 
 
 @register("commands go to who solved last", "deliveries apply in their order at their tick", 1)

@@ -12,14 +12,16 @@ from math import isfinite
 
 from foosim.protocol.deployment import Deployment, RodRobot
 from foosim.protocol.layout import Entity
+from foosim.protocol.names import CHANNEL_POSITION
 
-CHANNEL = "position"
 ANGLE_RAD_MAX = 1000.0
 _PAYLOAD = struct.Struct("<2d")
 
 
 class PositionActuator:
     """One rod's actuator; its memory (the wanted position) is in the frame."""
+
+    channel = CHANNEL_POSITION
 
     def __init__(self, deployment: Deployment, entity: Entity) -> None:
         robot = deployment.robots[entity.name]

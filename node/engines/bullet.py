@@ -18,7 +18,7 @@ from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.quiet import without_lines
 from foosim.protocol.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector, in_pieces
-from foosim.protocol.table_scene import build_scene
+from foosim.protocol.scenes import build_scene
 
 with without_lines(b"pybullet build time:"):
     import pybullet as p

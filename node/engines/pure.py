@@ -16,7 +16,8 @@ from foosim.node.engines.pure_shapes import Contact, Figures, Scenery
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.scene import Vector, multiply
-from foosim.protocol.table_scene import ball_body, build_scene
+from foosim.protocol.scenes import build_scene
+from foosim.protocol.table_scene import ball_body
 
 SILENT: Final = frozenset({"floor", "ramps"})
 """What a ball rolls on: its contacts are not logged."""

@@ -10,7 +10,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Protocol
 
 from foosim.node.sensors.ball import BallTracker
+from foosim.node.sensors.battery import BatteryGauge
 from foosim.node.sensors.encoder import Encoder
+from foosim.node.sensors.fitting import Fitting
+from foosim.node.sensors.odometry import Odometry
+from foosim.node.sensors.pose import PoseTracker
+from foosim.node.sensors.proximity import Proximity
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key
 from foosim.protocol.layout import Entity, Layout
 
@@ -22,12 +28,17 @@ class Sensor(Protocol):
         """Return the payload measured from a frame's numbers at `tick`."""
 
 
-SENSORS: Final[Mapping[str, Callable[[Any, Layout, Entity, bytes], Sensor]]] = {
+SENSORS: Final[Mapping[str, Callable[[Any, Fitting], Sensor]]] = {
     "encoder": Encoder,
     "ball": BallTracker,
+    "pose": PoseTracker,
+    "odometry": Odometry,
+    "proximity": Proximity,
+    "battery": BatteryGauge,
 }
 
 
-def make_sensor(settings: Any, layout: Layout, robot: Entity, channel: str, seed: int) -> Sensor:
+def make_sensor(settings: Any, deployment: Deployment, layout: Layout, robot: Entity, channel: str) -> Sensor:
     """Return the sensor of one robot's channel, its noise keyed by seed, robot and channel."""
-    return SENSORS[settings.kind](settings, layout, robot, draw_key(seed, "noise", robot.name, channel))
+    key = draw_key(deployment.seed, "noise", robot.name, channel)
+    return SENSORS[settings.kind](settings, Fitting(deployment, layout, robot, key))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
+from foosim.node.sensors.fitting import Fitting
 from foosim.protocol.deployment import BallSensor
 from foosim.protocol.draws import draw_words, gaussian
-from foosim.protocol.layout import Entity, Layout
 
 _PAYLOAD = struct.Struct("<3d")
 
@@ -15,10 +15,10 @@ _PAYLOAD = struct.Struct("<3d")
 class BallTracker:
     """Payload: x, y, z of the ball in the world frame in m, three little-endian float64; z carries no noise."""
 
-    def __init__(self, settings: BallSensor, layout: Layout, robot: Entity, key: bytes) -> None:
-        self._start = layout["ball"].offsets["position"]
+    def __init__(self, settings: BallSensor, at: Fitting) -> None:
+        self._start = at.layout["ball"].offsets["position"]
         self._noise_m = settings.noise
-        self._key = key
+        self._key = at.key
 
     def sample(self, numbers: Sequence[float], tick: int) -> bytes:
         words = draw_words(self._key, tick)

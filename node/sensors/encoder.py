@@ -5,9 +5,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
+from foosim.node.sensors.fitting import Fitting
 from foosim.protocol.deployment import RodSensor
 from foosim.protocol.draws import draw_words, gaussian
-from foosim.protocol.layout import Entity, Layout
 
 _PAYLOAD = struct.Struct("<2d")
 
@@ -15,11 +15,11 @@ _PAYLOAD = struct.Struct("<2d")
 class Encoder:
     """Payload: slide in m and spin in rad, two little-endian float64."""
 
-    def __init__(self, settings: RodSensor, layout: Layout, robot: Entity, key: bytes) -> None:
-        self._start = robot.offsets["joint_positions"]
+    def __init__(self, settings: RodSensor, at: Fitting) -> None:
+        self._start = at.robot.offsets["joint_positions"]
         self._position_noise_m = settings.position_noise
         self._angle_noise_rad = settings.angle_noise
-        self._key = key
+        self._key = at.key
 
     def sample(self, numbers: Sequence[float], tick: int) -> bytes:
         words = draw_words(self._key, tick)

@@ -14,9 +14,14 @@ from foosim.client.errors import UnknownName
 from foosim.client.payloads import (
     KINDS,
     BallPosition,
+    Battery,
     Command,
+    Drive,
+    Pose,
+    Ranges,
     RodPosition,
     Value,
+    WheelTravel,
     channel_kind,
     decode_payload,
     encode_command,
@@ -31,6 +36,11 @@ VALUES: dict[str, Value] = {
     "encoder": RodPosition(0.1, -2.5),
     "ball": BallPosition(1 / 3, -0.0, 1e-300),
     "position": Command(-0.12, 1.5),
+    "pose": Pose(1 / 3, -7.5, 3.1),
+    "odometry": WheelTravel(12.5, -0.25),
+    "battery": Battery(0.5, 24.6),
+    "proximity": Ranges((4.0, 0.0, 1 / 3)),
+    "drive": Drive(-0.5, 1.2),
     "echo": b"any \x00 bytes",
 }
 
@@ -59,6 +69,12 @@ def test_random_bytes_are_a_value_or_malformed(kind: str, payload: bytes) -> Non
     else:
         with pytest.raises(Malformed):
             decode_payload(kind, payload)
+
+
+@pytest.mark.parametrize("payload", [b"", bytes(12), bytes(8 * 129), np.array([1.0, nan]).tobytes()])
+def test_rays_are_one_to_128_finite_numbers(payload: bytes) -> None:
+    with pytest.raises(Malformed, match="proximity"):
+        decode_payload("proximity", payload)
 
 
 @pytest.mark.parametrize(

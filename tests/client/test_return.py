@@ -310,6 +310,28 @@ def test_what_was_said_before_a_branch_does_not_count_in_it() -> None:
     assert state.members["ear"].sequence == 1
 
 
+def test_a_late_downlink_of_a_vhub_that_is_gone_is_no_answer_to_a_join() -> None:
+    air = Storm()
+    air.start()
+    ear = air.enter("ear", 0)
+    for _ in range(6):
+        air.close()
+    (late, *_) = [said for said in air.said() if said.channel is channels.DOWN]
+    ear.receive(late.channel, "ear", late.payload, air.now_ns)
+    air.die([ear])
+    air.come_back()
+    ear.wake(air.now_ns + AWAY_AGAIN_NS)
+    for message in published(ear):
+        air.tell(message.channel, message.name, message.payload)
+    (welcome,) = [said for said in air.said() if said.channel is channels.CLIENT_WELCOME]
+    ear.receive(channels.CLIENT_WELCOME, "ear", welcome.payload, air.now_ns)
+    (lost,) = published(ear)
+    assert lost.channel is channels.UP and not ear.is_away
+    ear.receive(late.channel, "ear", late.payload, air.now_ns)
+    air.settle(ear)
+    assert air.hub.sessions.by_name["ear"].is_present
+
+
 def test_the_answer_to_a_hello_of_before_is_none() -> None:
     """One that a vHub said which is gone again, and that comes late."""
     air = Storm()

@@ -14,6 +14,7 @@ from foosim.client.core import ClientCore
 from foosim.node.inputs import Inputs
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode_any
+from foosim.protocol.hub_messages import Standing
 from foosim.protocol.messages import Add, ClientWelcome, Epoch, Push
 from foosim.rehearsal.bus import CALM, Weather
 from foosim.rehearsal.faults import TICKS, Fault, ask
@@ -32,6 +33,7 @@ TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MS: Final = 1_000_000
 SEED: Final = 1
 NAMES: Final = ("n1", "n2", "n3")
+BEGUN: Final = "goes on as branch from tick "
 BRANCH: Final = r"branch from tick (\d+): (\d+) ticks are lost"
 BAD: Final = Weather(SEED, MS, 2 * MS, loss=0.02, repeat=0.1)
 
@@ -181,6 +183,69 @@ def test_a_supervisor_that_has_lost_the_branch_learns_of_it_from_the_vhub() -> N
     flown = Flown([(110, lose(60)), (110, lambda system: system.later(310 * MS, partial(lose_branch, system)))])
     assert 0 < ends[1] < ends[0] - 1, "the vHub lives before the journal's end"
     assert flown.system.supervisor.branches.number == state(flown.system).branch > 0
+
+
+@pytest.mark.parametrize("more", [0, 30])
+def test_a_supervisor_that_ends_before_the_branchs_first_epoch_goes_on_with_it(
+    more: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The branch is told once; where the vHub's machine is lost once more meanwhile, another one begins before it."""
+
+    def cut_power(system: System) -> None:
+        begin = system.supervisor.branches.begin
+
+        def end_behind(standing: Standing, now_ns: int) -> None:
+            begin(standing, now_ns)
+            system.end_amid(channels.SUPERVISOR, len(system.supervisor.actions))
+            system.later(100 * MS, partial(system.start, channels.SUPERVISOR))
+            if more:
+                system.later(10 * MS, partial(lose_hub, system, more, 50 * MS))
+
+        monkeypatch.setattr(system.supervisor.branches, "begin", end_behind)
+        lose_hub(system, 40)
+
+    flown = Flown([(110, cut_power)])
+    told = [entry.what for entry in flown.system.supervisor.recovery.recovered]
+    assert told == ["vhub", *["vhub"] * (more > 0), "supervisor"]
+    (first, *second) = flown.branches
+    assert sum(first) >= 110 and all(tick < first[0] == tick + lost for tick, lost in second)
+    assert flown.system.supervisor.branches.number == 2, "that of the epoch that nobody had heard of"
+
+
+def test_a_vhub_that_ends_before_the_branchs_first_epoch_goes_on_with_it() -> None:
+    """No node is here with which the epoch could begin; the branch is told once."""
+
+    def cut_power(system: System) -> None:
+        for name in NAMES:
+            system.kill(name)
+            system.later(900 * MS, partial(system.start, name))
+        lose_hub(system, 40, 50 * MS)
+        system.later(400 * MS, partial(system.kill_hub, "now", 50 * MS))
+
+    flown = Flown([(110, cut_power)])
+    ((tick, lost),) = flown.branches
+    said = [text for who, text in flown.warnings if who == "supervisor" and text.startswith(BEGUN)]
+    assert said == [f"{BEGUN}{tick}: {lost} ticks are lost"]
+
+
+@pytest.mark.parametrize("supervisor", [50, 120])
+def test_a_branch_is_named_behind_epochs_that_only_nodes_know(supervisor: int) -> None:
+    """Both journals have lost the epoch of the move, which is asked for once more."""
+    epochs: list[int] = []
+
+    def move(system: System) -> None:
+        ask(system, "move", robot="camera", node="n2")
+
+    def cut_power(system: System) -> None:
+        epochs.append(system.supervisor.epoch)
+        lose_supervisor(system, supervisor)
+        left = fold(system.supervisor.deployment, system.journal).epoch
+        epochs.append(0 if left is None else left.epoch)
+        lose_hub(system, 60, 50 * MS)
+        system.later(40 * MS, partial(system.start, channels.SUPERVISOR))
+
+    flown = Flown([(110, move), (130, cut_power), (160, move)])
+    assert epochs == [2, 1] and flown.system.supervisor.branches.number == 3
 
 
 def _keeps_deliveries(monkeypatch: pytest.MonkeyPatch) -> None:

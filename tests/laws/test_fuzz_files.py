@@ -26,7 +26,8 @@ from foosim.protocol.messages import Answer, Delivered, Request
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.run_folder import RunFolder, RunInfo
-from foosim.vhub.capture_reader import capture_info, open_capture
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.records import fold
 from foosim.vhub.rows import CaptureError
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
-from math import erf, erfc, exp, expm1, sqrt
+from math import erf, erfc, exp, expm1, lgamma, log, log1p, sqrt
 from typing import Final
 
 ALPHA: Final = 1e-3
@@ -95,7 +95,11 @@ def ks_two_samples(one: Sequence[float], other: Sequence[float]) -> float:
 
 
 def chi_square_p(statistic: float, freedom: int) -> float:
-    """Return how probable a value at least as great is, by Wilson and Hilferty's cube root; within 3e-4 from 3 on."""
+    """Return how probable a value at least as great is; from 3 on by Wilson and Hilferty's cube root, within 3e-4."""
+    if freedom == 1:
+        return normal_p(sqrt(statistic))
+    if freedom == 2:
+        return exp(-statistic / 2.0)
     spread = 2.0 / (9.0 * freedom)
     z = ((statistic / freedom) ** (1.0 / 3.0) - (1.0 - spread)) / sqrt(spread)
     return 0.5 * erfc(z / sqrt(2.0))
@@ -121,3 +125,52 @@ def chi_square(observed: Sequence[int], expected: Sequence[float], estimated: in
     assert len(classes) >= 2, "too few counts for a test"
     statistic = sum((count - expectation) ** 2 / expectation for count, expectation in classes)
     return chi_square_p(statistic, len(classes) - 1 - estimated)
+
+
+def binomial_p(hits: int, trials: int, probability: float) -> float:
+    """Return how probable a count at least as far out is, exactly: twice the lesser tail of the binomial law."""
+    log_odds = log(probability) - log1p(-probability)
+
+    def log_mass(k: int) -> float:
+        ways = lgamma(trials + 1) - lgamma(k + 1) - lgamma(trials - k + 1)
+        return ways + k * log_odds + trials * log1p(-probability)
+
+    def tail(step: int) -> float:
+        total, k = 0.0, hits
+        while 0 <= k <= trials:
+            mass = exp(log_mass(k))
+            total += mass
+            if mass < 1e-18 * total or (mass == 0.0 and (k - trials * probability) * step > 0.0):
+                break
+            k += step
+        return total
+
+    return min(1.0, 2.0 * min(tail(1), tail(-1)))
+
+
+def contingency(table: Sequence[Sequence[int]]) -> float:
+    """Return the p-value of Pearson's test of independence of rows and columns."""
+    rows, columns = [sum(row) for row in table], [sum(column) for column in zip(*table, strict=True)]
+    total = sum(rows)
+    expected = [[row * column / total for column in columns] for row in rows]
+    statistic = sum(
+        (count - due) ** 2 / due
+        for counts, dues in zip(table, expected, strict=True)
+        for count, due in zip(counts, dues, strict=True)
+    )
+    return chi_square_p(statistic, (len(rows) - 1) * (len(columns) - 1))
+
+
+def gamma_cdf(shape: float, x: float) -> float:
+    """Return the regularised incomplete gamma function P(shape, x): its series (Abramowitz and Stegun, 6.5.29)."""
+    if x <= 0.0:
+        return 0.0
+    if x > 200.0 + 10.0 * shape:
+        return 1.0
+    term = total = 1.0 / shape
+    n = shape
+    while term > 1e-16 * total:
+        n += 1.0
+        term *= x / n
+        total += term
+    return min(1.0, total * exp(shape * log(x) - x - lgamma(shape)))

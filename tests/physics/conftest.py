@@ -9,8 +9,9 @@ from foosim.node.engines import ENGINES
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import Entity, build_layout
 from foosim.protocol.scene import Vector
+from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import initial_numbers, place_ball
-from foosim.protocol.table_scene import build_scene, spin_inertia
+from foosim.protocol.table_scene import spin_inertia
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 Motors = tuple[tuple[float, float], tuple[float, float]]

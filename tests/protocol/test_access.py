@@ -69,10 +69,11 @@ def keys(plane: Plane, names: list[str]) -> list[tuple[str, zenoh.KeyExpr]]:
 def test_rules_say_what_the_predicate_says(nodes: list[str], clients: list[str], operators: list[str]) -> None:
     clients = [f"c{name}" for name in clients]
     made = deployment(nodes, clients, operators)
-    names = [*nodes, *clients, "vhub", "supervisor", "nobody", *(f"{name}.x1" for name in [*operators, *nodes])]
+    fixed = ["vhub", "supervisor", "replay", "nobody"]
+    names = [*nodes, *clients, *fixed, *(f"{name}.x1" for name in [*operators, *nodes])]
     for plane in Plane:
         control = access_control(access_to(plane, made))
-        here = "client." if plane is Plane.RADIO else ("vhub", "node.", "operator.")
+        here = {Plane.RADIO: "client.", Plane.REPLAY: "operator."}.get(plane, ("vhub", "node.", "operator."))
         for identity in [*identities_of(made), "node.nobody", "client.nobody", "operator.nobody"]:
             is_known = identity.startswith(here) and not identity.endswith("nobody")
             passes = Allowed(control, identity)
@@ -112,6 +113,9 @@ def test_writers_are_told_that_readers_listen_as_those_declare_it() -> None:
         for key in declared:
             assert passes("egress", "declare_subscriber", zenoh.KeyExpr(f"foosim/{key}")), (identity, key)
         assert not passes("egress", "declare_subscriber", zenoh.KeyExpr("foosim/simulation/build/blue"))
+        if identity == "operator.admin":
+            replay = Allowed(access_control(access_to(Plane.REPLAY, made)), identity)
+            assert replay("egress", "declare_subscriber", zenoh.KeyExpr("foosim/replay/request/*"))
         assert not passes("egress", "declare_subscriber", zenoh.KeyExpr("foosim/radio/down/other"))
 
 

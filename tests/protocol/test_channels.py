@@ -28,6 +28,8 @@ READS: Final[Mapping[str, Sequence[tuple[Channel, bool]]]] = {
     "supervisor": channels.SUPERVISOR_READS,
     "client": channels.CLIENT_READS,
     "operator": channels.OPERATOR_READS,
+    "replay": channels.REPLAY_READS,
+    "listener": channels.LISTENER_READS,
 }
 
 
@@ -61,7 +63,7 @@ def test_planes_share_no_key_and_keys_are_valid() -> None:
 def test_size_limits_are_those_of_the_planes() -> None:
     small = {"hello", "ready", "want", "request"}
     for channel in CHANNELS:
-        largest = limits.MESSAGE_BYTES_MAX if channel.plane is Plane.SIMULATION else limits.RADIO_MESSAGE_BYTES_MAX
+        largest = limits.RADIO_MESSAGE_BYTES_MAX if channel.plane is Plane.RADIO else limits.MESSAGE_BYTES_MAX
         assert channel.bytes_max == (limits.SMALL_MESSAGE_BYTES_MAX if channel.name in small else largest), channel.name
 
 
@@ -80,6 +82,7 @@ def test_every_channel_has_a_reader_and_no_role_reads_over_the_other_plane() -> 
     assert planes["vhub"] == {Plane.SIMULATION, Plane.RADIO}, "it alone is on both"
     assert planes["node"] == planes["supervisor"] == planes["operator"] == {Plane.SIMULATION}
     assert planes["client"] == {Plane.RADIO}
+    assert planes["replay"] == planes["listener"] == {Plane.REPLAY}
 
 
 def supervisor() -> SupervisorCore:

@@ -179,10 +179,8 @@ def test_a_file_that_is_no_mapping_is_refused(text: str) -> None:
 
 def test_an_empty_mapping_lacks_every_required_key() -> None:
     missing = [problem.rpartition(" ")[2] for problem in problems_of("{}")]
-    assert missing == sorted(
-        f"'{key}'"
-        for key in ["engine", "format", "nodes", "pace", "robots", "seed", "substeps", "table", "tick", "world"]
-    )
+    keys = ["engine", "format", "nodes", "pace", "robots", "seed", "substeps", "table", "tick", "world"]
+    assert sorted(missing) == [f"'{key}'" for key in keys]
 
 
 def test_nothing_is_built_from_what_is_refused_by_the_scan() -> None:

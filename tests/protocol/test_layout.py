@@ -48,7 +48,7 @@ def test_the_table_has_its_entities() -> None:
     assert [entity.name for entity in LAYOUT.robots] == sorted(DEPLOYMENT.robots)
     assert [entity.name for entity in LAYOUT.balls] == [BALL]
     assert {entity.name for entity in LAYOUT.entities if not entity.has_body} == {WORLD, "camera"}
-    assert {"rod"} == BODIES & ROBOTS and ADDABLE <= BODIES - ROBOTS
+    assert {"rod", "rover"} == BODIES & ROBOTS and ADDABLE <= BODIES - ROBOTS
     assert "ball" in LAYOUT and "nobody" not in LAYOUT and LAYOUT["camera"].model == "camera"
 
 

@@ -16,7 +16,7 @@ from foosim.protocol.layout import build_layout
 from foosim.protocol.mesh import is_closed, read_mesh
 from foosim.protocol.radio_materials import MATERIALS, METAL, PLASTIC, UNKNOWN, WOOD, MaterialName, RadioMaterial
 from foosim.protocol.scene import Cylinder
-from foosim.protocol.table_scene import build_scene
+from foosim.protocol.scenes import build_scene
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 POST: Final = "shape: cylinder, radius: 1 cm, length: 20 cm, surface: walls"

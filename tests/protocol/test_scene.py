@@ -9,8 +9,9 @@ from foosim.protocol.assign import reach_of
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout
 from foosim.protocol.scene import Box, Shape, Vector, forward_kinematics, multiply, place, rotate, swept_box, turn
+from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import initial_numbers, place_ball
-from foosim.protocol.table_scene import build_scene, spin_inertia
+from foosim.protocol.table_scene import spin_inertia
 
 DEPLOYMENT = load_deployment((Path(__file__).parents[2] / "deploy" / "table.yaml").read_text(), "table.yaml")
 TABLE = DEPLOYMENT.table

@@ -21,7 +21,8 @@ from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify_capture
 from foosim.supervisor import records
 from foosim.vhub.branching import BadBranch, read_branch
-from foosim.vhub.capture_reader import capture_info, open_capture
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.records import fold
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -16,9 +16,10 @@ from foosim.node.engines.interface import Engine
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import Layout
+from foosim.rehearsal.capture_arguments import BadCapture
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.rehearse_command import app as rehearse_app
-from foosim.rehearsal.replay_command import BadCapture, app
+from foosim.rehearsal.replay_command import app
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify, verify_capture
 from foosim.vhub.capture_reader import CapturedTick, open_capture

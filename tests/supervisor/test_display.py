@@ -36,6 +36,7 @@ def running() -> dict[str, Any]:
         "lag_ms": {"p50": 0.31, "p99": 1.62, "max": 7.4},
         "late": {"lag_ms": 0.7, "waited_for": "player-blue", "tick": 6170},
         "ball": {"position": [0.123, -0.045, 0.0175], "solver": "red"},
+        "rovers": None,
         "recording": {"state": "on", "problem": "", "offered": 9000, "written": 8990, "refused": 0},
         "packets": {"offered": 22510, "delivered": 22390, "dropped": 113, "in_flight": 7, "refused": 0},
         "nodes": {
@@ -65,6 +66,13 @@ def test_the_table_has_time_pace_lag_score_and_ball(running: dict[str, Any]) -> 
     assert "12.34 s · tick 6170 · realtime 1.00x" in text
     assert "red 2 : 1 blue · ball at +0.123 -0.045 +0.018 m, solved by red · 41 hand-overs, 2 moves" in text
     assert "lag 0.7 ms (p50 0.3, p99 1.6, max 7.4), waited for player-blue" in text
+
+
+def test_a_hall_has_rovers_and_no_score(running: dict[str, Any]) -> None:
+    rovers = {"count": 20, "drive": 18, "least": "rover07", "charge": 0.3412}
+    running |= {"score": None, "ball": None, "rovers": rovers}
+    assert "20 rovers, 18 drive, rover07 has 34% of its charge · 41 hand-overs" in render_text(running)
+    assert " | 20 rovers, 18 drive, rover07 has 34% of its charge | packets" in plain_line(running)
 
 
 def test_hosts_have_a_column_where_there_are_any(running: dict[str, Any]) -> None:

@@ -149,7 +149,7 @@ def test_another_pace_does_not_end_a_pause() -> None:
 
 @settings(max_examples=100)
 @given(lags=st.lists(st.integers(0, 20_000_000_000), min_size=1, max_size=200), share=st.floats(0.01, 1.0))
-def test_quantiles_are_right_to_ten_microseconds(lags: list[int], share: float) -> None:
+def test_quantiles_are_right_to_ten_microseconds_or_to_their_512th(lags: list[int], share: float) -> None:
     made = Lags()
     for lag in lags:
         made.add(lag)
@@ -158,15 +158,15 @@ def test_quantiles_are_right_to_ten_microseconds(lags: list[int], share: float) 
     found_ms = made.quantile_ms(share)
     assert found_ms <= made.max_ns / 1e6
     if exact_ms < 10_000.0:
-        assert exact_ms - 1e-9 <= found_ms <= exact_ms + 0.01 + 1e-9
+        assert exact_ms - 1e-9 <= found_ms <= exact_ms + max(0.01, (exact_ms + 0.01) / 512) + 1e-9
     assert made.max_ns == ordered[-1] and made.count == len(lags)
 
 
 def test_lags_take_bounded_memory() -> None:
     made = Lags()
-    for lag in range(0, 10**12, 10**8):
+    for lag in range(0, 11 * 10**9, 10**4):
         made.add(lag)
-    assert len(made.cells) <= 1_000_001 and max(made.cells) == 1_000_000
+    assert len(made.cells) <= 6_200 and made.quantile_ms(1.0) == 10_004.48
     assert Lags().quantile_ms(0.5) == 0.0
 
 

@@ -20,8 +20,9 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from foosim.protocol.frame import CHAIN_START, chain_next
 from foosim.protocol.scene import forward_kinematics
-from foosim.protocol.table_scene import build_scene
-from foosim.vhub.capture_reader import CaptureData, capture_info, open_capture
+from foosim.protocol.scenes import build_scene
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import CaptureData, open_capture
 from foosim.vhub.rows import ROW_TYPES, CaptureError, EpochRow, OwnerRow, row_schema
 from foosim.vhub.viewing import VIEW_TYPES
 from tests.vhub.conftest import RECOVERED, noise

@@ -19,7 +19,8 @@ from mcap.writer import CompressionType, Writer
 from foosim.protocol import limits
 from foosim.protocol.errors import Refused
 from foosim.vhub import capture_file
-from foosim.vhub.capture_reader import capture_info, open_capture
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.mcap_file import CHUNK_BYTES_MAX, McapWriter
 from foosim.vhub.rows import CaptureError

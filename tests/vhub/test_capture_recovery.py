@@ -13,7 +13,8 @@ from mcap.reader import make_reader
 from foosim.protocol.errors import Refused
 from foosim.protocol.journal import Journal, JournalError
 from foosim.vhub import capture_file
-from foosim.vhub.capture_reader import capture_info, open_capture
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import UNCLEAN, Recovered, recover_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.mcap_file import MAGIC, McapFile, Message

@@ -195,7 +195,7 @@ def test_what_is_crossed_is_what_bullet_hits_from_both_ends() -> None:
             in_bullet(shape, 1 << number, client)
         sight = sight_of(*things)
         lines = [line_through(rng) for _ in range(8)]
-        ours = sight.between_many([(a, b, ()) for a, b in lines])
+        ours = [sight.between(a, b) for a, b in lines]
         for number, shape in enumerate(things):
             mask = {"collisionFilterMask": 1 << number, "physicsClientId": client}
             there = p.rayTestBatch([a for a, _ in lines], [b for _, b in lines], **mask)
@@ -436,15 +436,12 @@ def test_neither_company_nor_order_nor_memory_changes_anything(monkeypatch: pyte
         pairs += [(*moved(((0.0, 0.0, -5.0), (0.0, 0.0, 5.0)), way), [])]
     alone = [repr(fresh().between(*pair)) for pair in pairs]
     assert len(set(alone)) > 50
-    assert [repr(found) for found in fresh().between_many(pairs)] == alone
     sight, order = geometry.sight(layout, numbers), list(range(len(pairs)))
     for _ in range(3):
         rng.shuffle(order)
         some = {index: repr(sight.between(*pairs[index])) for index in order}
         assert [some[index] for index in sorted(some)] == alone
         sight = geometry.sight(layout, numbers)  # another frame; what lies still is remembered of some
-    monkeypatch.setattr(geometry_module, "LINES_AT_ONCE", 1)
-    assert [repr(found) for found in fresh().between_many([*pairs, *pairs])] == alone * 2
 
 
 def test_on_the_table_rods_and_figures_stand_between_and_follow_the_frame() -> None:

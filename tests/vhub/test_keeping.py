@@ -6,10 +6,11 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol import channels
-from foosim.protocol.actions import Journal
-from foosim.protocol.messages import End, Tempo, Up
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Journal, Publish
+from foosim.protocol.messages import Commit, End, Tempo, Up
 from foosim.vhub.keeping import Keep, Keeping
+from foosim.vhub.main import needs_record
 from foosim.vhub.packet import Flight
 from foosim.vhub.records import Closing
 from foosim.vhub.release import Release, Releases
@@ -111,3 +112,68 @@ def test_at_the_end_what_waits_leaves_and_all_closings_are_kept() -> None:
     assert run.hub.core.finished and [closing.frame.tick for closing in run.kept] == list(range(10))
     assert run.released == run.left and [sequence for sequence, _ in run.left] == list(range(1, 9))
     assert all(wall_ns for _, wall_ns in run.released)
+
+
+def ended_amid(hub: Hub, tick: int) -> list[Closing]:
+    """What the capture gets of a run that ends at `tick` while the vHub waits for something before it."""
+    kept = [action.closing for action in hub.core.actions if isinstance(action, Keep)]
+    hub.core.actions.clear()
+    hub.say(channels.END, "supervisor", End(tick, "lost the journal", True))
+    hub.now_ns += limits.DOWNLINK_KEPT_NS
+    hub.core.wake(hub.now_ns)
+    assert hub.core.finished
+    return kept + [action.closing for action in hub.core.actions if isinstance(action, Keep)]
+
+
+def test_frames_behind_a_tick_that_is_half_closed_are_kept() -> None:
+    """Deliveries of a tick let nodes compute the frame behind it, whoever its own closing waits for."""
+    hub = Hub().begin()
+    for tick in range(5):
+        hub.close(tick)
+    for tick in (5, 6):
+        hub.commit(tick)
+    assert hub.core.waiting_for == "Done of hand"
+    kept = ended_amid(hub, 6)
+    assert [closing.frame.tick for closing in kept] == list(range(7))
+    assert kept[5].joins == kept[6].joins == [] and kept[6].delivered == hub.state.deliveries[5]
+
+
+def test_so_are_those_behind_one_whose_samples_have_not_come() -> None:
+    hub = Hub().begin()
+    for tick in range(2):
+        hub.close(tick)
+    for tick in range(2, 5):
+        frame = type(FRAME)(tick, FRAME.layout, FRAME.values, {FRAME.layout["red.goal"].index: b"to somebody"})
+        content = frame.digest, frame.values.tobytes(), frame.outbox_items
+        hub.say(channels.COMMIT, "vhub", Commit(1, tick, *content, [], False))
+    assert hub.core.waiting_for.startswith("samples of ")
+    assert [closing.frame.tick for closing in ended_amid(hub, 4)] == list(range(5))
+
+
+def test_a_commit_that_an_ended_run_lacks_is_asked_for_while_a_client_is_waited_for() -> None:
+    hub = Hub().begin()
+    hub.commit(0)
+    hub.said()
+    hub.core.wake(limits.WANT_AFTER_NS)
+    assert not hub.said(channels.WANT), "the tick waits for clients alone"
+    hub.now_ns = limits.WANT_EVERY_NS_MAX
+    hub.say(channels.END, "supervisor", End(2, "lost the journal", True))
+    for lacking in (1, 2):
+        hub.core.wake(hub.now_ns)
+        (want,) = hub.said(channels.WANT)
+        assert (want.kind, want.tick) == (channels.COMMIT.name, lacking)
+        hub.commit(lacking)
+        hub.now_ns += limits.WANT_EVERY_NS_MAX // 4
+    hub.core.wake(hub.now_ns)
+    assert not hub.said(channels.WANT) and not hub.core.finished
+    assert [closing.frame.tick for closing in ended_amid(hub, 2)] == [0, 1, 2]
+
+
+def test_a_vhub_whose_journal_has_failed_says_how_it_is_and_what_it_lacks() -> None:
+    """All else tells of what is not written."""
+    hub = Hub().begin()
+    hub.close(0)
+    hub.core.wake(limits.WANT_EVERY_NS_MAX)
+    said = [action for action in hub.core.actions if isinstance(action, Publish)]
+    assert {"want", "heartbeat"} == {each.channel.name for each in said if not needs_record(each)}
+    assert {"deliveries", "down"} <= {each.channel.name for each in said if needs_record(each)}

@@ -36,16 +36,21 @@ LONG_S: Final = 60.0
 INSIDERS: Final = {
     Plane.SIMULATION: ("node.red", "node.blue", "vhub", "operator.admin"),
     Plane.RADIO: ("client.hand", "client.other"),
+    Plane.REPLAY: ("operator.admin",),
 }
 OUTSIDERS: Final = {
     Plane.SIMULATION: ("client.hand", "node.nobody", "operator.nobody"),
     Plane.RADIO: ("node.red", "operator.admin", "client.nobody"),
+    Plane.REPLAY: ("node.red", "client.hand", "operator.nobody"),
 }
 """They have certificates of the same root."""
-ROUTER: Final = {Plane.SIMULATION: "supervisor", Plane.RADIO: "vhub"}
+ROUTER: Final = {Plane.SIMULATION: "supervisor", Plane.RADIO: "vhub", Plane.REPLAY: "vhub"}
+PRESENT: Final = {Plane.REPLAY: "replay"}
+"""The name under which a router is present, where it is not its identity's: a replay shows the vHub's certificate."""
 NAMES: Final = {
     Plane.SIMULATION: ("red", "blue", "nobody", "vhub", "supervisor", "admin.x1", "nobody.x1"),
     Plane.RADIO: ("hand", "other", "nobody", "vhub", "red"),
+    Plane.REPLAY: ("packets", "poses", "rows", "clock", "replay", "red", "admin.x1", "nobody.x1"),
 }
 BYTES_MAX: Final = 1 << 20
 
@@ -236,7 +241,7 @@ def test_nobody_is_present_as_another_and_all_see_the_router_only(world: World) 
         mine = {key for key in presences(world.plane) if may_be_present(member.identity, key)}
         for key in sorted(presences(world.plane), key=mine.__contains__):
             double.kept.append(double.session.liveliness().declare_token(key))
-    own = ALIVE[world.plane].replace("{name}", router.identity)
+    own = ALIVE[world.plane].replace("{name}", PRESENT.get(world.plane, router.identity))
     router.kept.append(router.session.liveliness().declare_token(own))
     granted = {key for key in presences(world.plane) for its in world.insiders if may_be_present(its.identity, key)}
     wait_for("the tokens", lambda: {key for _, key, _ in router.heard} == granted | {own})

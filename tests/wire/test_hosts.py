@@ -17,7 +17,7 @@ from foosim.supervisor import doctor_hosts
 from foosim.supervisor.doctor_hosts import LIMIT_S, ask, findings_of
 from foosim.supervisor.doctor_there import Question
 from foosim.supervisor.remote import Remote
-from foosim.vhub.capture_reader import capture_info
+from foosim.vhub.capture_info import capture_info
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE
 from tests.wire.test_run import last_json

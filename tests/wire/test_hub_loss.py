@@ -125,11 +125,10 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
 
 
 def test_a_run_whose_vhub_is_given_up_ends_in_order(house: House) -> None:
-    """Its journal cannot be read any more: whoever takes its place would have to guess."""
+    """Its journal cannot be read any more: however often it is started again, it does not come back."""
     up = house.up("--json", "--set", "deadlines.vhub_back=2 s")
     house.ticking(5)
-    run = house.live()
-    for journal in run.journals.glob("vhub-*.journal"):
+    for journal in house.live().journals.glob("vhub-*.journal"):
         journal.write_bytes(b"nothing of a journal")
     house.kill("vhub")
     code, out, err = house.end(up)
@@ -138,7 +137,17 @@ def test_a_run_whose_vhub_is_given_up_ends_in_order(house: House) -> None:
     assert (
         content["reason"] == "lost vhub: its connection closed; it did not come back within 2 s" and content["failed"]
     )
-    assert "no journal of this version" in run.log("vhub").read_text()
+
+
+def test_a_vhub_whose_journal_cannot_be_read_ends_and_says_so(house: House) -> None:
+    """It would have to guess what the one before has said."""
+    house.start("foosim-supervisor", "run", house.table, "--set", "players={}", "--set", LONG)
+    connect = ["--connect", house.wait_for("the run file", house.live().info).simulation]
+    journals = house.folder / "hub" / "journals"
+    journals.mkdir(parents=True)
+    (journals / "vhub-000001.journal").write_bytes(b"nothing of a journal")
+    code, _, err = house.run("foosim-vhub", *connect, "--run-folder", str(house.folder / "hub"))
+    assert code == 1 and "no journal of this version" in err, err
 
 
 TRAP: Final = """

@@ -13,7 +13,8 @@ import pytest
 from foosim.protocol import disk
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.verify import verify_capture
-from foosim.vhub.capture_reader import capture_info, open_capture
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import UNCLEAN
 from tests.wire.conftest import House
 

@@ -39,7 +39,7 @@ class Delay:
         return cls(setup) if timed or late or settings.delay_ns or setup.holds else None
 
     def at_sending(self, flight: Flight) -> str:
-        spent_ns = flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
+        spent_ns = flight.phase_ns + flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
         due_ns = flight.sent_ns + spent_ns + self._delay_ns
         if self._quantiles_ns:
             flight.jitter_ns = interpolate_ns(self._quantiles_ns, flight.words[Slot.JITTER])

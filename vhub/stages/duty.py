@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from foosim.vhub.memory import Sending
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
 from foosim.vhub.setup import LinkSetup
-from foosim.vhub.stages.queue import is_shared
 
 DUTY_CYCLE: Final = "duty_cycle"
 
@@ -19,7 +19,7 @@ class Duty:
         self._settings, self._sender = setup.settings, setup.sender
         self._share = setup.settings.duty_cycle
         self._size_ns = int(self._share * setup.settings.duty_window_ns)
-        self._broadcasts = setup.settings.published == "broadcast"
+        self._broadcasts = setup.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Duty | None:
@@ -27,8 +27,10 @@ class Duty:
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
-        if self._broadcasts and flight.published and is_shared(flight, sender):
-            return ""
+        if self._broadcasts and flight.published:
+            shared = sender.sending(flight.sequence, flight.copy)
+            if shared is not None:
+                return DUTY_CYCLE if shared.cause == DUTY_CYCLE else ""
         if sender.tokens_ns < 0:
             sender.tokens_ns = self._size_ns
         filled_ns = int((flight.sent_ns - sender.tokens_at_ns) * self._share)
@@ -36,6 +38,7 @@ class Duty:
         sender.tokens_at_ns = flight.sent_ns
         airtime_ns = self._airtime_ns(len(flight.payload))
         if airtime_ns > sender.tokens_ns:
+            sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
             return DUTY_CYCLE
         sender.tokens_ns -= airtime_ns
         return ""

@@ -6,10 +6,11 @@ the packet's own draws, so that a replay flips the same bits.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Final
 
 from foosim.protocol.draws import UNIT, Slot, chance_threshold
-from foosim.vhub.numbers import exp, ln
+from foosim.vhub.numbers import exp, ln, ln_gamma
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
 
@@ -17,6 +18,9 @@ CRC_FAIL: Final = "crc_fail"
 FLIP_BLOCK: Final = 1024
 """From here on the blocks of a packet's draws say which bits are flipped."""
 SIZES_KEPT: Final = 1024
+MEAN_SMALL: Final = 400.0
+DEVIATIONS: Final = 12.0
+"""Fewer flipped bits than the mean less this many deviations: less likely than 2^-64."""
 
 
 class Mangle:
@@ -44,6 +48,7 @@ class Mangle:
             self._flip(flight, bits)
         if flight.copy == 0 and words[Slot.DUPLICATE] < self._doubled:
             flight.is_doubled = True
+            self._setup.memory.copies += 1
         return ""
 
     def _threshold(self, bits: int) -> int:
@@ -67,14 +72,14 @@ class Mangle:
         payload = bytearray(flight.payload)
         for place in places:
             payload[place >> 3] ^= 1 << (place & 7)
-        flight.payload, flight.bits_flipped = bytes(payload), count
+        flight.mangled, flight.bits_flipped = bytes(payload), count
 
     def _count(self, word: int, bits: int) -> int:
         """Return how many of the bits are flipped, given that the draw says that some are: the binomial law."""
         rate = self._error_rate
         odds = rate / (1.0 - rate)
-        chance = exp(bits * ln(1.0 - rate)) * bits * odds
-        count, below = 1, chance
+        count = self._least(bits)
+        chance = below = exp(self._ln_mass(count, bits))
         while word >= chance_threshold(min(1.0, below)) and count < bits:
             chance *= (bits - count) / (count + 1) * odds
             count += 1
@@ -82,6 +87,16 @@ class Mangle:
                 break
             below += chance
         return count
+
+    def _least(self, bits: int) -> int:
+        """Return from which count on the law is looked at: 1, unless no float is as small as what it has there."""
+        mean = bits * self._error_rate
+        return 1 if mean < MEAN_SMALL else max(1, int(mean - DEVIATIONS * sqrt(mean)))
+
+    def _ln_mass(self, count: int, bits: int) -> float:
+        rate = self._error_rate
+        ln_ways = ln_gamma(bits + 1.0) - ln_gamma(count + 1.0) - ln_gamma(bits - count + 1.0)
+        return ln_ways + count * ln(rate) + (bits - count) * ln(1.0 - rate)
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:
         return ""

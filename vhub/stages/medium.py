@@ -40,7 +40,6 @@ from foosim.vhub.radio.timings import (
     with_category,
 )
 from foosim.vhub.setup import LinkSetup
-from foosim.vhub.stages.queue import is_shared
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
@@ -117,17 +116,18 @@ class OnAir:
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
-        self._once = setup.settings.published == "broadcast"
+        self._once = setup.sends_once
 
     def at_sending(self, flight: Flight) -> str:
         cause = self._budget.measure(flight)
         broadcast = flight.published and self._once
-        last = self._sender.last
-        if broadcast and last is not None and last.is_ready and is_shared(flight, self._sender):
+        last = self._sender.sending(flight.sequence, flight.copy)
+        assert last is not None, "the queue remembers what it lets through"
+        if broadcast and last.is_ready:
             self._share(flight, last)
         else:
             flight.rate_bps = self.rate_bps(flight, broadcast)
-            self._transmit(flight, broadcast, cause)
+            self._transmit(flight, last, broadcast, cause)
         if cause:
             flight.outcome = cause
         return COLLISION if flight.outcome == COLLISION else ""
@@ -138,16 +138,16 @@ class OnAir:
         flight.air_start_ns, flight.air_end_ns = last.start_ns, last.end_ns
         flight.contenders, flight.rate_bps, flight.outcome = last.contenders, last.rate_bps, last.outcome
 
-    def _transmit(self, flight: Flight, broadcast: bool, cause: str) -> None:
+    def _transmit(self, flight: Flight, last: Sending, broadcast: bool, cause: str) -> None:
         sender, air = self._sender, self._air
         air.advance(flight.sent_ns)
-        ready_ns = max(flight.sent_ns, sender.free_ns)
+        ready_ns = max(flight.sent_ns + flight.phase_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
         access, airtime_ns = self.access(flight, broadcast, UNIT if cause else None)
         end_ns, until_ns = start_ns + access.delay_ns, start_ns + access.occupancy_ns
         flight.air_start_ns, flight.air_end_ns = end_ns - airtime_ns, end_ns
-        flight.airtime_ns = access.airtime_ns
-        flight.access_ns = end_ns - ready_ns - access.airtime_ns
+        flight.airtime_ns = min(airtime_ns, access.delay_ns)
+        flight.access_ns = end_ns - ready_ns - flight.airtime_ns
         flight.retries = access.retries
         if access.outcome == "ok":
             flight.is_settled = not broadcast and self.is_acknowledged
@@ -155,11 +155,9 @@ class OnAir:
             flight.outcome = COLLISION if access.outcome in ("collision", "busy") else SNR
         sender.free_ns = until_ns
         sender.waiting.append((until_ns, len(flight.payload)))
-        last = sender.last
-        if last is not None:
-            last.access_ns, last.airtime_ns, last.start_ns = flight.access_ns, flight.airtime_ns, flight.air_start_ns
-            last.end_ns, last.contenders, last.rate_bps = end_ns, flight.contenders, flight.rate_bps
-            last.outcome, last.is_ready = flight.outcome, True
+        last.access_ns, last.airtime_ns, last.start_ns = flight.access_ns, flight.airtime_ns, flight.air_start_ns
+        last.end_ns, last.contenders, last.rate_bps = end_ns, flight.contenders, flight.rate_bps
+        last.outcome, last.is_ready = flight.outcome, True
         of = self._budget.propagation
         place, power = of.antenna(flight.source), of.power_cdbm
         times = flight.air_start_ns, end_ns, until_ns

@@ -18,12 +18,6 @@ QUEUE_FULL: Final = "queue_full"
 CODEL: Final = "queue_codel"
 
 
-def is_shared(flight: Flight, sender: RadioState) -> bool:
-    """Whether a broadcast's packet has been sent for another of its receivers."""
-    last = sender.last
-    return last is not None and (last.sequence, last.copy) == (flight.sequence, flight.copy)
-
-
 class Queue:
     """Decides whether a packet may wait, and how long."""
 
@@ -34,7 +28,7 @@ class Queue:
         self._codel = queue.drop == "codel"
         self._target_ns, self._interval_ns = queue.codel_target_ns, queue.codel_interval_ns
         self._overhead = setup.settings.overhead_bytes
-        self._broadcasts = setup.is_radio and setup.settings.published == "broadcast"
+        self._broadcasts = setup.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Queue | None:
@@ -44,12 +38,12 @@ class Queue:
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
-        if self._broadcasts and flight.published and is_shared(flight, sender):
-            last = sender.last
-            assert last is not None
-            flight.queue_bytes, flight.queue_ns = last.queue_bytes, last.queue_ns
-            return last.cause
-        now_ns, waiting = flight.sent_ns, sender.waiting
+        if self._broadcasts and flight.published:
+            shared = sender.sending(flight.sequence, flight.copy)
+            if shared is not None:
+                flight.queue_bytes, flight.queue_ns = shared.queue_bytes, shared.queue_ns
+                return shared.cause
+        now_ns, waiting = flight.sent_ns + flight.phase_ns, sender.waiting
         gone = next((n for n, (departure_ns, _) in enumerate(waiting) if departure_ns > now_ns), len(waiting))
         if gone:
             del waiting[:gone]

@@ -23,13 +23,15 @@ CHAIN_BLOCK: Final = 1
 
 
 class Residual:
-    """Independent losses, and those of a state that a subclass knows."""
+    """Independent losses, those of outages, and those of a state that a subclass knows."""
 
     def __init__(self, setup: LinkSetup, good_loss: float = 0.0, bad_loss: float = 0.0) -> None:
         loss = setup.settings.loss
         self._setup = setup
         self._burst = chance_threshold(good_loss), chance_threshold(bad_loss)
         self._any = tuple(chance_threshold(state + (1.0 - state) * loss) for state in (good_loss, bad_loss))
+        outages = setup.settings.outages
+        self._outages = None if outages is None else episodes_of_outages(_time_key(setup, "outages"), outages)
 
     def is_bad(self, flight: Flight) -> bool:
         """Whether the packet meets the link in its bad state."""
@@ -41,6 +43,9 @@ class Residual:
 
     def at_sending(self, flight: Flight) -> str:
         bad = flight.is_bad = self.is_bad(flight)
+        if self._outages is not None and self._outages.is_bad(flight.sent_ns):
+            flight.is_bad = True
+            return BURST_LOSS
         word = flight.words[Slot.LOSS]
         if word >= self._any[bad]:
             return ""
@@ -53,12 +58,12 @@ class Residual:
 class InTime(Residual):
     """Bad times of a link, whoever sends in them."""
 
-    def __init__(self, setup: LinkSetup, episodes: list[Episodes], bad_loss: float) -> None:
+    def __init__(self, setup: LinkSetup, episodes: Episodes, bad_loss: float) -> None:
         super().__init__(setup, 0.0, bad_loss)
         self._episodes = episodes
 
     def is_bad(self, flight: Flight) -> bool:
-        return any(episodes.is_bad(flight.sent_ns) for episodes in self._episodes)
+        return self._episodes.is_bad(flight.sent_ns)
 
 
 class ByPacket(Residual):
@@ -109,7 +114,8 @@ def chain_of_burst(burst: Burst) -> GilbertElliott:
     assert burst.mean_burst is not None
     share = burst.loss / burst.bad_loss
     r = 1.0 - (1.0 - 1.0 / burst.mean_burst) / burst.bad_loss
-    return GilbertElliott.model_construct(p=r * share / (1.0 - share), r=r, h=1.0 - burst.bad_loss, k=1.0)
+    p = min(1.0, r * share / (1.0 - share))
+    return GilbertElliott.model_construct(p=p, r=r, h=1.0 - burst.bad_loss, k=1.0)
 
 
 def make_residual(setup: LinkSetup) -> Residual | None:
@@ -122,15 +128,12 @@ def make_residual(setup: LinkSetup) -> Residual | None:
         return ByPacket(setup, chain.p, chain.r, 1.0 - chain.k, 1.0 - chain.h)
     if settings.markov4 is not None:
         return FourStates(setup, settings.markov4)
-    times: list[Episodes] = []
-    words = int.from_bytes(setup.key[:8], "little")
-    bad_loss = 1.0
-    if settings.burst is not None:
-        times.append(episodes_of_burst(draw_key(words, "burst"), settings.burst))
-        bad_loss = settings.burst.bad_loss
-    if settings.outages is not None:
-        times.append(episodes_of_outages(draw_key(words, "outages"), settings.outages))
-        bad_loss = 1.0 if settings.burst is None else bad_loss
-    if times:
-        return InTime(setup, times, bad_loss)
-    return Residual(setup) if settings.loss > 0.0 else None
+    burst = settings.burst
+    if burst is not None:
+        return InTime(setup, episodes_of_burst(_time_key(setup, "burst"), burst), burst.bad_loss)
+    return Residual(setup) if settings.loss > 0.0 or settings.outages is not None else None
+
+
+def _time_key(setup: LinkSetup, what: str) -> bytes:
+    """Return the key of the lengths of a link's times."""
+    return draw_key(int.from_bytes(setup.key[:8], "little"), what)

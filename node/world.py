@@ -1,0 +1,37 @@
+"""What differs between kinds of world in the tick of a node, and the one place where it is chosen.
+
+Neighbours: `table_world` and `hall_world` are the kinds, `step` is what they have in common, `engines` computes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from foosim.node.actuators import Actuator
+from foosim.node.hall_world import HallWorld
+from foosim.node.table_world import TableWorld
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.layout import Entity, Layout
+
+
+class World(Protocol):
+    """One kind of world, for one deployment and layout."""
+
+    @property
+    def actuators(self) -> Mapping[int, Actuator]:
+        """What moves each robot, by the entity's index."""
+
+    def apply_rules(self, numbers: list[float], layout: Layout) -> None:
+        """Edit a frame's numbers by the rules of the world, with all their memory in the frame."""
+
+    def plausible(self, entity: Entity, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether an entity's new, finite state is in the world, within its speed limit and its reach."""
+
+    def stir(self, numbers: list[float]) -> None:
+        """Set a world at rest in motion, for the fixed small run that tells engines apart."""
+
+
+def world_of(deployment: Deployment, layout: Layout) -> World:
+    """Return the deployment's kind of world."""
+    return HallWorld(deployment, layout) if deployment.is_hall else TableWorld(deployment, layout)

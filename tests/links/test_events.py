@@ -1,0 +1,157 @@
+"""Events by simulated time: partitions at sending and at arrival, clogs, changes, chaos, and what heals them."""
+
+from __future__ import annotations
+
+import json
+from math import expm1
+
+import pytest
+
+from foosim.protocol.messages import Disrupt
+from foosim.protocol.network import event_of
+from foosim.vhub.fabric import Fabric
+from foosim.vhub.packet import Flight
+from tests.links.offered import ENDS, MS, S, deployment_of, every, fabric_of, fates, rule
+from tests.links.proof import Proof
+from tests.links.statistics import ks
+
+PAIRS = [(one, other) for one in ENDS for other in ENDS if one != other]
+
+
+def events(*lines: str) -> str:
+    return f"network.events=[{', '.join(lines)}]"
+
+
+def cut_at(sets: tuple[str, ...], ends: tuple[str, str], period_ns: int = MS, count: int = 100) -> list[int]:
+    """The times (ms) at which a packet is lost by a partition, sent every ms."""
+    fabric = Fabric(deployment_of(*sets))
+    return [f.sent_ns // MS for f in fates(fabric, every(period_ns, count), ends=ends) if f.cause == "partition"]
+
+
+def test_a_partition_cuts_what_is_sent_and_what_arrives() -> None:
+    """With 10 ms of delay, what was sent 10 ms before it begins arrives in it; `deliver` lets that through."""
+    when = events("{at: 30 ms, for: 20 ms, partition: [[a], [rest]]}")
+    delay = rule("delay: 10 ms", "from: '*', to: '*'")
+    assert cut_at((delay, when), ("a", "b")) == list(range(20, 50))
+    deliver = "network.defaults={in_flight_on_partition: deliver}"
+    assert cut_at((delay, when, deliver), ("a", "b")) == list(range(30, 50))
+
+
+def test_who_is_on_which_side() -> None:
+    """The first group that selects an endpoint is its; who is in none talks to everybody."""
+    when = events("{at: 10 ms, for: 5 ms, partition: [[a, b], [c]]}")
+    cut = {pair for pair in PAIRS if cut_at((when,), pair)}
+    assert cut == {("a", "c"), ("b", "c"), ("c", "a"), ("c", "b")}
+    rest = events("{at: 10 ms, for: 5 ms, partition: [[a], [rest], [d]]}")
+    assert {p for p in PAIRS if not cut_at((rest,), p)} == {("b", "c"), ("c", "b")}
+    first = events("{at: 10 ms, for: 5 ms, partition: [[a], [a, b]]}")
+    assert {p for p in PAIRS if cut_at((first,), p)} == {("a", "b"), ("b", "a")}
+
+
+def test_a_partition_of_one_direction() -> None:
+    when = events("{at: 10 ms, for: 5 ms, partition: [[a], [rest]], symmetric: false}")
+    assert {pair for pair in PAIRS if cut_at((when,), pair)} == {("a", "b"), ("a", "c"), ("a", "d")}
+
+
+@pytest.mark.parametrize("heal", ["all", "partitions", "clogs", "chaos", "settings"])
+def test_each_heals_its_own(heal: str) -> None:
+    lines = (
+        "{at: 10 ms, partition: [[a], [rest]]}",
+        "{at: 10 ms, clog: {from: b, to: c}}",
+        "{at: 10 ms, set: {link: tried, delay: 3 ms}}",
+        f"{{at: 50 ms, heal: {heal}}}",
+    )
+    sets = (rule("delay: 1 ms", "from: d, to: '*'"), events(*lines))
+    assert max(cut_at(sets, ("a", "b"))) == (49 if heal in ("all", "partitions") else 99)
+    held = [f.due_ns for f in fates(Fabric(deployment_of(*sets)), every(MS, 100), ends=("b", "c"))]
+    if heal in ("all", "clogs"):
+        assert held[10:50] == [50 * MS + n for n in range(40)] and held[51] == 51 * MS
+    else:
+        assert min(held[10:]) > 1000 * S, "no end"
+    flights = fates(Fabric(deployment_of(*sets)), every(MS, 100), ends=("d", "c"))
+    changed = [(f.due_ns - f.sent_ns) // MS for f in flights]
+    assert changed[:50] == [1] * 10 + [3] * 40 and changed[-1] == (1 if heal in ("all", "settings") else 3)
+
+
+@pytest.mark.parametrize("first", ["heal", "partition"])
+def test_of_two_events_at_one_time_the_later_one_has_the_last_word(first: str) -> None:
+    """What begins behind a heal is not healed by it, in a file and on request."""
+    lines = ["{at: 20 ms, heal: all}", "{at: 20 ms, for: 30 ms, partition: [[a], [rest]]}"]
+    lines = lines if first == "heal" else lines[::-1]
+    expected = list(range(20, 50)) if first == "heal" else []
+    assert cut_at((events(*lines),), ("a", "b")) == expected
+    fabric = Fabric(deployment_of())
+    actions = [{"heal": "all"}, {"partition": [["a"], ["rest"]], "for": "30 ms"}]
+    for action in actions if first == "heal" else actions[::-1]:
+        fabric.take(10, 20 * MS, json.dumps(action))
+    found = [f.sent_ns // MS for f in fates(fabric, every(MS, 100)) if f.cause]
+    assert found == expected
+
+
+def test_a_clog_holds_and_lets_go() -> None:
+    """What would come within it comes when it ends, in order; the other direction is as it was."""
+    when = events("{at: 20 ms, for: 30 ms, clog: {from: a, to: [b, c]}}")
+    for ends in (("a", "b"), ("a", "c"), ("b", "a"), ("a", "d")):
+        fabric = Fabric(deployment_of(rule("delay: 5 ms", "from: '*', to: '*'"), when))
+        due = [f.due_ns for f in fates(fabric, every(MS, 100), ends=ends)]
+        plain = [n * MS + 5 * MS for n in range(100)]
+        if ends in (("a", "b"), ("a", "c")):
+            plain[15:45] = [50 * MS + n for n in range(30)]
+            plain[45] = 50 * MS + 30  # due at the end itself, behind those that waited
+        assert due == plain, ends
+
+
+def test_random_lengths_are_exponential(proof: Proof) -> None:
+    """Of clogs that are asked for one by one: each has a length of its own, drawn by its number."""
+    n = proof.size(200, 1000)
+    deployment = deployment_of()
+    fabric = Fabric(deployment, deployment.network.model_copy(update={"seed": proof.seed}))
+    clog = {"clog": {"from": "a", "to": "b"}, "for": {"exponential": "200 ms"}}
+    lengths = []
+    for k in range(n):
+        fabric.timeline.add(event_of(json.dumps(clog), 10 * S * k))
+        hold = fabric.timeline.holds[-1]
+        lengths.append((hold.end_ns - hold.start_ns) / S)
+    found = [f.due_ns - f.sent_ns for f in fates(fabric, every(10 * S, n))]
+    assert [x / S for x in found] == lengths
+    proof.likely("T6", "clogs with exponential lengths: Kolmogorov", ks(lengths, lambda x: -expm1(-x / 0.2)), n)
+
+
+def test_changes_are_over_one_another_and_heal_at_once() -> None:
+    lines = (
+        "{at: 10 ms, set: {link: tried, loss: 100 %}}",
+        "{at: 20 ms, set: {link: tried, delay: 2 ms}}",
+        "{at: 30 ms, set: {link: tried, loss: 0 %}}",
+        "{at: 40 ms, heal: settings}",
+    )
+    found = list(fates(fabric_of("delay: 1 ms", 1, events(*lines)), every(MS, 50)))
+    lost = [f.sent_ns // MS for f in found if f.cause]
+    assert lost == list(range(10, 30))
+    assert [(f.due_ns - f.sent_ns) // MS for f in found if not f.cause] == [1] * 10 + [2] * 10 + [1] * 10
+
+
+def test_chaos_comes_and_goes(proof: Proof) -> None:
+    """Between its times everything is as it was; within, every kind of trouble comes, by its own seed."""
+    lines = ("{at: 1 s, chaos: {among: [a, b, c]}, until: 60 s}", "{at: 30 s, heal: chaos}")
+    deployment = deployment_of(f"seed={proof.seed}", rule("delay: 1 ms", "from: '*', to: '*'"), events(*lines))
+    fabric = Fabric(deployment)
+    found: list[Flight] = list(fates(fabric, every(5 * MS, 8000)))
+    calm = [f for f in found if f.sent_ns < S or f.sent_ns >= 30 * S]
+    assert {f.due_ns - f.sent_ns for f in calm if f.sent_ns < S - 2 * MS} == {MS}
+    late = [f for f in calm if f.sent_ns >= 40 * S - 5 * MS]
+    assert all(f.due_ns - f.sent_ns == MS and not f.cause for f in late)
+    causes = {f.cause for f in found if S <= f.sent_ns < 30 * S}
+    assert {"", "random_loss"} <= causes and any(f.is_doubled for f in found)
+    apart = list(fates(Fabric(deployment), every(5 * MS, 8000), ends=("a", "d")))
+    assert all(not f.cause and f.due_ns - f.sent_ns == MS for f in apart), "d is not among them"
+    seeds = {tuple(f.cause for f in fates(Fabric(deployment.model_copy(update={"seed": seed})), every(5 * MS, 2000)))
+             for seed in range(10)}  # fmt: skip
+    assert len(seeds) == 10
+
+
+def test_a_request_is_as_an_event_of_the_file() -> None:
+    """Apart from what it draws, which is by its own number."""
+    text = {"partition": [["a"], ["rest"]], "for": "20 ms"}
+    fabric = Fabric(deployment_of())
+    fabric.take(5, 10 * MS, Disrupt(json.dumps(text)).event)
+    assert [f.sent_ns // MS for f in fates(fabric, every(MS, 50)) if f.cause] == list(range(10, 30))

@@ -1,0 +1,132 @@
+"""Copies and bit errors (T15): as often as configured, exactly the bits that are said, anywhere in the packet."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+from math import comb, expm1, log1p, sqrt
+
+import pytest
+
+from foosim.protocol.messages import Sent
+from foosim.vhub.packet import Flight, content_of
+from tests.links.offered import ENDS, MS, Hub, deployment_of, every, fabric_of, fates, play, rule
+from tests.links.proof import Proof
+from tests.links.statistics import binomial_z, chi_square
+
+
+def flipped(before: bytes, after: bytes) -> list[int]:
+    """The places of the bits that differ."""
+    rest = int.from_bytes(before, "little") ^ int.from_bytes(after, "little")
+    places = []
+    while rest:
+        places.append((rest & -rest).bit_length() - 1)
+        rest &= rest - 1
+    return places
+
+
+@pytest.mark.parametrize(("size", "rate"), [(100, 1e-4), (1500, 1e-5), (16, 2e-3), (1, 0.1)])
+def test_packets_with_errors(proof: Proof, size: int, rate: float) -> None:
+    """1 - (1 - rate)^bits of the packets, binomial counts of flipped bits in them, uniform places."""
+    n, bits = proof.size(60_000, 600_000), 8 * size
+    settings = f"corrupt: {{bit_error_rate: {rate:.10f} p, deliver: true}}"
+    zeros = bytes(size)
+    counts, places = Counter[int](), [0] * min(bits, 16)
+    for flight in fates(fabric_of(settings, proof.seed), every(MS, n), size):
+        assert not flight.cause
+        found = flipped(zeros, content_of(flight)) if flight.bits_flipped else []
+        assert len(found) == flight.bits_flipped and (found or content_of(flight) == zeros)
+        counts[len(found)] += 1
+        for place in found:
+            places[place * len(places) // bits] += 1
+    what = f"{size} B at {rate:g}"
+    hit = -expm1(bits * log1p(-rate))
+    proof.normal("T15", f"corruption of {what}: share of packets", binomial_z(n - counts[0], n, hit), n)
+    due = [n * comb(bits, k) * rate**k * (1 - rate) ** (bits - k) for k in range(1, 12 if bits > 12 else bits + 1)]
+    most = len(due)
+    seen = [counts[k] for k in range(1, most + 1)]
+    if sum(x >= 5 for x in due) > 2:
+        proof.likely("T15", f"corruption of {what}: bits in one packet", chi_square(seen, due), sum(seen))
+    total = sum(places)
+    proof.likely("T15", f"corruption of {what}: places", chi_square(places, [total / len(places)] * len(places)), total)
+
+
+@pytest.mark.parametrize(("size", "rate"), [(60_000, 0.01), (1500, 0.2), (8000, 0.5)])
+def test_many_errors_in_long_packets(proof: Proof, size: int, rate: float) -> None:
+    """Where a packet without errors is less likely than the least number of a float."""
+    n, bits = proof.size(30, 300), 8 * size
+    settings = f"corrupt: {{bit_error_rate: {rate:.3f} p, deliver: true}}"
+    counts = [f.bits_flipped for f in fates(fabric_of(settings, proof.seed), every(MS, n), size)]
+    z = (sum(counts) - n * bits * rate) / sqrt(n * bits * rate * (1 - rate))
+    proof.normal("T15", f"corruption of {size} B at {rate:g}: bits", z, n)
+    spread = sum((count - bits * rate) ** 2 for count in counts) / (bits * rate * (1 - rate))
+    proof.normal("T15", f"corruption of {size} B at {rate:g}: their spread", (spread - n) / sqrt(2 * n), n)
+
+
+def test_with_a_checksum_they_are_lost(proof: Proof) -> None:
+    """The same packets: a draw says the same, whatever becomes of it."""
+    n = proof.size(30_000, 300_000)
+    lost = [f.cause for f in fates(fabric_of("corrupt: {bit_error_rate: 0.0001 p}", proof.seed), every(MS, n))]
+    settings = "corrupt: {bit_error_rate: 0.0001 p, deliver: true}"
+    spoiled = [f.bits_flipped > 0 for f in fates(fabric_of(settings, proof.seed), every(MS, n))]
+    differing = sum((cause == "crc_fail") != bad for cause, bad in zip(lost, spoiled, strict=True))
+    assert set(lost) == {"", "crc_fail"}
+    proof.exact("T15", "packets lost for errors that are not those delivered with errors", differing, 0, n)
+
+
+def test_an_empty_packet_has_no_bits() -> None:
+    flights = fates(fabric_of("corrupt: {bit_error_rate: 50 %}"), every(MS, 50), 0)
+    assert {f.cause for f in flights} == {""}
+
+
+def flight_of(sequence: int, sent_ns: int, size: int = 1250) -> Flight:
+    return Flight("a", "b", "data", sequence, sent_ns, 0, bytes(size))
+
+
+def test_copies_are_as_frequent_as_configured(proof: Proof) -> None:
+    n = proof.size(50_000, 500_000)
+    count = sum(f.is_doubled for f in fates(fabric_of("duplicate: 7 %", proof.seed), every(MS, n)))
+    proof.normal("T15", "duplication: share", binomial_z(count, n, 0.07), n)
+
+
+def test_copies_take_time_on_the_wire_and_have_a_fate_of_their_own(proof: Proof) -> None:
+    """Each has its own draws: half of either sort is lost, independently; each is served after the other."""
+    n = proof.size(4000, 40_000)
+    settings = "rate: 10 Mbit/s, loss: 50 %, duplicate: 100 %, delay: 5 ms"
+    flights = play(fabric_of(settings, proof.seed), [flight_of(k, 10 * MS * k) for k in range(n)])
+    twins = [f for f in flights if f.copy]
+    originals = {f.sequence: f for f in flights if not f.copy}
+    doubled = [f.sequence for f in originals.values() if f.is_doubled]
+    assert sorted(f.sequence for f in twins) == doubled, "one copy of each that came through so far"
+    assert not any(f.is_doubled for f in twins), "a copy is never doubled again"
+    assert {f.queue_ns for f in twins} == {MS} and {f.queue_ns for f in originals.values()} == {0}
+    assert all(f.due_ns == f.sent_ns + 7 * MS for f in twins if not f.cause)
+    lost = sum(bool(f.cause) for f in twins)
+    proof.normal("T15", "duplication: loss of copies is their own", binomial_z(lost, len(twins), 0.5), len(twins))
+
+
+def test_copies_count_against_the_rate(proof: Proof) -> None:
+    """A link that doubles everything has half of its rate left: of twice as much, half is lost in the queue."""
+    n = proof.size(4000, 40_000)
+    settings = "rate: 10 Mbit/s, duplicate: 100 %, queue: {packets: 10}"
+    flights = play(fabric_of(settings, proof.seed), [flight_of(k, k * MS) for k in range(n)])
+    sent = sorted(f.due_ns for f in flights if not f.cause)
+    proof.ratio("T15", "throughput with copies", (len(sent) - 1) / (sent[-1] - sent[0]), 1 / MS, 0.001, len(sent))
+    assert all(b - a == MS for a, b in pairwise(sent))
+
+
+def test_copies_are_in_no_account(proof: Proof) -> None:
+    """The hub: offered = delivered + dropped + in flight, and the copies beside."""
+    settings = "loss: 20 %, duplicate: 50 %, jitter: {shape: gamma, sd: 3 ms}, order: free"
+    hub = Hub(deployment_of(f"seed={proof.seed}", rule(settings, "from: '*', to: '*'")))
+    for tick in range(200):
+        hub.close({name: [Sent(tick + 1, "", "news", 0, b"x")] for name in ENDS})
+        packets = hub.state.packets
+        assert packets.in_flight == sum(f.copy == 0 for f in hub.state.in_flight())
+    copies = [f for f in hub.fates if f.copy] + [f for f in hub.state.in_flight() if f.copy]
+    assert packets.offered == 200 * 12 and packets.copies == len(copies) > 700
+    links = hub.state.fabric.states.values()
+    assert sum(link.offered for link in links) == packets.offered
+    assert sum(link.copies for link in links) == packets.copies
+    arrived = Counter((f.source, f.destination, f.sequence, f.copy) for f in hub.fates)
+    assert max(arrived.values()) == 1

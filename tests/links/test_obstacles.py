@@ -1,0 +1,141 @@
+"""Obstacles (T21): what stands between two antennas in the newest frame weakens their signal, and nothing else does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import pytest
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.scene import Vector
+from foosim.protocol.start import initial_frame, place_ball
+from foosim.vhub.fabric import Fabric
+from foosim.vhub.packet import Flight
+from foosim.vhub.radio.materials import slab_loss_db
+from tests.links.offered import deployment_of
+from tests.links.proof import Proof
+
+HIGH: Final = 0.5
+"""Above the table (m)."""
+AWAY: Final = (5.0, 5.0, HIGH)
+FREQUENCY_HZ: Final = 5.25e9
+
+
+def world(*things: str, path_loss: str = "environment: free_space", clients: str = "", far: int = 1) -> Deployment:
+    """Clients a and b, twice `far` metres apart on a line along x, with a radio that all carry; c beside them."""
+    everybody = "a: {}, b: {}, c: {}, d: {}" + clients
+    sets = [f"clients={{{everybody}}}"] if clients else []
+    radio = f"preset: wifi_5_indoor, shadowing: {{on: false}}, path_loss: {{{path_loss}}}, burst: null, jitter: null"
+    return deployment_of(
+        *sets,
+        f"network.radios={{r: {{{radio}}}}}",
+        "network.robots={'*': [r]}",
+        f"network.places={{a: [-{far} m, 0 m, {HIGH} m], b: [{far} m, 0 m, {HIGH} m], '*': [0 m, 6 m, {HIGH} m]}}",
+        f"scenery={{{', '.join(things)}}}",
+    )
+
+
+def frame_with(deployment: Deployment, ball: Vector, tick: int = 0) -> Frame:
+    start = initial_frame(deployment)
+    numbers = list(start.numbers)
+    place_ball(numbers, start.layout["ball"], ball)
+    return Frame(tick, start.layout, np.array(numbers))
+
+
+def heard(fabric: Fabric, ends: tuple[str, str] = ("a", "b"), sequence: int = 1) -> Flight:
+    flight = Flight(*ends, "data", sequence, 0, 0, bytes(20))
+    fabric.link(*ends, "data").send(flight)
+    return flight
+
+
+def loss_cdb(deployment: Deployment, ball: Vector = AWAY, ends: tuple[str, str] = ("a", "b")) -> int:
+    fabric = Fabric(deployment)
+    fabric.turn_to(frame_with(deployment, ball))
+    return heard(fabric, ends).path_loss_cdb
+
+
+def wall(radio: str, thickness: str = "20 cm", at: str = "0 m") -> str:
+    size = f"length: {thickness}, width: 3 m, height: 3 m"
+    return f"wall: {{shape: box, {size}, x: {at}, z: 1 m, surface: walls, radio: {radio}}}"
+
+
+@pytest.mark.parametrize(("material", "thickness_m"), [("concrete", 0.2), ("brick", 0.1), ("wood", 0.05), ("glass", 0.012)])
+def test_a_wall_weakens_by_what_its_material_takes(proof: Proof, material: str, thickness_m: float) -> None:
+    """P.2040's slab, to a hundredth of a dB, both ways; the receiver gets that much less."""
+    clear, built = world(), world(wall(material, f"{100 * thickness_m:g} cm"))
+    expected = round(100 * slab_loss_db(material, thickness_m, FREQUENCY_HZ))
+    measured = [loss_cdb(built, ends=ends) - loss_cdb(clear, ends=ends) for ends in (("a", "b"), ("b", "a"))]
+    assert measured[0] == measured[1]
+    proof.exact("T21", f"a wall of {material} between two (0.01 dB)", abs(measured[0] - expected) <= 1, True, 1)
+    fabric = Fabric(built)
+    fabric.turn_to(frame_with(built, AWAY))
+    flight = heard(fabric)
+    assert flight.walls == ("wall",) and abs(flight.walls_cdb - expected) <= 1
+
+
+def test_walls_add_up_and_a_wall_aside_is_none() -> None:
+    one = wall("{loss: 5 dB}", at="-30 cm")
+    other = one.replace("wall:", "second:").replace("-30 cm", "40 cm")
+    aside = one.replace("wall:", "third:").replace("-30 cm", "150 cm")
+    assert loss_cdb(world(one)) - loss_cdb(world()) == 500
+    assert loss_cdb(world(one, other, aside)) - loss_cdb(world()) == 1000
+    assert loss_cdb(world(wall("none"))) == loss_cdb(world())
+
+
+def test_a_body_that_moves_in_and_out(proof: Proof) -> None:
+    """The ball on the line of sight takes its share, off it takes none: the newest frame decides, tick by tick."""
+    deployment = world()
+    fabric = Fabric(deployment)
+    losses = []
+    for tick, y in enumerate([5.0, 0.1, 0.0, 0.01, 0.1, 5.0, 0.0]):
+        fabric.turn_to(frame_with(deployment, (0.0, y, HIGH), tick))
+        losses.append(heard(fabric, sequence=tick + 1).path_loss_cdb)
+    inside = [loss > losses[0] for loss in losses]
+    proof.exact("T21", "ball on the line of sight, by its place", inside, [False, False, True, True, False, False, True], 7)
+    assert len({loss for loss, shadowed in zip(losses, inside, strict=True) if not shadowed}) == 1
+
+
+def test_the_ends_own_bodies_are_no_obstacles(proof: Proof) -> None:
+    """A client on board of a rod is at the rod; its own rod hides nothing, but hides others from each other."""
+    deployment = world(clients=", rider: {on: red.goal}")
+    fabric = Fabric(deployment)
+    fabric.turn_to(frame_with(deployment, AWAY))
+    own = [heard(fabric, ends) for ends in (("rider", "a"), ("a", "rider"), ("red.goal", "a"))]
+    on_board = Fabric(deployment).link("rider", "red.goal", "data").rule
+    proof.exact("T21", "an end's own rod among its obstacles", any("red.goal" in f.walls for f in own), False, 3)
+    assert on_board == "on_board"
+    rod = fabric.world.antenna("red.goal", (0.0, 0.0, 0.0))
+    x, _, z = rod
+    across = {"a": (x - 1.0, 0.0, z), "b": (x + 1.0, 0.0, z)}
+    crossed = [crossing.name for crossing in fabric.world.crossings(across["a"], across["b"], frozenset())]
+    assert "red.goal" in crossed
+    assert "red.goal" not in [c.name for c in fabric.world.crossings(across["a"], across["b"], frozenset(["red.goal"]))]
+
+
+@pytest.mark.parametrize("material", ["concrete", "brick", "wood", "chipboard"])
+def test_thicker_is_not_less(proof: Proof, material: str) -> None:
+    """For lossy slabs, in steps of a wavelength in the air (reflections within a slab go up and down with half of it)."""
+    losses: Sequence[int] = [loss_cdb(world(wall(material, f"{cm} cm"))) for cm in range(6, 66, 12)]
+    falls = sum(b < a for a, b in zip(losses, losses[1:], strict=False))
+    proof.exact("T21", f"{material}: steps of 12 cm that take less", falls, 0, len(losses))
+
+
+def test_the_way_round_bounds_what_walls_take() -> None:
+    """`min(LOS + walls, NLOS)`: behind ten metres of concrete it is as out of sight as behind one."""
+    losses = []
+    for things in ((), (wall("{loss: 1 dB}"),), (wall("{loss: 150 dB}"),), (wall("{loss: 200 dB}"),)):
+        losses.append(loss_cdb(world(*things, path_loss="environment: indoor", far=30)))
+    assert losses[0] + 100 == losses[1] < losses[2] == losses[3]
+
+
+def test_strict_sight_is_cut_by_anything() -> None:
+    strict = "environment: free_space, strict_los: true"
+    fabric = Fabric(world(path_loss=strict))
+    causes = []
+    for tick, y in enumerate([5.0, 0.0, 5.0]):
+        fabric.turn_to(frame_with(fabric.deployment, (0.0, y, HIGH), tick))
+        causes.append(heard(fabric, sequence=tick + 1).cause)
+    assert causes == ["", "blocked", ""]

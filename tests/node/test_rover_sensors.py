@@ -1,0 +1,140 @@
+"""What rovers measure and how they are commanded: exact without noise, Gaussian with it, and from the frame alone."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from math import inf, nan, pi, sqrt
+from typing import Final
+
+import pytest
+
+from foosim.node.actuators.drive import DriveActuator
+from foosim.node.sensors import make_sensor
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.start import initial_numbers
+
+PLACED: Final = (
+    "robots.rover01.x=2 m",
+    "robots.rover01.y=-1 m",
+    "robots.rover01.heading=0 deg",
+    "robots.base.x=-15 m",
+    "scenery={}",
+)
+SENSORS: Final = "robots.rover01.sensors."
+
+
+class Fitted:
+    """The sensors of rover01 in a hall of one's own."""
+
+    def __init__(self, text: str) -> None:
+        self.deployment: Deployment = load_deployment(text, "hall.yaml")
+        self.layout: Layout = build_layout(self.deployment)
+        self.numbers = initial_numbers(self.deployment, self.layout)
+        self.rover = self.layout["rover01"]
+
+    def sample(self, channel: str, tick: int = 0) -> tuple[float, ...]:
+        settings = self.deployment.robots["rover01"].sensors[channel]
+        raw = make_sensor(settings, self.deployment, self.layout, self.rover, channel).sample(self.numbers, tick)
+        return struct.unpack(f"<{len(raw) // 8}d", raw)
+
+    def turn(self, heading: float) -> None:
+        self.numbers[self.rover.offsets["heading"]] = heading
+
+
+def test_without_noise_pose_odometry_and_battery_are_the_frame(fleet_text: Callable[..., str]) -> None:
+    quiet = ["pose.position_noise=0 m", "pose.heading_noise=0 deg", "odometry.noise=0 m", "battery.noise=0 V"]
+    fitted = Fitted(fleet_text(1, *PLACED, *(SENSORS + one for one in quiet)))
+    fitted.turn(0.5)
+    travel = fitted.rover.offsets["wheel_travel"]
+    fitted.numbers[travel : travel + 2] = 3.0, 4.0
+    assert fitted.sample("pose") == (2.0, -1.0, 0.5)
+    assert fitted.sample("odometry") == (3.0, 4.0)
+    share, voltage = fitted.sample("battery")
+    assert share == pytest.approx(0.9) and voltage == pytest.approx(21.0 + 0.9 * 8.4)
+
+
+def test_noise_has_the_spread_that_is_declared_and_is_each_tick_s_own(fleet_text: Callable[..., str]) -> None:
+    fitted = Fitted(fleet_text(1, *PLACED))
+    for channel, truth, sds in (
+        ("pose", (2.0, -1.0, 0.0), (0.02, 0.02, pi / 180)),
+        ("odometry", (0.0, 0.0), (0.001, 0.001)),
+        ("battery", (0.9, 28.56), (0.0, 0.05)),
+    ):
+        settings = fitted.deployment.robots["rover01"].sensors[channel]
+        sensor = make_sensor(settings, fitted.deployment, fitted.layout, fitted.rover, channel)
+        drawn = [struct.unpack(f"<{len(truth)}d", sensor.sample(fitted.numbers, tick)) for tick in range(2000)]
+        for column, mean, sd in zip(zip(*drawn, strict=True), truth, sds, strict=True):
+            errors = [value - mean for value in column]
+            assert abs(sum(errors) / 2000) <= 3.29 * sd / sqrt(2000) + 1e-12
+            assert sqrt(sum(error * error for error in errors) / 2000) == pytest.approx(sd, rel=0.06, abs=1e-12)
+        assert drawn[7] == fitted.sample(channel, 7)
+
+
+RAYS: Final = (SENSORS + "proximity.rays=4", SENSORS + "proximity.noise=0 m", SENSORS + "proximity.range=100 m")
+
+
+def test_rays_reach_the_walls_from_the_hull_and_turn_with_the_rover(fleet_text: Callable[..., str]) -> None:
+    fitted = Fitted(fleet_text(1, *PLACED, *RAYS))
+    ahead, left, behind, right = 20 - 2 - 0.3, 12.5 + 1 - 0.3, 20 + 2 - 0.3, 12.5 - 1 - 0.3
+    assert fitted.sample("proximity") == pytest.approx((ahead, left, behind, right))
+    fitted.turn(pi / 2)
+    assert fitted.sample("proximity") == pytest.approx((left, behind, right, ahead))
+
+
+@pytest.mark.parametrize(
+    ("thing", "free"),
+    [
+        ("{shape: box, x: 5 m, y: -1 m, z: 1 m, length: 2 m, width: 1 m, height: 2 m}", 1.7),
+        ("{shape: box, x: 5 m, y: -1 m, z: 1 m, length: 2 m, width: 2 m, height: 2 m, yaw: 45 deg}", 2.7 - sqrt(2)),
+        ("{shape: box, x: 5 m, y: -1 m, z: 1 m, length: 2 m, width: 1 m, height: 2 m, yaw: 90 deg}", 2.2),
+        ("{shape: box, x: 5 m, y: -1.6 m, z: 1 m, length: 2 m, width: 1 m, height: 2 m}", 17.7),
+        ("{shape: box, x: 5 m, y: -1 m, z: 3 m, length: 2 m, width: 1 m, height: 2 m}", 17.7),
+    ],
+)
+def test_a_ray_ends_at_what_it_hits_first(fleet_text: Callable[..., str], thing: str, free: float) -> None:
+    fitted = Fitted(fleet_text(1, *PLACED, *RAYS, f"scenery={{thing: {thing}}}"))
+    assert fitted.sample("proximity")[0] == pytest.approx(free)
+
+
+def test_rays_end_at_other_rovers_and_stations(fleet_text: Callable[..., str]) -> None:
+    others = ("robots.rover02.x=4 m", "robots.rover02.y=-0.82 m", "robots.base.x=2 m", "robots.base.y=2 m")
+    fitted = Fitted(fleet_text(2, *PLACED, *RAYS, *others))
+    ways = fitted.sample("proximity")
+    assert ways[0] == pytest.approx(2.0 - sqrt(0.3**2 - 0.18**2) - 0.3), "a chord off the middle"
+    assert ways[1] == pytest.approx(3.0 - 0.2 - 0.3)
+
+
+def test_beyond_its_range_a_ray_sees_nothing_and_has_no_noise(fleet_text: Callable[..., str]) -> None:
+    fitted = Fitted(fleet_text(1, *PLACED, "robots.rover01.x=18 m", SENSORS + "proximity.noise=0.2 m"))
+    drawn = [fitted.sample("proximity", tick) for tick in range(50)]
+    assert {ways[8] for ways in drawn} == {4.0}, "behind it is nothing"
+    ahead = [ways[0] for ways in drawn]
+    assert len(set(ahead)) == 50 and sum(ahead) / 50 == pytest.approx(1.7, abs=0.1)
+    assert all(0.0 <= way <= 4.0 for ways in drawn for way in ways)
+    assert len({ways[0] - ways[1] for ways in drawn}) == 50, "each ray has noise of its own"
+
+
+@pytest.mark.parametrize(
+    ("payload", "wanted"),
+    [
+        (struct.pack("<2d", 0.5, -0.25), [0.5, -0.25]),
+        (struct.pack("<2d", 7.0, -7.0), [1.2, -1.2]),
+        (struct.pack("<2d", nan, 0.0), None),
+        (struct.pack("<2d", 0.0, -inf), None),
+        (bytes(15), None),
+        (bytes(24), None),
+        (b"", None),
+    ],
+)
+def test_the_drive_holds_speeds_within_its_own_and_refuses_the_rest(
+    fleet_text: Callable[..., str], payload: bytes, wanted: list[float] | None
+) -> None:
+    fitted = Fitted(fleet_text(1, *PLACED))
+    actuator, at = DriveActuator(fitted.deployment, fitted.rover), fitted.rover.offsets["wanted"]
+    fitted.numbers[at : at + 2] = [0.1, 0.2]
+    assert actuator.accept(payload, fitted.numbers) is (wanted is not None)
+    assert fitted.numbers[at : at + 2] == (wanted or [0.1, 0.2])
+    assert [speed for speed, _ in actuator.command(fitted.numbers)] == fitted.numbers[at : at + 2]

@@ -1,0 +1,165 @@
+"""A hall in a deployment: its schema and what it refuses, its layout, its scene, and what stands in a rover's way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from foosim.protocol.assign import Assignment, reach_of
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.errors import DeploymentError, Malformed
+from foosim.protocol.frame import fitting_edits
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import Add, Edit, Freeze, Push, Remove, Thaw
+from foosim.protocol.obstacles import Circle, Rectangle, obstacle, obstacles_of
+from foosim.protocol.scene import Cylinder, Shape, antenna_position, forward_kinematics
+from foosim.protocol.scenes import build_scene
+from foosim.protocol.start import initial_frame, initial_numbers
+
+DEPLOY: Final = Path(__file__).parents[2] / "deploy"
+WAREHOUSE: Final = (DEPLOY / "warehouse.yaml").read_text()
+TABLE: Final = (DEPLOY / "table.yaml").read_text()
+DEPLOYMENT: Final = load_deployment(WAREHOUSE, "warehouse.yaml")
+
+
+def problems(text: str, *sets: str) -> list[str]:
+    with pytest.raises(DeploymentError) as error:
+        apply_sets(text, "x.yaml", sets)
+    return [problem.partition(": ")[2] for problem in error.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("setting", "problem"),
+    [
+        ("robots.base={model: camera, sensors: {}}",
+         "robots.base.model: a robot of a table in a world without one, 'camera'"),
+        ("robots.rover01.x=3 m", "robots.rover01.x: the rover starts in a wall of the hall, '3 m, 12.4 m'"),
+        ("robots.rover01.x=-1 m", "robots.rover01.x: the rover starts in scenery.shelf-north-outer-2, '-1 m, 9 m'"),
+        ("robots.rover03.x=4 m", "robots.rover03.x: the rover starts in the rover rover01, '4 m, 6.5 m'"),
+        ("robots.rover01.x=-17.1 m", "robots.rover01.x: the rover starts in the station base, '-17.1 m, 0 m'"),
+        ("robots.rover01.heading=90", "robots.rover01.heading: not an angle (a number and one of rad, mrad, deg), 90"),
+        ("robots.rover01.charge=120 %", "robots.rover01.charge: out of range 0 % to 100 %, '120 %'"),
+        ("robots.rover01.sensors.pose.kind=pos",
+         "robots.rover01.sensors.pose.kind: not one of battery, odometry, pose, proximity, 'pos', nearest is 'pose'"),
+        ("robots.rover01.sensors.proximity.rays=0", "robots.rover01.sensors.proximity.rays: less than 1, 0"),
+        ("robots.rover01.sensors.drive={kind: battery, rate: 1 Hz, noise: 0 V}",
+         "robots.rover01.sensors: a reserved name, 'drive'"),
+        ("robots.base.sensors={}", "robots.base: unknown key, 'sensors'"),
+        ("scenery.goods-1.surface=floor",
+         "scenery.goods-1.surface: a surface for a ball, in a world without one, 'floor'"),
+        ("hall.rover.radius=13 m", "hall.rover.radius: more than half of the hall's least side, '13 m'"),
+        ("hall.rover.drive.track=70 cm",
+         "hall.rover.drive.track: the wheels would be outside of the rover: more than twice its radius, '70 cm'"),
+        ("hall.rover.battery.empty=30 V", "hall.rover.battery.empty: not below the full battery's voltage, '30 V'"),
+        ("hall.rover.battery.capacity=3 V",
+         "hall.rover.battery.capacity: not an energy (a number and one of J, kJ, Wh, kWh), '3 V'"),
+        ("players.pilot01.process=west", "players.pilot01.process: a name that is also one of nodes, 'west'"),
+        ("players.pilot01.process=vhub", "players.pilot01.process: a reserved name, 'vhub'"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused_with_its_place(
+    fleet_text: Callable[..., str], setting: str, problem: str
+) -> None:
+    elsewhere = {"'3 m, 12.4 m'": "y=12.4 m", "'-1 m, 9 m'": "y=9 m", "0 m'": "y=0 m", "'4 m, 6.5 m'": "y=6.5 m"}
+    more = [f"robots.rover01.{y}" for end, y in elsewhere.items() if problem.endswith(end)]
+    more += ["robots.rover03.y=6.5 m", "robots.rover01.x=4.2 m"] if "rover03" in setting else []
+    assert problems(fleet_text(3), setting, *more)[:1] == [problem]
+
+
+def test_a_process_has_its_players_on_one_host() -> None:
+    hosts = "hosts={a: {address: 10.0.0.1}, b: {address: 10.0.0.2}}"
+    found = problems(WAREHOUSE, hosts, "players.pilot01.host=a")
+    assert found[0] == "players.pilot01.process: a process whose players are not all on the same host, 'fleet'"
+
+
+def test_a_world_is_a_table_or_a_hall() -> None:
+    hall = "hall={length: 4 m, width: 4 m}"
+    assert "a hall beside a table: a world is one of them, 'hall'" in problems(TABLE, hall)
+    neither = WAREHOUSE.replace("\nhall:\n", "\nhal:\n")
+    assert "missing key of a world, which is a table or a hall, 'table'" in problems(neither)
+    rover = "{model: rover, x: 0 m, y: 0 m, sensors: {}}"
+    assert "robots.camera.model: a robot of a hall in a world without one, 'rover'" in problems(
+        TABLE, f"robots.camera={rover}"
+    )
+
+
+def test_a_hall_has_no_ball_no_score_and_nothing_can_be_added() -> None:
+    layout = build_layout(DEPLOYMENT)
+    assert {entity.model for entity in layout.entities} == {"rover", "station"} and "world" not in layout
+    assert initial_frame(DEPLOYMENT).score is None
+    with pytest.raises(Malformed, match="ball b2 cannot be added: nothing can be to a hall"):
+        build_layout(DEPLOYMENT, [("b2", "ball")])
+    still = (0.0, 0.0, 0.0)
+    edits: list[Edit] = [Add("b2", "ball", still, still), Remove("b2"), Push("rover01", still)]
+    assert fitting_edits(layout, [*edits, Freeze("rover01"), Thaw("base")]) == [Freeze("rover01"), Thaw("base")]
+
+
+def test_rovers_start_where_they_are_declared() -> None:
+    frame = initial_frame(DEPLOYMENT)
+    assert frame.vector("rover03", "position", 3) == [-6.25, 11.25, 0.0]
+    assert frame.at("rover03", "heading") == pytest.approx(-pi / 2)
+    assert frame.vector("rover03", "orientation", 4) == pytest.approx([0.0, 0.0, -(0.5**0.5), 0.5**0.5])
+    assert frame.at("rover03", "charge") == pytest.approx(0.95 * 250 * 3600)
+
+
+def test_each_rover_is_an_island_that_its_owner_solves() -> None:
+    layout, owners = build_layout(DEPLOYMENT), DEPLOYMENT.owners()
+    shares = Assignment(layout, reach_of(DEPLOYMENT, layout), ["east", "west"], owners).shares([])
+    for node, share in shares.items():
+        mine = [entity for entity in layout.entities if owners[entity.name] == node]
+        assert share.islands == tuple((entity.index,) for entity in mine if entity.model == "rover")
+        assert share.solved == tuple(entity.index for entity in mine)
+
+
+def test_the_scene_has_rovers_where_they_are_and_antennas_above_them() -> None:
+    layout = build_layout(DEPLOYMENT)
+    scene, numbers = build_scene(DEPLOYMENT, layout), initial_numbers(DEPLOYMENT, layout)
+    rover, base = scene.bodies["rover03"], scene.bodies["base"]
+    ((name, position, orientation),) = forward_kinematics(rover, layout["rover03"], numbers)
+    assert (name, position) == ("rover03", (-6.25, 11.25, 0.0)) and orientation[2] < 0.0
+    assert antenna_position(rover, layout["rover03"], numbers) == (-6.25, 11.25, 0.5)
+    assert antenna_position(base, layout["base"], numbers) == (-17.5, 0.0, 3.0)
+    hulls = [shape.geometry for body in (rover, base) for shape in body.links[0].shapes[:1]]
+    assert hulls == [Cylinder(0.3, 0.35), Cylinder(0.2, 1.2)]
+
+
+def test_obstacles_are_the_scenery_from_above() -> None:
+    found = obstacles_of(DEPLOYMENT)
+    assert len(found) == 4 + 1 + len(DEPLOYMENT.scenery)
+    assert Rectangle(-12.5, 8.75, 1.0, 0.0, 4.25, 0.5) in found and Circle(-17.5, 0.0, 0.2) in found
+    upright = Shape(Cylinder(0.4, 3.0), "walls", (0, 0, 0, 1), (1.0, 2.0, 1.5))
+    assert obstacle(upright) == Circle(1.0, 2.0, 0.4)
+    lying = Shape(Cylinder(0.4, 3.0), "walls", (0, 0, 0, 1), (1.0, 2.0, 0.4), (0.5**0.5, 0.0, 0.0, 0.5**0.5))
+    around = obstacle(lying)
+    assert isinstance(around, Rectangle)
+    assert (around.half_along, around.half_across) == pytest.approx((0.4, 1.5))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "clear"),
+    [
+        (2.5, 0, True),
+        (2.49, 0, False),
+        (0, 1.5, True),
+        (0, 1.49, False),
+        (2.35, 1.35, False),
+        (2.36, 1.36, True),
+        (0, 0, False),
+    ],
+)
+def test_a_circle_is_clear_of_a_rectangle_from_where_it_touches(x: float, y: float, clear: bool) -> None:
+    straight, turned = Rectangle(0, 0, 1, 0, 2, 1), Rectangle(0, 0, 0, 1, 2, 1)
+    for side_x, side_y in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
+        assert straight.is_clear(side_x * x, side_y * y, 0.5) is clear
+        assert turned.is_clear(-side_y * y, side_x * x, 0.5) is clear
+
+
+def test_players_that_name_a_process_share_it(fleet_text: Callable[..., str]) -> None:
+    deployment = load_deployment(fleet_text(2, "players.pilot02.process=own"), "hall.yaml")
+    assert deployment.player_processes() == {"fleet": ["dispatch", "pilot01"], "own": ["pilot02"]}
+    table = load_deployment(TABLE, "table.yaml")
+    assert table.player_processes() == {"player-blue": ["player-blue"], "player-red": ["player-red"]}

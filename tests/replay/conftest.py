@@ -1,0 +1,132 @@
+"""Captures of short runs that the tests of replays share, and the command as a person types it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import pytest
+from mcap import records
+from typer.testing import CliRunner
+
+from foosim.protocol.errors import Refused
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.replay_command import app
+from foosim.rehearsal.system import System
+from foosim.vhub import capture_file, capture_writer
+from foosim.vhub.capture_file import declare_topics, write_all
+from foosim.vhub.mcap_file import McapFile, McapWriter, Message
+from foosim.vhub.rows import PROFILE
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TICKS: Final = 300
+TICK_NS: Final = 2_000_000
+ADDED_AT: Final = 60
+
+
+def disturb(system: System) -> None:
+    system.at_tick(20, lambda: system.request("push", impulse=[0.03, 0.01, 0.0]))
+    system.at_tick(ADDED_AT, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
+
+
+def capture_to(path: Path, ticks: int = TICKS) -> Path:
+    rehearse(TABLE.read_text(), TABLE.name, ticks, 2, ["engine=pure"], prepare=disturb, capture=path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of 0.6 s with players and an added ball, in many small chunks; not to be changed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(capture_writer, "BATCH_ROWS", 100)
+        patch.setattr(capture_file, "CHUNK_BYTES", 1)
+        return capture_to(tmp_path_factory.mktemp("replay") / "run.mcap")
+
+
+@pytest.fixture(scope="session")
+def again(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same run once more, in a large chunk."""
+    return capture_to(tmp_path_factory.mktemp("replay") / "again.mcap")
+
+
+def contents_of(path: Path) -> list[Any]:
+    """Messages, metadata and attachments of a capture, in its order."""
+    with path.open("rb") as stream:
+        return list(McapFile(stream, path.stat().st_size, str(path)).contents())
+
+
+def messages_of(path: Path) -> list[Message]:
+    return [content for content in contents_of(path) if isinstance(content, Message)]
+
+
+def rewritten(path: Path, out: Path, messages: Iterable[Message]) -> Path:
+    """Write a capture with other messages."""
+    with out.open("xb", buffering=0) as stream:
+        mcap = McapWriter(partial(write_all, stream.fileno()), PROFILE)
+        channels = declare_topics(mcap)
+        for content in contents_of(path):
+            if isinstance(content, records.Attachment):
+                mcap.add_attachment(content.name, content.media_type, content.data)
+            elif isinstance(content, records.Metadata):
+                mcap.add_metadata(content.name, content.metadata)
+        for message in messages:
+            stamps = message.log_ns, message.publish_ns, message.sequence
+            mcap.add_message(channels[message.topic], *stamps, message.data)
+        mcap.finish()
+    return out
+
+
+def with_row(message: Message, **fields: Any) -> Message:
+    """A message whose row has other fields."""
+    row = {**msgspec.json.decode(message.data), **fields}
+    return Message(message.topic, message.log_ns, message.publish_ns, message.sequence, msgspec.json.encode(row))
+
+
+def damaged(path: Path, out: Path) -> Path:
+    """Write a capture with one wrong bit within the compressed data of a chunk in the middle."""
+    content = bytearray(path.read_bytes())
+    chunks = [found.start() for found in re.finditer(re.escape(b"\x28\xb5\x2f\xfd"), content)]
+    content[chunks[len(chunks) // 2] + 40] ^= 1
+    out.write_bytes(content)
+    return out
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a command did: its exit code, and what it said to whom."""
+
+    code: int
+    out: str
+    err: str
+
+
+def replay(*arguments: str | Path) -> Done:
+    """Run `foosim-replay` as a person would: what is refused is told on standard error."""
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    if isinstance(done.exception, Refused):
+        return Done(done.exception.exit_code, done.stdout, f"{done.stderr}{done.exception}\n")
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return Done(done.exit_code, done.stdout, done.stderr)
+
+
+@pytest.fixture
+def bad_files(tmp_path: Path, run: Path) -> list[Path]:
+    """Files that no command takes for a capture: absent, empty, of other people, of another format, a folder."""
+    files = {"empty": b"", "text": b"not a capture\n", "magic": b"\x89MCAP0\r\n"}
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+    other = tmp_path / "format.mcap"
+    with other.open("xb", buffering=0) as stream:
+        mcap = McapWriter(partial(write_all, stream.fileno()), PROFILE)
+        declare_topics(mcap)
+        mcap.add_metadata("foosim", {"format": "99", "deployment": "table.yaml"})
+        mcap.finish()
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    return [tmp_path / "absent", *(tmp_path / name for name in files), other, folder]

@@ -1,0 +1,100 @@
+"""What a capture holds in short, and the exit codes by which a recovery says what it could save."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from foosim.protocol.journal import Journal
+from foosim.rehearsal.diff import diff_captures
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings
+from foosim.vhub import capture_file, capture_writer
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import open_capture
+from tests.replay.conftest import TABLE, damaged, messages_of, replay
+
+
+def test_info_counts_what_the_capture_has(run: Path) -> None:
+    info, capture = capture_info(run), open_capture(run)
+    packets = capture.packets
+    assert info.packets["offered"] == len(packets)
+    assert dict(info.channels) == Counter(packets.channel.tolist())
+    assert dict(info.causes) == Counter(packets.cause[packets.fate == "dropped"].tolist()) != {}
+    assert info.payload_bytes == int(packets.size.sum()) and info.clients == ("player-blue", "player-red")
+    assert dict(info.topics) == Counter(message.topic for message in messages_of(run))
+    shown = replay("info", run)
+    assert shown.code == 0 and "\n  dropped by " in shown.out and "\n  clients player-blue, player-red\n" in shown.out
+    content = msgspec.json.decode(replay("info", run, "--json").out)
+    assert content["causes"] == dict(info.causes) and content["channels"] == dict(info.channels)
+
+
+def test_info_of_an_unfinished_one_says_so(run: Path, tmp_path: Path) -> None:
+    left = tmp_path / "left.mcap"
+    left.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
+    shown = replay("info", left)
+    assert shown.code == 0 and "not finished, " in shown.out
+
+
+def test_info_refuses_what_is_no_capture(bad_files: list[Path]) -> None:
+    for bad in bad_files:
+        done = replay("info", bad)
+        assert done.code == 2 and done.err.startswith(f"{bad}: ") and done.err.count("\n") == 1
+
+
+def test_a_finished_capture_is_clean(run: Path) -> None:
+    before = run.read_bytes()
+    done = replay("recover", run)
+    assert done.code == 0 and done.out == f"capture {run} is finished already\n" and run.read_bytes() == before
+
+
+def test_without_a_journal_something_is_lost(run: Path, tmp_path: Path) -> None:
+    left = tmp_path / "left.mcap"
+    left.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
+    done = replay("recover", left, "--json")
+    content = msgspec.json.decode(done.out)
+    assert done.code == 3 and not content["whole"] and content["torn_bytes"] > 0
+    assert content["problem"] == "there is no journal of it" and content["added_ticks"] == 0
+    assert open_capture(left).finished and replay("recover", left).code == 0
+
+
+def test_with_its_journal_nothing_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(capture_writer, "BATCH_ROWS", 100)
+    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
+    path, left, journals = tmp_path / "run.mcap", tmp_path / "left.mcap", tmp_path / "journals"
+    records: list[bytes] = []
+
+    def note(process: str, record: bytes) -> None:
+        if process == "vhub":
+            records.append(record)
+
+    settings = Settings(on_journal=note)
+    rehearse(TABLE.read_text(), TABLE.name, 60, 1, ["engine=pure"], settings, capture=path)
+    with Journal(journals, "vhub") as journal:
+        for record in records:
+            journal.append(record)
+    left.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+    done = replay("recover", left, "--journals", journals)
+    assert done.code == 0, done
+    assert "of them from its journal" in done.out
+    found = diff_captures(path, left)
+    differing = {topic for topic, channel in found.channels.items() if channel.first is not None}
+    assert differing <= {"/tick", "/tf", "/frame"}, "the last frame was committed only"
+    assert found.channels["/packets"].first is None, "each has its fate again"
+    assert int(open_capture(left).ticks[-1]) == 59, "the journal ends with the last closed tick"
+
+
+def test_what_cannot_be_recovered_fails_and_stays_as_it_is(run: Path, tmp_path: Path, bad_files: list[Path]) -> None:
+    for bad in bad_files:
+        before = bad.read_bytes() if bad.is_file() else b""
+        done = replay("recover", bad)
+        assert done.code == 1 and str(bad) in done.err, done
+        assert not bad.is_file() or bad.read_bytes() == before
+    torn = damaged(run, tmp_path / "torn.mcap")
+    torn.write_bytes(torn.read_bytes()[:-100])
+    before = torn.read_bytes()
+    done = replay("recover", torn)
+    assert done.code == 1 and "would be lost" in done.err and torn.read_bytes() == before

@@ -1,0 +1,142 @@
+"""What another network would have made of a capture: every fate again by its own, other fates by another one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from foosim.protocol.deployment_file import load_deployment, with_network
+from foosim.protocol.errors import DeploymentError
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.whatif import WhatIf, _age_ms, what_if
+from foosim.rehearsal.whatif_picture import picture
+from foosim.vhub.capture_reader import open_capture
+from tests.replay.conftest import TABLE, Done, capture_to, disturb, replay
+
+NETWORKS: Final = {
+    "wire": "links: [{id: w, from: '*', to: '*', delay: 1 ms, jitter: {shape: gamma, sd: 1 ms}, rate: 400 kbit/s,"
+    " queue: {packets: 6, drop: codel}, burst: {loss: 5 %, mean_bad: 20 ms}, duplicate: 5 %,"
+    " corrupt: {bit_error_rate: 0.0005 p, deliver: true}, reorder: {probability: 2 %, extra: 4 ms}}]",
+    "chains": "links: [{id: in, from: 'player*', to: '*', burst: {loss: 10 %, mean_burst: 3}, order: free},"
+    " {id: out, from: '*', to: 'player*', markov4: {p13: 5 %, p31: 30 %}, ttl: 3 ms, delay: 2 ms}]",
+    "wifi": "radios: {w: {preset: wifi_5_indoor, fading: {kind: rician}, duplicate: 3 %}}, robots: {'*': [w]}",
+    "zigbee": "radios: {z: {preset: zigbee}}, robots: {'*': [z]}",
+    "lora": "radios: {l: {preset: lora_eu868, duty_cycle: 10 %}}, robots: {'*': [l]}",
+    "lte": "radios: {m: {preset: lte}}, robots: {'*': [m]}",
+    "events": "links: [{id: w, from: '*', to: '*', delay: 1 ms}], events: ["
+    "{at: 40 ms, for: 60 ms, partition: [[player-red], [rest]]}, {at: 90 ms, for: {exponential: 30 ms},"
+    " clog: {from: player-blue, to: '*'}}, {at: 100 ms, set: {link: w, loss: 30 %}},"
+    " {at: 140 ms, until: 300 ms, chaos: {}}]",
+}
+PLACES: Final = "places: {player-red: [-20 m, 3 m, 1 m], player-blue: [3 m, 0 m, 1 m], camera: [0 m, 0 m, 2 m]}"
+
+
+def captured(path: Path, network: str, *sets: str) -> Path:
+    sets = ("engine=pure", f"network={{{NETWORKS[network]}, {PLACES}}}", *sets)
+    rehearse(TABLE.read_text(), TABLE.name, 200, 2, list(sets), prepare=disturb, capture=path)
+    return path
+
+
+@pytest.mark.parametrize("network", NETWORKS)
+def test_by_its_own_network_every_fate_is_the_captured_one(tmp_path: Path, network: str) -> None:
+    """Every field of every row, whatever the stages remember; frames between captured ones are computed again."""
+    found = what_if(open_capture(captured(tmp_path / "run.mcap", network)))
+    assert (found.packets > 300, found.changed, found.inputs_changed) == (True, 0, 0)
+    assert found.causes == found.new_causes
+    assert all(link.before == link.after for link in found.links)
+    assert sum(link.offered for link in found.links) <= found.packets
+
+
+def test_frames_of_every_tick_are_read_and_not_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    capture = open_capture(captured(tmp_path / "run.mcap", "wifi", "capture.frames_every=1 tick"))
+    monkeypatch.setattr("foosim.rehearsal.whatif.Replica", None)
+    assert what_if(capture).changed == 0
+
+
+def changed_by(path: Path, *sets: str) -> WhatIf:
+    capture = open_capture(path)
+    about = capture.about
+    text = with_network(about.deployment_text, about.deployment_name, None, sets)
+    return what_if(capture, load_deployment(text, about.deployment_name))
+
+
+def test_a_worse_network_loses_more_of_the_same_draws(run: Path) -> None:
+    """Common random numbers: what a loss of 5 % takes, a loss of 10 % takes, too."""
+    lost = []
+    for loss in ("0 %", "5 %", "10 %"):
+        found = changed_by(run, f"network.links.everything.loss={loss}")
+        lost.append({(c.source, c.sequence, c.destination) for c in found.changes if c.new_cause == "random_loss"})
+        assert found.new_causes.get("random_loss", 0) >= len(lost[-1])
+    assert lost[0] < lost[1] < lost[2] and 20 < len(lost[1]) < len(lost[2])
+    slower = changed_by(run, "network.links.everything.delay=21 ms")
+    for link in slower.links:
+        assert link.after.delay_mean_ms == pytest.approx(link.before.delay_mean_ms + 20.0, abs=0.2)
+        assert link.after.age_ms > link.before.age_ms + 15.0
+
+
+def test_a_network_with_walls_needs_the_world_and_has_it(run: Path, tmp_path: Path) -> None:
+    other = tmp_path / "radio.yaml"
+    other.write_text(f"network: {{{NETWORKS['wifi']}, {PLACES}}}\n")
+    typed = replay("whatif", run, "--network", other, "--json", "--packets")
+    found = json.loads(typed.out)
+    assert found["changed"] > 100 and len(found["changes"]) == found["changed"]
+    assert set(found["new_causes"]) & {"collision", "snr"}
+
+
+def test_the_age_of_information_is_the_area_under_the_saw() -> None:
+    """Sent every 10 ms with a delay of 2 ms the age goes from 2 to 12; one that comes late changes nothing."""
+    sent = np.array([0, 10, 20, 30]) * 1_000_000
+    assert _age_ms(sent, sent + 2_000_000) == pytest.approx(7.0)
+    late = np.append(sent, 5_000_000), np.append(sent + 2_000_000, 25_000_000)
+    assert _age_ms(*late) == pytest.approx(7.0)
+    assert _age_ms(sent[:1], sent[:1] + 3_000_000) == 3.0
+
+
+def test_the_command_shows_links_and_draws_them(run: Path, tmp_path: Path) -> None:
+    drawing = tmp_path / "changed.svg"
+    typed = replay("whatif", run, "--set", "network.links.everything.loss=50 %", "--picture", drawing)
+    assert "changed" in typed.out and "random_loss" in typed.out and "red.goal" in typed.out
+    root = ElementTree.fromstring(drawing.read_text())
+    assert root.tag.endswith("svg") and len(root) > 50
+    again = replay("whatif", run, "--picture", drawing)
+    assert again.code == 1 and "File exists" in again.err
+
+
+def test_a_picture_of_many_links_is_bounded(run: Path) -> None:
+    found = what_if(open_capture(run))
+    many = WhatIf(1, 0, 0, found.links * 40, {}, {}, ())
+    assert "the first 200 of" in picture(many, "<run>") and "&lt;run&gt;" in picture(many, "<run>")
+    assert asdict(found)["changes"] == ()
+
+
+def bad(run: Path, *arguments: str | Path) -> Done:
+    typed = replay("whatif", run, *arguments)
+    assert typed.code == 2, typed.out
+    return typed
+
+
+def test_bad_input_is_refused_with_its_place(run: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.yaml"
+    other.write_text("network:\n  links:\n    - {id: a, from: '*', to: '*', loss: 12}\n")
+    assert f"{other}:3:41: network.links[0].loss: not a probability" in bad(run, "--network", other).err
+    other.write_text("links: []\n")
+    assert "missing key, 'network'" in bad(run, "--network", other).err
+    assert "cannot be read" in bad(run, "--network", tmp_path / "none.yaml").err
+    assert "not a setting of the network" in bad(run, "--set", "tick=4 ms").err
+    assert "nearest" in bad(run, "--set", "network.links.everything.los=4 %").err
+    with pytest.raises(DeploymentError):
+        with_network(TABLE.read_text(), TABLE.name, ("a: [", "x.yaml"), [])
+
+
+def test_an_unfinished_capture_is_judged_as_far_as_it_goes(tmp_path: Path) -> None:
+    whole = capture_to(tmp_path / "whole.mcap")
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(whole.read_bytes()[: whole.stat().st_size * 2 // 3])
+    found = what_if(open_capture(torn))
+    assert found.packets > 0
