@@ -374,6 +374,7 @@ class _Story:
         reorder = settings.reorder
         late = reorder is not None and self.words[Slot.REORDER] < chance_threshold(reorder.probability)
         spent = {
+            "phase": row.phase_ns,
             "queue": row.queue_ns,
             "access": row.access_ns,
             "airtime": row.airtime_ns,

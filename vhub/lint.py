@@ -259,10 +259,11 @@ def _runs(steps: Matrix, lost: Sequence[float]) -> tuple[float, float | None]:
     count = len(steps)
     power = [[(step + (row == column)) / 2.0 for column, step in enumerate(line)] for row, line in enumerate(steps)]
     for _ in range(64):  # the chain that stays with 1/2 has the same shares, and no period
-        power = [
+        squared = [
             [sum(power[row][inner] * power[inner][column] for inner in range(count)) for column in range(count)]
             for row in range(count)
         ]
+        power = [[step / sum(line) for step in line] for line in squared]  # else rounding errors double, too
     shares = power[0]
     loss = sum(share * of for share, of in zip(shares, lost, strict=True))
     two = sum(shares[a] * lost[a] * steps[a][b] * lost[b] for a in range(count) for b in range(count))
@@ -420,10 +421,15 @@ def _has_queue(settings: Radio) -> bool:
 
 
 def _offered(deployment: Deployment, uses: Sequence[Use]) -> dict[tuple[str, str], float]:
-    """Return the packets per second that sensors and players offer, by rule and radio: of all on one air, else of the
-    busiest sender. What is published goes once for all where the radio broadcasts."""
+    """Return the packets per second that sensors and players offer, by rule and radio: of all on one air, else to the
+    busiest queue. What is published goes once for all where the radio broadcasts."""
     profiles = Profiles(deployment, deployment.network)
     flows: dict[tuple[tuple[str, str], str, str, str], float] = {}
+    queues: dict[tuple[str, str], dict[str, float]] = {}
+
+    def queue_of(profile: Profile, source: str, destination: str) -> str:
+        return f"{source}>{destination}" if profile.is_own_queue else source
+
     for player, spec in deployment.players.items():
         for source, channel in deployment.heard_by(player):
             robot = deployment.robots.get(source)
@@ -431,16 +437,17 @@ def _offered(deployment: Deployment, uses: Sequence[Use]) -> dict[tuple[str, str
                 continue
             profile = profiles.find(source, player, channel)
             once = _is_air(profile.settings) and profile.settings.published == "broadcast"
-            flows[_key(profile), source, "" if once else player, channel] = float(robot.sensors[channel].rate_hz)
+            flow = _key(profile), queue_of(profile, source, player), "" if once else player, channel
+            flows[flow] = float(robot.sensors[channel].rate_hz)
         for robot_name in spec.robots:
-            flows[_key(profiles.find(player, robot_name, "")), player, robot_name, ""] = float(spec.rate_hz)
-    senders: dict[tuple[str, str], dict[str, float]] = {}
-    for (key, source, _, _), rate_hz in flows.items():
-        senders.setdefault(key, {}).setdefault(source, 0.0)
-        senders[key][source] += rate_hz
+            profile = profiles.find(player, robot_name, "")
+            flows[_key(profile), queue_of(profile, player, robot_name), robot_name, ""] = float(spec.rate_hz)
+    for (key, queue, _, _), rate_hz in flows.items():
+        queues.setdefault(key, {}).setdefault(queue, 0.0)
+        queues[key][queue] += rate_hz
     found: dict[tuple[str, str], float] = {}
     for use in uses:
-        rates = senders.get((use.rule, use.radio), {})
+        rates = queues.get((use.rule, use.radio), {})
         found[use.rule, use.radio] = sum(rates.values()) if _is_air(use.settings) else max(rates.values(), default=0.0)
     return found
 

@@ -79,10 +79,11 @@ def fly(
 
 def asking(faults: Sequence[tuple[int, Fault]], asked: list[str]) -> Callable[[System], None]:
     def prepare(system: System) -> None:
+        def ask(event: dict[str, Any]) -> None:
+            asked.append(system.request("network", again_ns=3_000_000, event=event))
+
         for tick, event in EVENTS:
-            system.at_tick(
-                tick, lambda event=event: asked.append(system.request("network", again_ns=3_000_000, event=event))
-            )
+            system.at_tick(tick, partial(ask, event))
         for tick, fault in faults:
             system.at_tick(tick, partial(fault, system))
 

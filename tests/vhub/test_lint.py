@@ -1,0 +1,165 @@
+"""What a network means: the printed figures are those that packets then have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from math import inf
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.draws import draw_key, draw_words
+from foosim.protocol.impairments import Impairments
+from foosim.protocol.network import Network
+from foosim.protocol.radios import Radio
+from foosim.vhub.jitter import interpolate_ns, quantiles_ns
+from foosim.vhub.lint import Use, delay_of, meaning_of, meanings, ranges_of, residual_of, uses_alone, uses_of
+from foosim.vhub.lint_text import LINES_MAX, meaning_line, start_lines
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+APPROXIMATELY: Final = partial(pytest.approx, rel=1e-6)
+
+
+def radio(**settings: Any) -> Radio:
+    return Radio.model_validate(settings)
+
+
+def deployment(network: str) -> Deployment:
+    return load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [f"network={network}"]), TABLE.name)
+
+
+@pytest.mark.parametrize(
+    ("settings", "loss", "packets", "bad_ns"),
+    [
+        ({}, 0.0, None, None),
+        ({"loss": "2 %"}, 0.02, None, None),
+        ({"burst": {"loss": "1 %", "mean_bad": "40 ms"}}, 0.01, None, 40_000_000),
+        ({"burst": {"loss": "1 %", "mean_burst": 4.0}}, 0.01, 4.0, None),
+        ({"burst": {"loss": "10 %", "mean_bad": "1 s", "bad_loss": "50 %"}, "loss": "10 %"}, 0.19, None, 10**9),
+        ({"gilbert_elliott": {"p": "1 %", "r": "25 %"}}, 1 / 26, 4.0, None),
+        # A quarter of all is bad, half of that is lost; of what is lost 70 % is followed by bad again.
+        ({"gilbert_elliott": {"p": "10 %", "r": "30 %", "h": "50 %"}}, 0.125, 1 / (1 - 0.7 * 0.5), None),
+        ({"markov4": {"p13": "10 %", "p31": "50 %"}}, 1 / 6, 2.0, None),
+        ({"outages": {"mean_on": "3 s", "mean_off": "1 s"}}, 0.25, None, 10**9),
+    ],
+)
+def test_mean_loss_and_bursts(
+    settings: Mapping[str, Any], loss: float, packets: float | None, bad_ns: int | None
+) -> None:
+    mean, run, length_ns = residual_of(Impairments.model_validate(settings))
+    assert mean == APPROXIMATELY(loss) and length_ns == bad_ns
+    assert run == (None if packets is None else APPROXIMATELY(packets))
+
+
+@pytest.mark.parametrize(
+    "jitter",
+    [
+        {"shape": "gamma", "sd": "2 ms", "mean": "3 ms"},
+        {"shape": "pareto", "mean": "1 ms", "alpha": 2.5},
+        {"shape": "mixture", "parts": [{"share": "90 %", "to": "1 ms"}, {"share": "10 %", "to": "50 ms"}]},
+    ],
+    ids=lambda jitter: jitter["shape"],
+)
+def test_the_delay_is_that_of_the_table_that_draws_come_from(jitter: Mapping[str, Any]) -> None:
+    settings = Impairments.model_validate({"delay": "5 ms", "jitter": jitter})
+    mean_ns, sd_ns, p99_ns = delay_of(settings, {})
+    assert settings.jitter is not None
+    table, key = quantiles_ns(settings.jitter), draw_key(1, "lint")
+    drawn = sorted(
+        5_000_000 + interpolate_ns(table, word) for number in range(12_500) for word in draw_words(key, number)
+    )
+    mean = sum(drawn) / len(drawn)
+    sd = (sum((one - mean) ** 2 for one in drawn) / len(drawn)) ** 0.5
+    assert mean_ns == pytest.approx(mean, abs=5 * sd / len(drawn) ** 0.5)
+    assert sd_ns == pytest.approx(sd, rel=0.02 if jitter["shape"] != "pareto" else 0.2)
+    assert p99_ns == pytest.approx(drawn[int(0.99 * len(drawn))], rel=0.05)
+
+
+def test_ranges_are_where_the_formulas_say() -> None:
+    wifi = radio(preset="wifi_2_4_indoor")
+    los_m, nlos_m = ranges_of(wifi)
+    # 20 dBm, -94 dBm of noise, 3.3 dB that 136 B need at 6 Mbit/s; behind walls 17.3 + 38.3 lg d + 24.9 lg 2.437
+    assert nlos_m == pytest.approx(10 ** ((20 + 93.99 - 3.3 - 17.3 - 9.633) / 38.3), rel=0.02)
+    assert los_m is not None and nlos_m is not None and los_m > nlos_m
+    assert ranges_of(radio(preset="range_only", path_loss={"range": "7 m"})) == (7.0, None)
+    assert ranges_of(radio(preset="range_only", path_loss={"strict_los": True})) == (10.0, 0.0)
+    assert ranges_of(radio(preset="wired_1g")) == (None, None)
+    assert ranges_of(radio(medium="radio", tx_power="100 dBm", sensitivity="-200 dBm"))[0] == inf
+    lora_m, _ = ranges_of(radio(preset="lora_eu868", spreading_factor=7))
+    assert lora_m == pytest.approx(10 ** ((14 + 124 - 7.7) / 37.6), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("settings", "warning"),
+    [
+        ({"loss": "60 %"}, "more than half of all packets is lost: 60.0 %"),
+        ({"delay": "20 ms", "ttl": "10 ms"}, "the mean delay of 20 ms is above ttl, 10 ms"),
+        ({"preset": "wifi_5_indoor", "tx_power": "-80 dBm"}, "it does not reach 1 m (0.00 m)"),
+        ({"allow": False}, "nothing passes: allow is off"),
+        ({"preset": "lora_eu868", "spreading_factor": 12}, "mtu is above the 51 B of LoRaWAN at spreading factor 12"),
+        ({"medium": "wired", "rate": "1 Mbit/s", "queue": {"bytes": "500 B"}},
+         "a packet of 1500 B does not fit into the queue of 500 B"),
+        ({"queue": {"packets": 3}}, "the queue has no effect: no rate, no medium"),
+    ],
+)  # fmt: skip
+def test_what_looks_wrong_is_said(settings: Mapping[str, Any], warning: str) -> None:
+    assert warning in meaning_of(Use("one", "", radio(**settings)), {}).warnings
+
+
+def test_every_link_of_a_deployment_is_in_one_line() -> None:
+    made = deployment(
+        "{radios: {wifi: {preset: wifi_5_indoor}, idle: {preset: lora_eu868}}, robots: {'*.goal': [wifi],"
+        " player-red: [wifi]}, places: {player-*: [1 m, 1 m, 1 m]}, links: [{id: seen, from: camera, to: 'player-*',"
+        " channels: ball, loss: 5 %}]}"
+    )
+    uses = {(use.rule, use.radio): use for use in uses_of(made)}
+    assert {key: use.links for key, use in uses.items()} == {
+        ("seen", ""): 2,
+        ("wifi", "wifi"): 6,
+        ("perfect", ""): 11 * 10 - 6,
+        ("idle", "idle"): 0,
+    }
+    assert uses["seen", ""].example == ("camera", "player-blue")
+    assert [meaning.warnings for meaning in meanings(made) if meaning.rule == "idle"] == [("no link uses it",)]
+
+
+def test_who_offers_more_than_is_carried_is_warned_of() -> None:
+    made = deployment("{links: [{id: thin, from: '*', to: '*', rate: 64 kbit/s}]}")
+    (thin,) = meanings(made)
+    assert thin.warnings == ("one sender offers 100 packets/s by what is declared; of 100 B it carries 80/s",)
+
+
+def test_a_network_alone_is_shown_over_its_radios() -> None:
+    network = Network.model_validate(
+        {
+            "radios": {"wifi": {"preset": "wifi_5_indoor"}, "wire": {"preset": "wired_1g"}},
+            "links": [
+                {"id": "any", "from": "*", "to": "*", "loss": "1 %"},
+                {"id": "far", "between": ["a", "b"], "via": "wire"},
+            ],
+        }
+    )
+    assert [(use.rule, use.radio, use.links) for use in uses_alone(network)] == [
+        ("wifi", "wifi", None),
+        ("wire", "wire", None),
+        ("any", "wifi", None),
+        ("any", "wire", None),
+        ("far", "wire", None),
+    ]
+    assert [use.rule for use in uses_alone(Network())] == ["perfect"]
+
+
+def test_lines_are_for_people() -> None:
+    wifi = meaning_of(Use("wifi", "wifi", radio(preset="wifi_5_indoor"), 2, ("a", "b")), {})
+    assert meaning_line(wifi) == (
+        "wifi: wifi, 2 links (as a to b), loss 0.05 %, bursts of 20 ms, delay 600 us, sd 301 us, p99 1.68 ms, "
+        "at 54 Mbit/s, 100 B: 44 us, 4.03 Mbit/s, 10 stations 4.319 Mbit/s, 1500 B: 248 us, 29.81 Mbit/s, "
+        "10 stations 26.76 Mbit/s, range 7.37 km in sight, behind walls 112 m, queue of 17.3 ms"
+    )
+    lines = start_lines([wifi] * 40, "some.yaml")
+    assert len(lines) == LINES_MAX and lines[-1] == "and 29 more: foosim-net lint some.yaml"
+    assert start_lines([wifi], "some.yaml") == [f"network {meaning_line(wifi)}"]
