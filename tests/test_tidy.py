@@ -75,6 +75,7 @@ SHELLS = {
     "rehearsal/rehearse_command.py",
     "rehearsal/replay_command.py",
     "rehearsal/verify.py",
+    "rehearsal/whatif_command.py",
     "supervisor/children.py",
     "supervisor/cli.py",
     "supervisor/control.py",
