@@ -17,6 +17,7 @@ from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
+from foosim.protocol.network import EVENTS_MAX
 from foosim.supervisor.requests import ANSWERS_KEPT
 
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
@@ -33,6 +34,11 @@ BOUNDS: Final[Mapping[str, int]] = {
     "HubState._receivers": limits.ENTITIES_MAX,
     "HubState._flights": 1 << 14,  # by tick all that arrives then: each of many clients may hear all others
     "Process.report": limits.CLIENTS_MAX,  # a line a link
+    "Fabric.asked": EVENTS_MAX,
+    "Timeline._events": 2 * EVENTS_MAX,
+    "Timeline.settings": 2 * EVENTS_MAX,
+    "Timeline.holds": 2 * EVENTS_MAX,
+    "Timeline.cuts": 1 << 16,  # an hour of chaos has some 10,000
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers of something else than ticks."""

@@ -76,6 +76,7 @@ SHELLS = {
     "rehearsal/replay_command.py",
     "rehearsal/whatif_command.py",
     "rehearsal/verify.py",
+    "rehearsal/whatif_command.py",
     "supervisor/children.py",
     "supervisor/cli.py",
     "supervisor/control.py",
