@@ -74,6 +74,7 @@ SHELLS = {
     "rehearsal/rehearse.py",
     "rehearsal/rehearse_command.py",
     "rehearsal/replay_command.py",
+    "rehearsal/report_command.py",
     "rehearsal/verify.py",
     "supervisor/children.py",
     "supervisor/cli.py",
