@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from typing import Final
 
-from foosim.rehearsal.report import ChannelReport, LinkReport, Report
+from foosim.rehearsal.report import BinReport, ChannelReport, LinkReport, Report
 from foosim.rehearsal.report_svg import (
     PALETTE,
     SHARES,
@@ -185,8 +185,8 @@ def _over_time(found: Report) -> Iterator[str]:
 def _channel(found: Report, channel: ChannelReport) -> str:
     span = Span(found.start_ns, found.end_ns, found.bin_ns, HALF, 120)
     low = Span(found.start_ns, found.end_ns, found.bin_ns, HALF, 70)
-    p50 = [a.p50_ms if a.delivered else None for a in channel.bins]
-    p95 = [a.p95_ms if a.delivered else None for a in channel.bins]
+    p50 = _runs(channel.bins, [a.p50_ms for a in channel.bins])
+    p95 = _runs(channel.bins, [a.p95_ms for a in channel.bins])
     lost = [100.0 * a.dropped / (a.delivered + a.dropped) if a.dropped else 0.0 for a in channel.bins]
     judged = channel.delivered + channel.dropped
     share = f", {_percent(channel.dropped / judged)} lost" if judged else ""
@@ -198,6 +198,17 @@ def _channel(found: Report, channel: ChannelReport) -> str:
             bar_chart(low, {"lost": (LOST, lost)}, " %", *around, f"loss of {channel.name}"),
         ]
     )
+
+
+def _runs(bins: Sequence[BinReport], values: Sequence[float]) -> list[list[tuple[int, float]]]:
+    """Return values as runs: broken where all was lost, and passing over where nothing was sent."""
+    runs: list[list[tuple[int, float]]] = [[]]
+    for number, (content, value) in enumerate(zip(bins, values, strict=True)):
+        if content.delivered:
+            runs[-1].append((number, value))
+        elif content.dropped:
+            runs.append([])
+    return [run for run in runs if run]
 
 
 def _causes(found: Report) -> Iterator[str]:
@@ -216,7 +227,7 @@ def _ages(found: Report) -> Iterator[str]:
     yield "<h2>Age of information</h2>"
     yield _note(
         "How old, at the receiver, the newest is that has come on a link: mean and greatest, from the first arrival to "
-        "the end. The oldest first; what came never, before."
+        "the end. Links on which nothing came stand first, then the oldest."
     )
     shown = sorted(found.links, key=_staleness)[:LINKS_SHOWN]
     yield _table(

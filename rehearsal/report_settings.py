@@ -26,9 +26,10 @@ _UNITS: Final = (
     ("_m_s", "m/s"),
     ("_m", "m"),
     ("_bytes", "B"),
-    ("_max", "B"),
 )
-"""What the end of a field's name says of its unit; those of sizes are `bytes_max` and `payload_max`."""
+"""What the end of a field's name says of its unit."""
+_SHORT: Final = {"bytes_max": "size_bytes", "payload_max": "mtu_bytes", "sense_dbm": "carrier_sense_dbm"}
+"""Fields whose keys in a file are other words."""
 _PREFIXES: Final = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
 _SHARES: Final = frozenset({"loss", "duplicate", "bad_loss", "share", "probability", "duty_cycle", "p", "r", "h", "k"})
 _SHARES_OF_CHAINS: Final = frozenset({"p13", "p31", "p32", "p23", "p14", "bit_error_rate"})
@@ -80,7 +81,7 @@ def event_text(event: Event) -> str:
 
 
 def _entries(content: Mapping[str, Any]) -> list[str]:
-    return [_entry(name, value) for name, value in content.items()]
+    return [_entry(_SHORT.get(name, name), value) for name, value in content.items() if value is not None]
 
 
 def _entry(name: str, value: Any) -> str:

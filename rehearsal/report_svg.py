@@ -15,8 +15,10 @@ from foosim.rehearsal.report import Band, LinkReport, Mark
 from foosim.rehearsal.report_map import Map, Place
 
 LEFT: Final = 56
-RIGHT: Final = 12
+RIGHT: Final = 20
 FOOT: Final = 20
+WHOLE: Final = (1.0, 2.0, 5.0, 10.0)
+"""Steps of lengths and times."""
 PALETTE: Final = (
     *("#d9480f", "#1971c2", "#2f9e44", "#9c36b5", "#e0a100", "#0c8599", "#c2255c", "#5f3dc4", "#66a80f", "#868e96"),
     *("#a61e4d", "#364fc7", "#2b8a3e", "#862e9c", "#846358", "#087f5b"),
@@ -32,6 +34,10 @@ SHARES: Final = (
     *((0.8, "#fdae61", "80 %"), (0.5, "#f46d43", "50 %"), (0.0, "#a50026", "less")),
 )
 """The least share delivered of each colour of a matrix."""
+
+
+Run = Sequence[tuple[int, float]]
+"""Numbers of bins, and a value of each: what is drawn as one line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +80,12 @@ def rect(x: float, y: float, width: float, height: float, colour: str, title: st
     )
 
 
-def round_up(value: float) -> float:
-    """Return the least of 1, 2 and 5 times a power of ten that is not below a value; 1 for 0."""
+def round_up(value: float, steps: Sequence[float] = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)) -> float:
+    """Return the least of some steps times a power of ten that is not below a value; 1 for 0."""
     if value <= 0.0:
         return 1.0
     power = 10.0 ** floor(log10(value))
-    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= value * (1.0 - 1e-12))
+    return next(step * power for step in steps if step * power >= value * (1.0 - 1e-12))
 
 
 def legend(entries: Iterable[tuple[str, str]]) -> str:
@@ -103,7 +109,7 @@ def _frame(span: Span, top: float, unit: str, bands: Sequence[Band], marks: Sequ
 
 def _times(span: Span) -> list[str]:
     """Return the numbers below the time axis, about one in 110 pixels."""
-    step_ns = max(1, int(round_up((span.end_ns - span.start_ns) * 110 / span.width)))
+    step_ns = max(1, int(round_up((span.end_ns - span.start_ns) * 110 / span.width, WHOLE)))
     first, last = -(-span.start_ns // step_ns), span.end_ns // step_ns
     return [
         text(span.x(n * step_ns), span.height - 5, f"{n * step_ns / 1e9:g} s", "middle") for n in range(first, last + 1)
@@ -127,17 +133,17 @@ def shades(span: Span, bands: Sequence[Band], marks: Sequence[Mark]) -> list[str
 
 def line_chart(
     span: Span,
-    lines: Sequence[tuple[str, Sequence[float | None]]],
+    lines: Sequence[tuple[str, Sequence[Run]]],
     unit: str,
     bands: Sequence[Band],
     marks: Sequence[Mark],
     label: str,
 ) -> str:
-    """Draw (colour, a number for each bin) as lines through the middles of the bins, broken where there is none."""
-    top = round_up(max((value for _, values in lines for value in values if value is not None), default=0.0))
+    """Draw (colour, runs of numbers) as lines through the middles of their bins, each run one line."""
+    top = round_up(max((value for _, runs in lines for run in runs for _, value in run), default=0.0))
     parts = _frame(span, top, unit, bands, marks)
-    for colour, values in lines:
-        for run in _runs(values):
+    for colour, runs in lines:
+        for run in runs:
             points = []
             for number, value in run:
                 low, high = span.bin_x(number)
@@ -148,18 +154,6 @@ def line_chart(
             else:
                 parts.append(f'<polyline points="{" ".join(points)}" fill="none" stroke="{colour}"/>')
     return svg(span.width, span.height, parts, label)
-
-
-def _runs(values: Sequence[float | None]) -> Iterable[list[tuple[int, float]]]:
-    run: list[tuple[int, float]] = []
-    for number, value in enumerate(values):
-        if value is not None:
-            run.append((number, value))
-        elif run:
-            yield run
-            run = []
-    if run:
-        yield run
 
 
 def bar_chart(
@@ -272,21 +266,35 @@ def map_picture(found: Map, colours: Mapping[str, str], label: str) -> str:
         style = f'fill="rgb({red},{green},{blue})" fill-opacity="{opacity}" stroke="#495057" stroke-width="0.5"'
         title = f"<title>{escape(thing.name)}, top at {thing.top_m:.3g} m</title>"
         parts.append(f'<polygon points="{line(thing.corners)}" {style}>{title}</polygon>')
+    labels: list[tuple[float, float, str]] = []
     for track in found.tracks:
         title = f"<title>{escape(track.name)}</title>"
         parts.append(f'<polyline points="{line(track.points)}" class="track">{title}</polyline>')
         x, y = at(track.points[-1])
         parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#212529">{title}</circle>')
+        labels.append((x, y, track.name))
     for name, place in found.standing.items():
         x, y = at(place)
         parts.append(rect(x - 4, y - 4, 8, 8, "#212529", name))
+        labels.append((x, y, name))
     for loss in found.losses:
         x, y = at(loss.at)
         title = f"{loss.source} to {loss.destination}: {loss.cause} at {loss.sent_ns / 1e9:.3f} s"
         parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{colours[loss.cause]}" fill-opacity="0.55">'
                      f"<title>{escape(title)}</title></circle>")  # fmt: skip
-    length = round_up((high_x - low_x) / 8)
+    parts += _labels(labels)
+    length = round_up((high_x - low_x) / 8, WHOLE)
     height = 2 * MARGIN + (high_y - low_y) * scale + 24
     parts.append(f'<path d="M{MARGIN} {height - 8:.1f}h{length * scale:.1f}" stroke="#212529" stroke-width="3"/>')
     parts.append(text(MARGIN, height - 14, f"{length:g} m"))
     return svg(MAP_SIZE, height, parts, label)
+
+
+def _labels(places: Iterable[tuple[float, float, str]]) -> Iterable[str]:
+    """Yield names beside their places, but for those that would stand on another one: they are told when pointed at."""
+    taken: list[tuple[float, float, float]] = []
+    for x, y, name in places:
+        left, right = x + 6, x + 6 + 7 * len(name)
+        if all(right < low or left > high or abs(y - at) > 12 for low, high, at in taken):
+            taken.append((left, right, y))
+            yield text(left, y + 4, name)

@@ -15,11 +15,11 @@ import pytest
 from foosim.protocol.impairments import Impairments
 from foosim.protocol.scene import Box, Cylinder, Shape, turn
 from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.report import Band, Mark, Report, bin_width_ns, gather
+from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
 from foosim.rehearsal.report_map import outline
-from foosim.rehearsal.report_page import page
+from foosim.rehearsal.report_page import _runs, page
 from foosim.rehearsal.report_settings import mean_loss, mean_own_delay_ns
-from foosim.rehearsal.report_svg import round_up
+from foosim.rehearsal.report_svg import WHOLE, round_up
 from foosim.rehearsal.report_tallies import SAMPLES, LinkTally, Sample
 from foosim.rehearsal.system import System
 from foosim.rehearsal.whatif import what_if
@@ -209,8 +209,14 @@ def test_the_page_is_whole_and_says_what_was_found(found: Report) -> None:
     titles = [text for text in read.texts if " to player-red: " in text]
     assert any("delivered" in text for text in titles)
     (radio,) = [row for row in read.rows if row[:2] == ["w", "wifi_5_indoor"]]
-    assert "loss 4 %" in radio[2] and "frequency 5.25 GHz" in radio[2]
+    assert {"loss 4 %", "frequency 5.25 GHz", "mtu 1500 B"} < set(radio[2].split(", ")) and "None" not in radio[2]
     assert "http" not in page(found) and "url(" not in page(found)
+
+
+def test_lines_break_where_all_was_lost_and_pass_over_silence() -> None:
+    bins = [BinReport(delivered, dropped, 1.0, 2.0) for delivered, dropped in ((1, 0), (0, 0), (1, 1), (0, 1), (1, 0))]
+    assert _runs(bins, [5.0, 0.0, 6.0, 0.0, 7.0]) == [[(0, 5.0), (2, 6.0)], [(4, 7.0)]]
+    assert _runs(bins[3:4], [0.0]) == []
 
 
 def test_the_map_has_scenery_paths_and_where_packets_were_lost(found: Report) -> None:
@@ -317,4 +323,5 @@ def test_spans_are_round_and_few() -> None:
     assert bin_width_ns(0, 2_000_000) == 2_000_000
     for span in (1, 7_000_000, 3_600_000_000_000):
         assert span / bin_width_ns(span, 1) <= 60
-    assert [round_up(value) for value in (0.0, 0.3, 1.0, 2.1, 99.0)] == [1.0, 0.5, 1.0, 5.0, 100.0]
+    assert [round_up(value) for value in (0.0, 0.3, 1.0, 2.1, 99.0)] == pytest.approx([1.0, 0.3, 1.0, 3.0, 100.0])
+    assert round_up(2.1, WHOLE) == 5.0
