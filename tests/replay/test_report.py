@@ -11,12 +11,13 @@ from typing import Any, Final
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as replace_row
 
 from foosim.protocol.impairments import Impairments
 from foosim.protocol.scene import Box, Cylinder, Shape, turn
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
-from foosim.rehearsal.report_map import outline
+from foosim.rehearsal.report_map import MapMaker, outline
 from foosim.rehearsal.report_page import _runs, page
 from foosim.rehearsal.report_settings import mean_loss, mean_own_delay_ns
 from foosim.rehearsal.report_svg import WHOLE, round_up
@@ -227,6 +228,23 @@ def test_the_map_has_scenery_paths_and_where_packets_were_lost(found: Report) ->
     assert sum(count for *_, count in where.links) <= where.lost
     middle = next(loss for loss in where.losses if {loss.source, loss.destination} == {"camera", "player-red"})
     assert middle.at == (-10.0, 1.5)
+
+
+def test_a_packet_is_lost_where_its_sender_was_when_it_sent(radio_run: Path) -> None:
+    """Not where the sender is when the loss is known; without a place of either end it is counted and not drawn."""
+    capture = open_capture(radio_run)
+    places = capture.poses("red.midfield").positions
+    maker = MapMaker(capture.deployment, capture.deployment.tick_ns)
+    frames = [block.frame(index) for block in capture.frame_blocks for index in range(len(block))]
+    for frame in frames:
+        maker.take_frame(frame)
+    moved = max(range(len(frames)), key=lambda number: float(abs(places[number] - places[-1]).sum()))
+    sent_ns = frames[moved].tick * capture.deployment.tick_ns
+    maker.take_loss(replace_row(packet(sent_ns + 1, -1, "snr"), source="red.midfield"))
+    maker.take_loss(packet(sent_ns, -1, "snr"))
+    where = maker.result(10)
+    assert [loss.at for loss in where.losses] == [tuple(places[moved][:2])] != [tuple(places[-1][:2])]
+    assert (where.lost, where.placeless) == (2, 1)
 
 
 def test_outlines_are_what_a_thing_covers() -> None:
