@@ -102,7 +102,7 @@ def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
             continue
         section = next(one for one in ("players", "clients", "robots") if endpoint in view.mapping(one))
         robot = endpoint if section == "robots" else view.get(section, endpoint, "on")
-        if isinstance(robot, str) and view.get("robots", robot, "model") != BODILESS:
+        if isinstance(robot, str) and (view.get("robots", robot, "model") != BODILESS or view.get("table") is None):
             continue
         what = f"carries the radio {on_air[0]}, but is nowhere: write network.places.{endpoint}"
         yield Finding(

@@ -19,6 +19,8 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.network import EVENTS_MAX
 from foosim.supervisor.requests import ANSWERS_KEPT
+from foosim.vhub.geometry import PAIRS_KEPT, Sight
+from foosim.vhub.propagation import PLACES_KEPT
 
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {
@@ -28,6 +30,10 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 13,
+    "Still._newer": PAIRS_KEPT,
+    "Still._older": PAIRS_KEPT,
+    "Propagation._paths": limits.CLIENTS_MAX,  # of one frame
+    "Propagation._heard": 2 * PLACES_KEPT,
     "Fabric.states": limits.CLIENTS_MAX,
     "Fabric._links": limits.CLIENTS_MAX,
     "Fabric.radios": limits.CLIENTS_MAX,
@@ -42,8 +48,8 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers of something else than ticks."""
-CONSTANT: Final = (Deployment, Layout, Frame, msgspec.Struct)
-"""What does not grow."""
+CONSTANT: Final = (Deployment, Layout, Frame, msgspec.Struct, Sight)
+"""What does not grow, or is of one frame."""
 
 
 def too_large(core: object) -> list[str]:

@@ -1,0 +1,337 @@
+"""A report as one HTML page that stands by itself: no script, nothing that is fetched from elsewhere.
+
+Every text is escaped, also those that the capture's own makers chose. Neighbours: `report` finds what is on it,
+`report_svg` draws.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from typing import Final
+
+from foosim.rehearsal.report import BinReport, ChannelReport, LinkReport, Report
+from foosim.rehearsal.report_svg import (
+    PALETTE,
+    SHARES,
+    Span,
+    bar_chart,
+    lanes,
+    legend,
+    line_chart,
+    map_picture,
+    matrix,
+)
+
+WIDE: Final = 1000
+HALF: Final = 490
+ENDPOINTS_MAX: Final = 60
+LINKS_SHOWN: Final = 100
+ROWS_SHOWN: Final = 200
+P50: Final = "#1971c2"
+P95: Final = "#e0a100"
+LOST: Final = "#c92a2a"
+
+_STYLE: Final = """
+body { font: 14px/1.45 system-ui, sans-serif; color: #212529; max-width: 1040px; margin: 24px auto; padding: 0 16px; }
+h1 { font-size: 22px; } h2 { font-size: 17px; margin: 32px 0 6px; border-bottom: 1px solid #dee2e6; }
+h3 { font-size: 14px; margin: 10px 0 2px; }
+table { border-collapse: collapse; font-size: 13px; } td, th { padding: 2px 10px 2px 0; vertical-align: top; }
+th { text-align: left; border-bottom: 1px solid #adb5bd; } td.n, th.n { text-align: right; white-space: nowrap; }
+code { font-size: 12px; overflow-wrap: anywhere; } p { margin: 4px 0; } .note { color: #495057; }
+svg { max-width: 100%; height: auto; display: block; } svg text { font-size: 11px; fill: #495057; }
+.scroll { overflow-x: auto; } .scroll svg { max-width: none; }
+.grid { stroke: #dee2e6; } .mark { stroke: #212529; stroke-dasharray: 3 2; stroke-width: 1.5; }
+.track { fill: none; stroke: #495057; stroke-width: 1.2; stroke-opacity: 0.7; }
+.two { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 4px 20px; }
+.legend span { margin-right: 14px; white-space: nowrap; }
+.legend i { display: inline-block; width: 11px; height: 11px; margin-right: 4px; }
+"""
+
+
+def page(found: Report) -> str:
+    """Return the page."""
+    title = escape(f"{found.name}: the network of {found.metadata.get('world', 'a run')}")
+    sections = (
+        *(_head(found), _network(found), _events(found), _links(found), _over_time(found), _causes(found)),
+        *(_ages(found), _senders(found), _configured(found), _places(found)),
+    )
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            f'<html lang="en"><head><meta charset="utf-8"><title>{title}</title>',
+            '<meta name="viewport" content="width=device-width">',
+            f"<style>{_STYLE}</style></head><body>",
+            f"<h1>{title}</h1>",
+            *(part for section in sections for part in section),
+            "</body></html>",
+            "",
+        ]
+    )
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]], texts: int = 1) -> str:
+    """Return a table; the first `texts` columns are texts, the others numbers."""
+    kinds = ["" if column < texts else ' class="n"' for column in range(len(head))]
+    lines = ["".join(f"<th{kind}>{escape(name)}</th>" for kind, name in zip(kinds, head, strict=True))]
+    for row in rows:
+        lines.append("".join(f"<td{kind}>{escape(str(cell))}</td>" for kind, cell in zip(kinds, row, strict=True)))
+    return f'<div class="scroll"><table>{"".join(f"<tr>{line}</tr>" for line in lines)}</table></div>'
+
+
+def _note(text: str) -> str:
+    return f'<p class="note">{escape(text)}</p>'
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.4g} %"
+
+
+def _seconds(ns: int) -> str:
+    return f"{ns / 1e9:.9g} s"
+
+
+def _colours(found: Report) -> dict[str, str]:
+    return {cause: PALETTE[number % len(PALETTE)] for number, cause in enumerate(found.causes)}
+
+
+# --- sections ---------------------------------------------------------------------------------------------------------
+
+
+def _head(found: Report) -> Iterator[str]:
+    span = f"{_seconds(found.start_ns)} to {_seconds(found.end_ns)}, {found.ticks} ticks of {found.tick_ns / 1e6:g} ms"
+    rows = [
+        ("simulated", span if found.finished else f"{span}; the capture is not finished"),
+        *sorted(found.metadata.items()),
+        ("digest of the last frame", found.digest),
+        ("digest of all ticks", found.chain),
+    ]
+    yield "<table>"
+    for name, value in rows:
+        yield f"<tr><td>{escape(name)}</td><td><code>{escape(value)}</code></td></tr>"
+    yield "</table><h2>Packets</h2>"
+    offered = found.fates["offered"]
+    fates = [(fate.replace("_", " "), count, _percent(count / offered) if offered else "-")
+             for fate, count in found.fates.items()]  # fmt: skip
+    yield '<div class="two"><div>' + _table(("fate", "packets", "share"), fates)
+    if found.copies:
+        yield _note(f"{found.copies} of them are copies that links made.")
+    causes = sorted(found.causes.items(), key=lambda entry: (-entry[1], entry[0]))
+    shares = [(cause, count, _percent(count / offered)) for cause, count in causes]
+    yield "</div><div>" + (_table(("dropped by", "packets", "share"), shares) if shares else _note("Nothing was lost."))
+    yield "</div></div>"
+
+
+def _network(found: Report) -> Iterator[str]:
+    yield "<h2>Network</h2>"
+    if found.radios:
+        radios = [(radio.name, radio.preset, radio.settings, radio.carriers) for radio in found.radios]
+        yield _table(("radio", "preset", "settings that are no defaults", "carried by"), radios, 3)
+    if found.rules:
+        yield _table(("rule", "for", "settings"), [(rule.name, rule.ends, rule.settings) for rule in found.rules], 3)
+    yield _note(f"Where nothing else is written: {found.defaults}.")
+
+
+def _events(found: Report) -> Iterator[str]:
+    yield "<h2>Events</h2>"
+    if not (found.happenings or found.bands or found.marks):
+        yield _note("Nothing happened to the network, and no process was lost.")
+        return
+    yield lanes(WIDE, found.start_ns, found.end_ns, found.bands, found.marks, "events over time")
+    if found.bands_left:
+        yield _note(f"The first {len(found.bands)} times are drawn, {found.bands_left} more are not.")
+    happened = [
+        (event.at_ns, event.text, "asked for" if event.is_asked else "deployment") for event in found.happenings
+    ]
+    happened += [(mark.at_ns, mark.text, "recovery") for mark in found.marks]
+    happened.sort()
+    rows = [(_seconds(at_ns), text, by) for at_ns, text, by in happened[:ROWS_SHOWN]]
+    yield _table(("at", "what", "by"), rows, 3)
+    if len(happened) > ROWS_SHOWN:
+        yield _note(f"And {len(happened) - ROWS_SHOWN} more.")
+
+
+def _links(found: Report) -> Iterator[str]:
+    yield "<h2>Links</h2>"
+    packets: Counter[str] = Counter()
+    for link in found.links:
+        packets[link.source] += link.offered
+        packets[link.destination] += link.offered
+    if not packets:
+        yield _note("No packets.")
+        return
+    names = sorted(name for name, _ in packets.most_common(ENDPOINTS_MAX))
+    yield _note("From each row to each column, coloured by the share delivered of what has a fate; at least:")
+    yield legend((name, colour) for _, colour, name in SHARES)
+    if len(packets) > len(names):
+        yield _note(f"The {len(names)} busiest of {len(packets)} endpoints.")
+    yield f'<div class="scroll">{matrix(names, found.links, "share delivered per link")}</div>'
+
+
+def _over_time(found: Report) -> Iterator[str]:
+    yield "<h2>Delay and loss over time</h2>"
+    if not found.channels:
+        yield _note("No packets.")
+        return
+    yield _note(f"By channel, in spans of {_seconds(found.bin_ns)} by the time of sending; the busiest channels.")
+    yield legend((("median delay", P50), ("95th percentile", P95), ("lost", LOST)))
+    yield '<div class="two">'
+    for channel in found.channels:
+        yield f"<div>{_channel(found, channel)}</div>"
+    yield "</div>"
+
+
+def _channel(found: Report, channel: ChannelReport) -> str:
+    span = Span(found.start_ns, found.end_ns, found.bin_ns, HALF, 120)
+    low = Span(found.start_ns, found.end_ns, found.bin_ns, HALF, 70)
+    p50 = _runs(channel.bins, [a.p50_ms for a in channel.bins])
+    p95 = _runs(channel.bins, [a.p95_ms for a in channel.bins])
+    lost = [100.0 * a.dropped / (a.delivered + a.dropped) if a.dropped else 0.0 for a in channel.bins]
+    judged = channel.delivered + channel.dropped
+    share = f", {_percent(channel.dropped / judged)} lost" if judged else ""
+    around = found.bands, found.marks
+    return "\n".join(
+        [
+            f"<h3>{escape(channel.name)}: {channel.packets} packets{share}</h3>",
+            line_chart(span, [(P95, p95), (P50, p50)], " ms", *around, f"delay of {channel.name}"),
+            bar_chart(low, {"lost": (LOST, lost)}, " %", *around, f"loss of {channel.name}"),
+        ]
+    )
+
+
+def _runs(bins: Sequence[BinReport], values: Sequence[float]) -> list[list[tuple[int, float]]]:
+    """Return values as runs: broken where all was lost, and passing over where nothing was sent."""
+    runs: list[list[tuple[int, float]]] = [[]]
+    for number, (content, value) in enumerate(zip(bins, values, strict=True)):
+        if content.delivered:
+            runs[-1].append((number, value))
+        elif content.dropped:
+            runs.append([])
+    return [run for run in runs if run]
+
+
+def _causes(found: Report) -> Iterator[str]:
+    yield "<h2>Causes of losses over time</h2>"
+    if not found.causes:
+        yield _note("Nothing was lost.")
+        return
+    colours = _colours(found)
+    yield legend(colours.items())
+    span = Span(found.start_ns, found.end_ns, found.bin_ns, WIDE, 200)
+    series = {cause: (colours[cause], counts) for cause, counts in found.causes_over_time.items()}
+    yield bar_chart(span, series, "", found.bands, found.marks, "packets lost by cause over time")
+
+
+def _ages(found: Report) -> Iterator[str]:
+    yield "<h2>Age of information</h2>"
+    yield _note(
+        "How old, at the receiver, the newest is that has come on a link: mean and greatest, from the first arrival to "
+        "the end. Links on which nothing came stand first, then the oldest."
+    )
+    shown = sorted(found.links, key=_staleness)[:LINKS_SHOWN]
+    yield _table(
+        ("from", "to", "offered", "delivered", "mean delay ms", "longest", "mean age ms", "greatest"),
+        [
+            (link.source, link.destination, link.offered, link.delivered,
+             *(f"{ms:.3f}" if link.delivered else "-" for ms in (link.delay_mean_ms, link.delay_most_ms)),
+             *("never" if ms is None else f"{ms:.1f}" for ms in (link.age_mean_ms, link.age_most_ms)))
+            for link in shown
+        ],
+        2,
+    )  # fmt: skip
+    if len(found.links) > len(shown):
+        yield _note(f"And {len(found.links) - len(shown)} links with newer information.")
+
+
+def _staleness(link: LinkReport) -> tuple[bool, float, str, str]:
+    return link.age_most_ms is not None, -(link.age_most_ms or 0.0), link.source, link.destination
+
+
+def _senders(found: Report) -> Iterator[str]:
+    yield "<h2>Queues and airtime</h2>"
+    if not found.senders:
+        yield _note("Nothing waited, and nothing took time to send.")
+        return
+    yield _note(
+        "Each radio of an endpoint, and each queue of a wire; a broadcast counts once. Airtime is the share of the run "
+        "that the last attempts took; earlier attempts are in the time of access."
+    )
+    shown = sorted(found.senders, key=lambda sender: (-sender.airtime_share, sender.source, sender.medium))[:ROWS_SHOWN]
+    head = (
+        "from",
+        "by",
+        "packets",
+        "queue mean ms",
+        "p95",
+        "longest",
+        "access mean ms",
+        "longest",
+        "retries",
+        "airtime",
+    )
+    yield _table(
+        head,
+        [
+            (s.source, s.medium, s.transmissions, f"{s.queue_mean_ms:.3f}", f"{s.queue_p95_ms:.3f}",
+             f"{s.queue_most_ms:.3f}", f"{s.access_mean_ms:.3f}", f"{s.access_most_ms:.3f}", s.retries,
+             _percent(s.airtime_share))
+            for s in shown
+        ],
+        2,
+    )  # fmt: skip
+    if len(found.senders) > len(shown):
+        yield _note(f"And {len(found.senders) - len(shown)} that took less.")
+
+
+def _configured(found: Report) -> Iterator[str]:
+    yield "<h2>Configured and measured</h2>"
+    yield _note(
+        "By rule and radio. A link's own loss is what is lost singly or in bursts, of what came so far; its own delay "
+        "is what it adds by itself. Waiting, the medium, the way, clogs, partitions and receivers do the rest. "
+        "Configured is what the deployment says: * where events changed it meanwhile."
+    )
+    head = (
+        "rule",
+        "radio",
+        "links",
+        "packets",
+        "own loss configured",
+        "measured",
+        "own delay configured ms",
+        "measured",
+    )
+    yield _table(
+        (*head, "all loss", "mean delay ms", "median", "p95"),
+        [
+            (m.rule + ("*" if m.is_changed else ""), m.radio or "-", m.links, m.packets,
+             _percent(m.own_loss_configured), _percent(m.own_loss),
+             f"{m.own_delay_configured_ms:.3f}", f"{m.own_delay_ms:.3f}", _percent(m.loss),
+             f"{m.delay_mean_ms:.3f}", f"{m.delay_p50_ms:.3f}", f"{m.delay_p95_ms:.3f}")
+            for m in found.measured
+        ],
+        2,
+    )  # fmt: skip
+
+
+def _places(found: Report) -> Iterator[str]:
+    where = found.map
+    if not (where.outlines or where.tracks):
+        return
+    yield "<h2>Map</h2>"
+    yield _note(
+        "From above: scenery, the ways of bodies with their last places, and where packets were lost: in the middle "
+        "between their ends, as of the captured frame before."
+    )
+    colours = _colours(found)
+    if colours:
+        yield legend(colours.items())
+    yield map_picture(where, colours, "the world from above")
+    drawn = where.lost - where.placeless
+    if drawn > len(where.losses):
+        yield _note(f"A sample of {len(where.losses)} of {drawn} lost packets.")
+    if where.placeless:
+        yield _note(f"{where.placeless} lost packets have ends without a place and are not drawn.")
+    if where.links:
+        yield "<h3>Most lost</h3>"
+        yield _table(("from", "to", "by", "packets"), where.links, 3)

@@ -1,0 +1,345 @@
+"""The page about a captured run's network: what it says is what the capture gives, whatever the capture holds."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from html import escape
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pytest
+from msgspec.structs import replace as replace_row
+
+from foosim.protocol.impairments import Impairments
+from foosim.protocol.scene import Box, Cylinder, Shape, turn
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
+from foosim.rehearsal.report_map import MapMaker, outline
+from foosim.rehearsal.report_page import _runs, page
+from foosim.rehearsal.report_settings import mean_loss, mean_own_delay_ns
+from foosim.rehearsal.report_svg import WHOLE, round_up
+from foosim.rehearsal.report_tallies import SAMPLES, LinkTally, Sample
+from foosim.rehearsal.system import System
+from foosim.rehearsal.whatif import what_if
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.rows import PACKETS, Fate, PacketRow
+from tests.replay.conftest import TABLE, damaged, messages_of, replay, rewritten, with_row
+
+NETWORK: Final = (
+    "network={radios: {w: {preset: wifi_5_indoor, fading: {kind: rician}, loss: 4 %}}, robots: {'*': [w]},"
+    " links: [{id: fast, from: 'player*', to: '*', delay: 2 ms, jitter: {shape: uniform, width: 1 ms}}],"
+    " places: {player-red: [-20 m, 3 m, 1 m], player-blue: [3 m, 0 m, 1 m], camera: [0 m, 0 m, 2 m]},"
+    " events: [{at: 100 ms, for: 60 ms, partition: [[player-red], [rest]]}, {at: 200 ms,"
+    " set: {link: fast, loss: 30 %}}]}"
+)
+CLOG: Final = {"clog": {"from": "player-blue", "to": "*"}, "for": "50 ms"}
+
+
+def disrupt(system: System) -> None:
+    system.at_tick(60, lambda: system.request("network", event=CLOG))
+    system.at_tick(70, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
+
+
+@pytest.fixture(scope="module")
+def radio_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of 0.4 s over radio with places, a partition, changed settings and a clog that was asked for."""
+    path = tmp_path_factory.mktemp("report") / "radio.mcap"
+    rehearse(TABLE.read_text(), TABLE.name, 200, 2, ["engine=pure", NETWORK], prepare=disrupt, capture=path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(radio_run: Path) -> Report:
+    return gather(open_capture(radio_run), radio_run.name)
+
+
+class Page(HTMLParser):
+    """Checks that elements are closed in order, and that nothing is run or fetched; keeps texts and table rows."""
+
+    def __init__(self, content: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.texts: list[str] = []
+        self.rows: list[list[str]] = []
+        self.drawings = 0
+        self.feed(content)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert tag not in ("script", "link", "img", "iframe", "object") and not {"href", "src"} & dict(attrs).keys()
+        if tag != "meta":
+            self.open.append(tag)
+        self.drawings += tag == "svg"
+        if tag == "tr":
+            self.rows.append([])
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if data.strip():
+            self.texts.append(data)
+            if self.open[-1] in ("td", "code") and "tr" in self.open:
+                self.rows[-1].append(data)
+
+
+def test_the_report_has_the_numbers_that_the_capture_gives(radio_run: Path, found: Report) -> None:
+    capture, info = open_capture(radio_run), capture_info(radio_run)
+    packets = capture.packets
+    assert (found.fates, found.causes) == (info.packets, info.causes)
+    assert {"partition", "random_loss"} <= found.causes.keys() and found.causes["partition"] > 5
+    assert (found.digest, found.chain, found.ticks) == (info.digest, info.chain, info.ticks)
+    for cause, counts in found.causes_over_time.items():
+        sent = packets.sent_ns[packets.cause == cause]
+        assert list(counts) == np.bincount(sent // found.bin_ns, minlength=len(counts)).tolist()
+    for channel in found.channels:
+        delivered = (packets.channel == channel.name) & (packets.fate == "delivered")
+        for number, span in enumerate(channel.bins):
+            mask = delivered & (packets.sent_ns // found.bin_ns == number)
+            delays = (packets.due_ns - packets.sent_ns)[mask] / 1e6
+            assert span.delivered == len(delays)
+            if len(delays):
+                assert [span.p50_ms, span.p95_ms] == pytest.approx(np.quantile(delays, [0.5, 0.95]), abs=1e-5)
+    assert sum(channel.packets for channel in found.channels) == len(packets)
+
+
+def test_links_are_those_of_the_other_tools(radio_run: Path, found: Report) -> None:
+    """The same delays and ages as what-if has, which keeps all packets; it ends ages with the last arrival."""
+    links = {(link.source, link.destination): link for link in what_if(open_capture(radio_run)).links}
+    assert len(found.links) == len(links) > 10
+    for link in found.links:
+        other = links[link.source, link.destination]
+        assert (link.offered, link.delivered) == (other.offered, other.before.delivered)
+        assert link.delay_mean_ms == pytest.approx(other.before.delay_mean_ms, abs=1e-3)
+        assert link.delivered + link.dropped <= link.offered and sum(link.causes.values()) == link.dropped
+        assert link.age_most_ms is not None and link.age_mean_ms is not None
+        assert link.age_most_ms > link.age_mean_ms >= other.before.age_ms * 0.5
+
+
+def packet(sent_ns: int, due_ns: int, cause: str = "", copy: int = 0) -> PacketRow:
+    fate: Fate = "dropped" if cause else "delivered"
+    times = sent_ns, sent_ns, due_ns, 0
+    return PacketRow("a", sent_ns, copy, "b", "c", *times, fate, cause, "rule", "", "", 0, b"", 0)
+
+
+def test_ages_grow_until_something_newer_comes() -> None:
+    """Sent every 10 with a delay of 2 the age goes from 2 to 12; what comes late or as a copy renews nothing."""
+    link = LinkTally()
+    for sent in range(0, 40, 10):
+        link.add(packet(sent, sent + 2))
+    assert link.age_ns(32) == (7.0, 12)
+    link.add(packet(5, 33, copy=1))
+    link.add(packet(40, -1, cause="snr"))
+    assert (link.offered, link.delivered, link.dropped) == (5, 4, 1)
+    mean, worst = link.age_ns(52) or (0.0, 0)
+    assert worst == 22 and mean == pytest.approx((3 * 70 + 20 * 12) / 50)
+    assert LinkTally().age_ns(100) is None
+
+
+def test_a_broadcast_is_on_air_once(radio_run: Path, found: Report) -> None:
+    """All transmissions of the camera, which publishes to both players, by their distinct numbers."""
+    rows = [row for row in open_capture(radio_run).rows(PACKETS) if isinstance(row, PacketRow)]
+    airtimes: dict[int, int] = {}
+    for row in rows:
+        if row.source == "camera":
+            airtimes[row.sequence] = max(row.airtime_ns, airtimes.get(row.sequence, 0))
+    camera = next(sender for sender in found.senders if sender.source == "camera")
+    assert sum(row.source == "camera" for row in rows) == 2 * camera.transmissions == 2 * len(airtimes)
+    assert camera.airtime_share == pytest.approx(sum(airtimes.values()) / found.end_ns, abs=1e-6)
+
+
+def test_configured_stands_beside_measured(run: Path) -> None:
+    report = gather(open_capture(run), run.name)
+    (rule,) = [rule for rule in report.measured if rule.rule == "everything"]
+    assert rule.own_loss_configured == 0.005 and rule.own_delay_configured_ms == pytest.approx(1.3, abs=1e-3)
+    assert rule.own_delay_ms == pytest.approx(1.3, abs=0.05) and 0.0 < rule.own_loss < 0.015
+    assert not rule.is_changed and rule.own_loss == pytest.approx(report.causes["random_loss"] / rule.packets)
+
+
+def test_means_of_models_of_loss_and_delay() -> None:
+    def settings(**keys: Any) -> Impairments:
+        return Impairments.model_validate(keys)
+
+    burst = {"loss": "5 %", "mean_bad": "20 ms", "bad_loss": "50 %", "bad_extra_delay": "9 ms"}
+    assert mean_loss(settings(loss="10 %", burst=burst)) == pytest.approx(1 - 0.9 * 0.95)
+    assert mean_own_delay_ns(settings(burst=burst), {}) == pytest.approx(9e6 * 0.1 * 0.5 / 0.95)
+    assert mean_loss(settings(gilbert_elliott={"p": "10 %", "r": "30 %", "h": "20 %"})) == pytest.approx(0.25 * 0.8)
+    assert mean_loss(settings(outages={"mean_on": "3 s", "mean_off": "1 s"})) == pytest.approx(0.25)
+    four = {"p13": "5 %", "p31": "30 %", "p32": "20 %", "p23": "40 %", "p14": "2 %"}
+    steps = np.array([[0.93, 0, 0.05, 0.02], [0, 0.6, 0.4, 0], [0.3, 0.2, 0.5, 0], [1.0, 0, 0, 0]])
+    shares = np.full(4, 0.25)
+    for _ in range(2000):
+        shares = (shares[:, None] * steps).sum(axis=0)
+    assert mean_loss(settings(markov4=four)) == pytest.approx(shares[2] + shares[3])
+    for stuck, loss in (({"p13": "0 %", "p31": "30 %", "p14": "25 %"}, 0.2), ({"p13": "5 %", "p31": "0 %"}, 1.0)):
+        assert mean_loss(settings(markov4=stuck)) == pytest.approx(loss)
+    assert mean_loss(settings(markov4={"p13": "5 %", "p31": "30 %", "p32": "10 %"})) == 0.0
+    heavy = {"shape": "gamma", "mean": "1 ms", "sd": "4 ms"}
+    assert mean_own_delay_ns(settings(jitter=heavy, delay="1 ms"), {}) == pytest.approx(2e6, rel=0.01)
+    reorder = {"probability": "10 %", "extra": "5 ms"}
+    assert mean_own_delay_ns(settings(reorder=reorder), {}) == pytest.approx(0.5e6)
+
+
+def test_events_are_bands_and_are_told(found: Report) -> None:
+    bands = {band.kind: band for band in found.bands}
+    cut, clog, settings = bands["partition"], bands["clog"], bands["settings"]
+    assert (cut.start_ns, cut.end_ns) == (100_000_000, 160_000_000) and "player-red" in cut.text
+    assert clog.end_ns - clog.start_ns == 50_000_000 and clog.start_ns >= 120_000_000
+    assert (settings.start_ns, settings.end_ns, settings.text) == (200_000_000, found.end_ns, "fast: loss 30 %")
+    told = [(event.text, event.is_asked) for event in found.happenings]
+    assert ("partition player-red | rest, for 60 ms", False) in told
+    assert ("clog from player-blue to *, for 50 ms", True) in told
+    assert [rule.is_changed for rule in found.measured if rule.rule == "fast"] == [True]
+
+
+def test_the_page_is_whole_and_says_what_was_found(found: Report) -> None:
+    read = Page(page(found))
+    assert [str(found.fates["offered"])] == [row[1] for row in read.rows if row[:1] == ["offered"]]
+    assert {
+        row[0]: int(row[1]) for row in read.rows if row and row[0] in found.causes and len(row) == 3
+    } == found.causes
+    assert found.digest in read.texts and found.chain in read.texts
+    for sender in found.senders:
+        assert any(row[:3] == [sender.source, sender.medium, str(sender.transmissions)] for row in read.rows)
+    assert read.drawings == 2 + 2 * len(found.channels) + 1 + 1
+    titles = [text for text in read.texts if " to player-red: " in text]
+    assert any("delivered" in text for text in titles)
+    (radio,) = [row for row in read.rows if row[:2] == ["w", "wifi_5_indoor"]]
+    assert {"loss 4 %", "frequency 5.25 GHz", "mtu 1500 B"} < set(radio[2].split(", ")) and "None" not in radio[2]
+    assert "http" not in page(found) and "url(" not in page(found)
+
+
+def test_lines_break_where_all_was_lost_and_pass_over_silence() -> None:
+    bins = [BinReport(delivered, dropped, 1.0, 2.0) for delivered, dropped in ((1, 0), (0, 0), (1, 1), (0, 1), (1, 0))]
+    assert _runs(bins, [5.0, 0.0, 6.0, 0.0, 7.0]) == [[(0, 5.0), (2, 6.0)], [(4, 7.0)]]
+    assert _runs(bins[3:4], [0.0]) == []
+
+
+def test_the_map_has_scenery_paths_and_where_packets_were_lost(found: Report) -> None:
+    where = found.map
+    assert {track.name for track in where.tracks} >= {"ball", "red.goal"} and len(where.tracks) == 10
+    assert where.standing["player-red"] == (-20.0, 3.0) and where.placeless == 0
+    assert len(where.losses) == where.lost == found.fates["dropped"]
+    assert sum(count for *_, count in where.links) <= where.lost
+    middle = next(loss for loss in where.losses if {loss.source, loss.destination} == {"camera", "player-red"})
+    assert middle.at == (-10.0, 1.5)
+
+
+def test_a_packet_is_lost_where_its_sender_was_when_it_sent(radio_run: Path) -> None:
+    """Not where the sender is when the loss is known; without a place of either end it is counted and not drawn."""
+    capture = open_capture(radio_run)
+    places = capture.poses("red.midfield").positions
+    maker = MapMaker(capture.deployment, capture.deployment.tick_ns)
+    frames = [block.frame(index) for block in capture.frame_blocks for index in range(len(block))]
+    for frame in frames:
+        maker.take_frame(frame)
+    moved = max(range(len(frames)), key=lambda number: float(abs(places[number] - places[-1]).sum()))
+    sent_ns = frames[moved].tick * capture.deployment.tick_ns
+    maker.take_loss(replace_row(packet(sent_ns + 1, -1, "snr"), source="red.midfield"))
+    maker.take_loss(packet(sent_ns, -1, "snr"))
+    where = maker.result(10)
+    assert [loss.at for loss in where.losses] == [tuple(places[moved][:2])] != [tuple(places[-1][:2])]
+    assert (where.lost, where.placeless) == (2, 1)
+
+
+def test_outlines_are_what_a_thing_covers() -> None:
+    half_turn = turn((0.0, 0.0, 1.0), np.pi / 4)
+    diamond = outline(Shape(Box((1.0, 1.0, 0.5)), "walls", (0, 0, 0, 1), (5.0, 0.0, 0.5), half_turn))
+    assert len(diamond.corners) >= 4 and max(x for x, _ in diamond.corners) == pytest.approx(5.0 + 2**0.5)
+    assert diamond.top_m == pytest.approx(1.0)
+    lying = outline(Shape(Cylinder(0.5, 4.0), "walls", (0, 0, 0, 1), orientation=turn((1.0, 0.0, 0.0), np.pi / 2)))
+    assert max(y for _, y in lying.corners) == pytest.approx(2.0)
+    assert max(x for x, _ in lying.corners) == pytest.approx(0.5)
+
+
+def test_names_are_escaped_wherever_they_stand(found: Report) -> None:
+    evil = '"><b onload=x>&'
+    links = tuple(replace(link, source=evil, causes={evil: 1}) for link in found.links[:2])
+    losses = tuple(replace(loss, source=evil) for loss in found.map.losses)
+    where = replace(found.map, losses=losses, standing={evil: (0.0, 0.0)}, links=((evil, evil, evil, 1),))
+    tracks = tuple(replace(track, name=evil) for track in where.tracks)
+    content = page(
+        replace(
+            found,
+            name=evil,
+            metadata={evil: evil, "world": evil},
+            links=links,
+            causes={**found.causes, evil: 1},
+            causes_over_time={evil: (1,) * len(found.channels[0].bins)},
+            channels=tuple(replace(channel, name=evil) for channel in found.channels),
+            senders=tuple(replace(sender, source=evil, medium=evil) for sender in found.senders),
+            measured=tuple(replace(rule, rule=evil, radio=evil) for rule in found.measured),
+            bands=(Band("clog", 0, 10_000_000, evil),),
+            marks=(Mark(5_000_000, evil),),
+            happenings=tuple(replace(event, text=evil) for event in found.happenings),
+            radios=tuple(replace(radio, name=evil, settings=evil) for radio in found.radios),
+            rules=tuple(replace(rule, name=evil, ends=evil, settings=evil) for rule in found.rules),
+            map=replace(where, tracks=tracks),
+        )
+    )
+    read = Page(content)
+    assert "b" not in read.open and evil not in content and content.count(escape(evil)) > 40
+
+
+def test_the_command_writes_a_page_and_overwrites_none(radio_run: Path, tmp_path: Path, found: Report) -> None:
+    out = tmp_path / "page.html"
+    typed = replay("report", radio_run, "-o", out, "--json")
+    assert (typed.code, Page(out.read_text()).drawings) == (0, Page(page(found)).drawings)
+    assert json.loads(typed.out)["causes"] == found.causes
+    before = out.read_text()
+    again = replay("report", radio_run, "-o", out)
+    assert again.code == 3 and "exists already" in again.err and out.read_text() == before
+    nowhere = replay("report", radio_run, "-o", tmp_path / "none" / "page.html")
+    assert nowhere.code == 1 and "cannot be written" in nowhere.err
+
+
+def test_bad_files_are_refused_and_leave_no_page(bad_files: list[Path], run: Path, tmp_path: Path) -> None:
+    out = tmp_path / "page.html"
+    for path in (*bad_files, damaged(run, tmp_path / "damaged.mcap")):
+        typed = replay("report", path, "-o", out)
+        assert (typed.code, str(path) in typed.err, out.exists()) == (2, True, False)
+
+
+def test_an_event_that_is_none_is_named(run: Path, tmp_path: Path) -> None:
+    messages = messages_of(run)
+    number = next(n for n, message in enumerate(messages) if message.topic == "/tick" and n > 20)
+    messages[number] = with_row(messages[number], edits=[{"kind": "network", "event": '{"clog": 3}'}])
+    typed = replay("report", rewritten(run, tmp_path / "bad.mcap", messages), "-o", tmp_path / "page.html")
+    assert typed.code == 2 and "no event of a network" in typed.err
+
+
+def test_unfinished_and_empty_captures_have_a_page(radio_run: Path, run: Path, tmp_path: Path) -> None:
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(run.read_bytes()[: run.stat().st_size * 2 // 3])
+    part = gather(open_capture(torn), "torn")
+    assert not part.finished and part.fates["offered"] > 0 and part.fates["in_flight"] == 0
+    assert "not finished" in " ".join(Page(page(part)).texts)
+    for kept in (("/tick", "/layout", "/frame"), ()):
+        messages = [message for message in messages_of(radio_run) if message.topic in kept]
+        name = tmp_path / f"empty{len(kept)}.mcap"
+        silent = gather(open_capture(rewritten(radio_run, name, messages)), "silent")
+        assert silent.fates["offered"] == 0 and silent.links == ()
+        assert "No packets." in Page(page(silent)).texts
+
+
+def test_memory_is_bounded_and_samples_are_fair() -> None:
+    sample = Sample("test")
+    for value in range(20_000):
+        sample.add(value)
+    assert (sample.count, sample.mean, sample.most) == (20_000, 9999.5, 19_999)
+    assert len(sample.kept) == SAMPLES
+    assert sample.quantile(0.5) == pytest.approx(10_000, rel=0.1)
+
+
+def test_spans_are_round_and_few() -> None:
+    assert bin_width_ns(10_000_000_000, 2_000_000) == 200_000_000
+    assert bin_width_ns(0, 2_000_000) == 2_000_000
+    for span in (1, 7_000_000, 3_600_000_000_000):
+        assert span / bin_width_ns(span, 1) <= 60
+    assert [round_up(value) for value in (0.0, 0.3, 1.0, 2.1, 99.0)] == pytest.approx([1.0, 0.3, 1.0, 3.0, 100.0])
+    assert round_up(2.1, WHOLE) == 5.0
