@@ -96,14 +96,13 @@ def _disorder(planting: Planting) -> None:
 
 @register("deliveries come early", "what is sent at k arrives at ceil(due / T)", 1)
 def _early(planting: Planting) -> None:
-    def send(self: Any, flight: Any, tick: int, fates: Any) -> None:
-        before(self, flight, tick, fates)
-        later = self._flights.get(tick + 2, [])
-        if flight in later and flight.destination in self._robots:
-            later.remove(flight)
-            self._flights.setdefault(tick + 1, []).append(flight)
+    def let_fly(self: Any, flight: Any, earliest: int) -> None:
+        before(self, flight, earliest)
+        if flight.arrival_tick == earliest + 1 and flight.destination in self._robots:
+            self._flights[earliest + 1].remove(flight)
+            self._flights.setdefault(earliest, []).append(flight)
 
-    before: Any = planting.swap(HubState, "_send", send)
+    before: Any = planting.swap(HubState, "_let_fly", let_fly)
 
 
 @register("robots' numbers repeat", "a robot's sequence number is tick x 2^16 + index", 1)
