@@ -278,3 +278,27 @@ def test_a_vhub_dies_that_a_supervisor_has_just_recalled(what: str) -> None:
     assert seen.run.json["reason"] == "done" and len(kills) == 1
     assert seen.run.digests == undisturbed().run.digests[:120]
     assert [entry["what"] for entry in seen.run.json["recoveries"]] == ["supervisor"]
+
+
+def test_an_epoch_of_before_is_no_answer_to_a_supervisor_that_was_started_again() -> None:
+    """A late copy of it comes to a vHub that was recalled, whose first word of where it stands is lost."""
+    systems: list[System] = []
+    losses: list[int] = []
+
+    def watch(traced: Traced) -> None:
+        is_standing = (traced.process, traced.what, traced.channel) == (channels.VHUB, "publish", "standing")
+        if is_standing and systems and systems[0].supervisor.take_over is not None and not losses:
+            losses.append(traced.now_ns)
+            bus, epoch = systems[0].bus, systems[0].supervisor.epoch_payload
+            bus.put("nobody", channels.EPOCH, channels.SUPERVISOR, epoch, bus.now_ns)
+            bus.cut_off(channels.VHUB, bus.now_ns + MS, hears=False)
+
+    def restart(system: System) -> None:
+        systems.append(system)
+        system.kill(channels.SUPERVISOR)
+        system.later(50 * MS, partial(system.start, channels.SUPERVISOR))
+
+    chosen = {"weather": SLOW, "keeps_journals": True, "observer": watch}
+    seen = fly([(80, restart)], 120, (*SETS, "deadlines.orphan=5 s"), **chosen)
+    assert seen.run.json["reason"] == "done" and len(losses) == 1
+    assert seen.run.digests == undisturbed().run.digests[:120]
