@@ -58,6 +58,8 @@ class Member:
         self._built: set[bytes] = set()
         """Digests of the layouts that were said to be ready."""
         self._entered = False
+        self._entered_by = ""
+        """Boot of the supervisor in one of whose epochs it was the last time."""
         self._coming: tuple[Build, Deployment, Fetching] | None = None
         """A build whose files are on their way."""
         self._files: dict[str, bytes] = {}
@@ -188,10 +190,15 @@ class Member:
     def entered(self) -> None:
         """An epoch with this process in it has begun: nothing is to be said again."""
         self._entered = True
+        self._entered_by = "" if self.build is None else self.build.supervisor
 
     def repeated(self, is_present: bool) -> None:
-        """An epoch came again; the present one answers a ready that was said again."""
-        self._entered = self._entered or is_present
+        """An epoch came again; the present one answers a ready that was said again.
+
+        Not to a supervisor that has recalled this process: it begins an epoch of its own, this is one of before.
+        """
+        is_known = self.build is not None and self.build.supervisor == self._entered_by and not self._recalled_by
+        self._entered = self._entered or (is_present and is_known)
 
     def begin_anew(self) -> None:
         """The run goes on without this process: come back by the handshake. What is built stays."""

@@ -96,9 +96,23 @@ def _kill(dice: Dice, names: Sequence[str]) -> Fault:
 def _end(system: System, name: str, names: Sequence[str]) -> None:
     """Kill a node; one is started at once if none is left, since no further tick would be committed."""
     system.kill(name)
-    stopped = system.supervisor.roster.stopped
-    if not any(other in system.processes and other not in stopped for other in names):
+    if _is_none_left(system, names):
         system.start(name)
+
+
+def _is_none_left(system: System, names: Sequence[str]) -> bool:
+    """Whether no node is there that may take part."""
+    stopped = system.supervisor.roster.stopped
+    return not any(name in system.processes and name not in stopped for name in names)
+
+
+def _leave_one(system: System, names: Sequence[str]) -> None:
+    """Start a node if none is left: those that are to come back wait for ticks that nobody would compute."""
+    if _is_none_left(system, names):
+        stopped = system.supervisor.roster.stopped
+        name = next((name for name in names if name not in stopped), names[0])
+        ask(system, "start", node=name)
+        revive(system, name)
 
 
 def revive(system: System, name: str) -> None:
@@ -111,7 +125,8 @@ def _stop(dice: Dice, names: Sequence[str]) -> Fault:
     node = dice.one_of(names)
 
     def do(system: System) -> None:
-        ask(system, "stop", node=node)
+        asked = [ask(system, "stop", node=node)]
+        when_answered(system, asked, partial(_leave_one, names=names))
         tick = system.supervisor.frame.tick
         system.at_tick(tick + 10, partial(_here(node, lambda found: _end(found, node, names)), system))
         system.at_tick(tick + 15, partial(ask, system, "start", node=node))

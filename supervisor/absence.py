@@ -37,19 +37,21 @@ class Absence:
         """Where it stood when it was lost for not going on; -1 when it was lost for anything else."""
 
     def lose(self, reason: str, now_ns: int) -> None:
-        """The vHub is gone."""
+        """The vHub is gone: a run that goes on waits for it, and says for how long in its account."""
         core = self._core
         process = core.roster.by_name.get(channels.VHUB)
         if process is not None:
             core.roster.lose(process)
         if self.is_away:
             return
+        if not core.is_open:  # it is waited for as those are who have not come yet
+            if core.take_over is not None:
+                core.take_over.lose_hub()
+            core.say("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
+            return
         told = None if process is None else process.heartbeat
         self._tick = told.tick if told is not None and "overdue" in reason else -1
         self.is_away, self._since_ns, self._gap_ns = True, now_ns, 0
-        if not core.is_open:
-            core.say("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
-            return
         self._reason, self._lost_at = reason, (core.epoch, core.frame.tick)
         core.say("warning", f"lost the vHub: {reason}; the run waits for it at tick {core.frame.tick}")
 
@@ -61,7 +63,8 @@ class Absence:
         goes_on = self._tick < 0 or (told is not None and told.tick > self._tick)
         if core.end is None and goes_on and now_ns > max(self._since_ns, process.gone_ns) + SAID_NS:
             process.lost = False
-            self.ready(now_ns)
+            if core.is_open:  # else it says itself that it is ready, until it is told of an epoch
+                self.ready(now_ns)
 
     def ready(self, now_ns: int) -> None:
         """The vHub takes part: tell it what it does not know."""
@@ -84,7 +87,7 @@ class Absence:
     def is_over(self, now_ns: int) -> bool:
         """Whether the vHub was away for longer than a run waits; then the run is over, which is said."""
         core = self._core
-        if not self.is_away or not core.is_open or now_ns < self._since_ns + core.deployment.deadlines.vhub_back_ns:
+        if not self.is_away or now_ns < self._since_ns + core.deployment.deadlines.vhub_back_ns:
             return False
         wait_s = core.deployment.deadlines.vhub_back_ns / 1e9
         self._note()
@@ -93,6 +96,4 @@ class Absence:
 
     def _note(self) -> None:
         """Put it into the account, when it is over: the world stood still until now."""
-        core = self._core
-        if core.is_open:
-            self._entry = core.recovery.note("vhub", channels.VHUB, self._reason, *self._lost_at)
+        self._entry = self._core.recovery.note("vhub", channels.VHUB, self._reason, *self._lost_at)

@@ -59,6 +59,10 @@ class TakeOver:
         self._standing = standing
         return True
 
+    def lose_hub(self) -> None:
+        """The vHub is gone again: the next one tells where it stands."""
+        self._standing = None
+
     def wake(self, now_ns: int) -> None:
         """Begin the epoch when everybody is here, or when those who are not have had their time."""
         core = self._core

@@ -147,13 +147,13 @@ class Watch:
         """Return who is lost, and why."""
         self.now_ns = now_ns
         deadlines = self.deployment.deadlines
-        if core.take_over is not None:
-            return {}
         if core.epoch == 0:
             return self._late_to_start(core, now_ns)
         silent = self.roster.silent(now_ns, deadlines.heartbeat_ns)
         if silent:
             return dict.fromkeys(silent, f"no heartbeat for {deadlines.heartbeat_ns / 1e9:g} s")
+        if core.take_over is not None:
+            return {}  # nobody is waited for yet
         if core.absence.is_away:
             self._progress_ns = now_ns  # nothing goes on without it, and nobody else is to blame
             return {}

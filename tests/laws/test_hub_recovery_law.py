@@ -30,6 +30,8 @@ TICKS: Final = 240
 MS: Final = 1_000_000
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms")
+SLOW: Final = Weather(1, delay_ns=8 * MS)
+"""Time passes between what is said and heard."""
 Fault = tuple[int, Callable[[System], object]]
 
 
@@ -232,3 +234,71 @@ def test_supervisor_and_vhub_are_lost_together(hub_ms: int, supervisor_ms: int) 
     seen = fly([(80, both), (160, both)], keeps_journals=True)
     assert_the_same(seen, undisturbed())
     assert {entry["what"] for entry in seen.run.json["recoveries"]} >= {"supervisor"}
+
+
+def test_a_vhub_that_dies_before_the_run_begins_is_waited_for() -> None:
+    """It is no loss of the run: the one that comes instead begins with all others, and the run goes on to its end."""
+
+    early: list[bool] = []
+
+    def kill(system: System) -> None:
+        early.append(not system.supervisor.is_open)
+        system.kill_hub("now", 40 * MS)
+
+    def prepare(system: System) -> None:
+        system.later(30 * MS, partial(kill, system))
+
+    chosen = Settings(weather=SLOW, restart_ns=500 * MS)
+    run = rehearse(TABLE.read_text(), TABLE.name, 60, 2, (*SETS, "deadlines.vhub_back=250 ms"), chosen, prepare=prepare)
+    assert run.json["reason"] == "done" and run.json["recoveries"] == [] and early == [True]
+    assert run.digests == undisturbed().run.digests[:60]
+
+
+@pytest.mark.parametrize("what", ["publish", "receive"])
+def test_a_vhub_dies_that_a_supervisor_has_just_recalled(what: str) -> None:
+    """Whether its hello comes behind the news that it is gone, or before: it does not keep the next one out."""
+    systems: list[System] = []
+    kills: list[int] = []
+
+    def watch(traced: Traced) -> None:
+        who = channels.VHUB if what == "publish" else channels.SUPERVISOR
+        is_hello = (traced.process, traced.what, traced.channel, traced.name) == (who, what, "hello", channels.VHUB)
+        if is_hello and systems and systems[0].supervisor.take_over is not None and not kills:
+            kills.append(traced.now_ns)
+            systems[0].later(what == "receive", partial(systems[0].kill_hub, "now", 40 * MS))
+
+    def restart(system: System) -> None:
+        systems.append(system)
+        system.kill(channels.SUPERVISOR)
+        system.later(50 * MS, partial(system.start, channels.SUPERVISOR))
+
+    sets = (*SETS, "deadlines.orphan=5 s", "deadlines.vhub_back=250 ms")
+    chosen = {"weather": SLOW, "restart_ns": 500 * MS, "keeps_journals": True, "observer": watch}
+    seen = fly([(80, restart)], 120, sets, **chosen)
+    assert seen.run.json["reason"] == "done" and len(kills) == 1
+    assert seen.run.digests == undisturbed().run.digests[:120]
+    assert [entry["what"] for entry in seen.run.json["recoveries"]] == ["supervisor"]
+
+
+def test_an_epoch_of_before_is_no_answer_to_a_supervisor_that_was_started_again() -> None:
+    """A late copy of it comes to a vHub that was recalled, whose first word of where it stands is lost."""
+    systems: list[System] = []
+    losses: list[int] = []
+
+    def watch(traced: Traced) -> None:
+        is_standing = (traced.process, traced.what, traced.channel) == (channels.VHUB, "publish", "standing")
+        if is_standing and systems and systems[0].supervisor.take_over is not None and not losses:
+            losses.append(traced.now_ns)
+            bus, epoch = systems[0].bus, systems[0].supervisor.epoch_payload
+            bus.put("nobody", channels.EPOCH, channels.SUPERVISOR, epoch, bus.now_ns)
+            bus.cut_off(channels.VHUB, bus.now_ns + MS, hears=False)
+
+    def restart(system: System) -> None:
+        systems.append(system)
+        system.kill(channels.SUPERVISOR)
+        system.later(50 * MS, partial(system.start, channels.SUPERVISOR))
+
+    chosen = {"weather": SLOW, "keeps_journals": True, "observer": watch}
+    seen = fly([(80, restart)], 120, (*SETS, "deadlines.orphan=5 s"), **chosen)
+    assert seen.run.json["reason"] == "done" and len(losses) == 1
+    assert seen.run.digests == undisturbed().run.digests[:120]

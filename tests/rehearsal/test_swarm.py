@@ -14,9 +14,9 @@ from foosim.node.core import NodeCore
 from foosim.node.step import Work
 from foosim.rehearsal.bus import CALM
 from foosim.rehearsal.clock import Clock
-from foosim.rehearsal.faults import CHANGES_THE_WORLD, HEALED_TICK, HOUR_NS, KINDS, TICKS
+from foosim.rehearsal.faults import CHANGES_THE_WORLD, FAULT_OF, HEALED_TICK, HOUR_NS, KINDS, TICKS, Dice
 from foosim.rehearsal.rehearse_command import app
-from foosim.rehearsal.swarm import FAULTS, NODES, WORLDS, Flight, fly, plan_of, undisturbed
+from foosim.rehearsal.swarm import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
 from foosim.rehearsal.system import Settings
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -58,6 +58,28 @@ def test_clocks_decide_nothing() -> None:
         flight.run()
         chains.append((flight.system.supervisor.chain, flight.seen, flight.system.bus.now_ns))
     assert chains[0] == chains[1]
+
+
+class _Loaded(Dice):
+    """Gives what it is told to."""
+
+    def __init__(self, *picks: int) -> None:
+        super().__init__(0)
+        self._picks = list(picks)
+
+    def between(self, low: int, high: int) -> int:
+        return self._picks.pop(0)
+
+
+def test_faults_leave_a_node_that_may_take_part() -> None:
+    """The last one is stopped while it is not yet back, and the others come back at ticks: one of them does at once."""
+    names = ["n1", "n2", "n3"]
+    kinds = (("kill", 0, 40, 50), ("stop", 1, 50), ("kill", 2, 40, 52), ("stop", 2, 52))
+    faults = tuple(FAULT_OF[kind](_Loaded(*picks), names) for kind, *picks in kinds)
+    flight = Flight(TABLE.read_text(), TABLE.name, Plan(0, 3, CALM, faults, ()), Settings())
+    flight.run()
+    assert flight.system.supervisor.chain == undisturbed(TABLE.read_text(), TABLE.name, 0, TICKS)
+    assert all(answer.accepted for answer in flight.system.answers.values())
 
 
 class _Dizzy(NodeCore):
