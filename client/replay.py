@@ -272,9 +272,9 @@ class Replay:
         raise ReplayGone("the replay has ended" if self.ended else f"no answer to {verb} within {timeout_s:g} s")
 
     def _wait(self, identity: str) -> Answer | None:
-        """Return the answer to a request when it comes soon."""
+        """Return the answer to a request when it comes soon: the news that the replay has ended may overtake it."""
         again_s = time.monotonic() + AGAIN_S
-        while identity not in self._answers and not self.ended and (left_s := again_s - time.monotonic()) > 0:
+        while identity not in self._answers and (left_s := again_s - time.monotonic()) > 0:
             self._read(left_s)
         return self._answers.pop(identity, None)
 
