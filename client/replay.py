@@ -121,6 +121,8 @@ class Replay:
         """The newest that was heard."""
         self.ended = False
         """Whether all was heard that comes."""
+        self._is_gone = False
+        """Whether its presence has ended: news that may overtake what it has said."""
         self.malformed = 0
         self._name = name
         self._session = session
@@ -163,7 +165,11 @@ class Replay:
             left_s = None if deadline_s is None else deadline_s - time.monotonic()
             if left_s is not None and left_s <= 0:
                 break
-            self._read(left_s)
+            if self._is_gone:
+                self._read(AGAIN_S)
+                self.ended |= not self._heard
+            else:
+                self._read(left_s)
         heard = list(self._heard)
         self._heard.clear()
         return heard
@@ -185,7 +191,7 @@ class Replay:
                     answer: Answer = channels.read(channels.REPLAY_ANSWER, name, payload)
                     self._answers[answer.id] = answer
                 elif key == ALIVE[Plane.REPLAY]:
-                    self.ended |= payload == b"-"
+                    self._is_gone |= payload == b"-"
             except Malformed:
                 self.malformed += 1
 
@@ -258,7 +264,7 @@ class Replay:
         identity = f"r{self._asked}"
         payload = encode(Request(self._name, identity, verb, encode_json(arguments)))
         deadline_s = time.monotonic() + timeout_s
-        while time.monotonic() < deadline_s and not self.ended:
+        while time.monotonic() < deadline_s and not (self.ended or self._is_gone):
             self._wire.put(channels.REPLAY_REQUEST, self._name, payload)
             answer = self._wait(identity)
             if answer is None:
@@ -269,7 +275,7 @@ class Replay:
             if not isinstance(status, dict):
                 raise ReplayRefused("an answer that is no status")
             return status
-        raise ReplayGone("the replay has ended" if self.ended else f"no answer to {verb} within {timeout_s:g} s")
+        raise ReplayGone("the replay has ended" if self.ended or self._is_gone else f"no answer to {verb} within {timeout_s:g} s")
 
     def _wait(self, identity: str) -> Answer | None:
         """Return the answer to a request when it comes soon: the news that the replay has ended may overtake it."""
