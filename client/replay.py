@@ -275,7 +275,8 @@ class Replay:
             if not isinstance(status, dict):
                 raise ReplayRefused("an answer that is no status")
             return status
-        raise ReplayGone("the replay has ended" if self.ended or self._is_gone else f"no answer to {verb} within {timeout_s:g} s")
+        has_ended = self.ended or self._is_gone
+        raise ReplayGone("the replay has ended" if has_ended else f"no answer to {verb} within {timeout_s:g} s")
 
     def _wait(self, identity: str) -> Answer | None:
         """Return the answer to a request when it comes soon: the news that the replay has ended may overtake it."""
