@@ -14,14 +14,13 @@ from typing import Final
 from foosim.protocol.scene import Vector
 from foosim.vhub.memory import AirState, Transmission
 from foosim.vhub.packet import Flight
-from foosim.vhub.propagation import Propagation, zeptowatt
-from foosim.vhub.radio.errors import LORA_ISOLATION_DB
+from foosim.vhub.propagation import Propagation
+from foosim.vhub.radio.errors import LORA_FACTORS
+from foosim.vhub.radio.noise import NEGLIGIBLE_CDB, units_of
 
 DEAF: Final = 2**62
 """In units of 1e-21 W: the interference of a station with itself. That of others stays below: it is cut there, since
 sums of cut numbers do not depend on their order either, and a state has 64 bits for them."""
-NEGLIGIBLE_CDB: Final = 1000
-"""What is weaker than noise by this does not count."""
 NOTHING_CDBM: Final = -(10**6)
 
 
@@ -96,7 +95,9 @@ def _spoil(flight: Flight, known: Transmission, of: Propagation) -> None:
     if power_cdbm <= of.noise_cdbm - NEGLIGIBLE_CDB:
         return
     if flight.interference < DEAF:
-        flight.interference = min(DEAF - 1, flight.interference + zeptowatt(power_cdbm))
+        flight.interference = min(DEAF - 1, flight.interference + units_of(power_cdbm))
     if of.settings.medium == "lora":
-        isolation_db = LORA_ISOLATION_DB[of.settings.spreading_factor - 7][known.spreading_factor - 7]
-        flight.is_spoiled |= flight.received_cdbm - power_cdbm < isolation_db * 100
+        powers = list(flight.by_factor or (0,) * len(LORA_FACTORS))
+        place = known.spreading_factor - LORA_FACTORS[0]
+        powers[place] = min(DEAF - 1, powers[place] + units_of(power_cdbm))
+        flight.by_factor = tuple(powers)

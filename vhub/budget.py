@@ -8,8 +8,9 @@ from __future__ import annotations
 from foosim.protocol.draws import draw_key
 from foosim.protocol.radios import Fading
 from foosim.vhub.packet import Flight
-from foosim.vhub.propagation import OUT_OF_RANGE, Path, Propagation, centi, level_of, zeptowatt
+from foosim.vhub.propagation import OUT_OF_RANGE, Path, Propagation
 from foosim.vhub.radio.fading import block_of, fading_db, nakagami_m
+from foosim.vhub.radio.noise import centi, ratio_cdb
 
 
 class Budget:
@@ -46,10 +47,7 @@ class Budget:
 
     def ratio_cdb(self, flight: Flight) -> int:
         """Return the ratio of a packet's signal to noise and to all that others send meanwhile."""
-        if not flight.interference:
-            return flight.snr_cdb
-        noise = zeptowatt(self.propagation.noise_cdbm)
-        return flight.received_cdbm - centi(level_of(noise + flight.interference))
+        return ratio_cdb(flight.received_cdbm, self.propagation.noise_cdbm, flight.interference)
 
     def _fade(self, fading: Fading, time_ns: int, distance_mm: int) -> int:
         parameter = fading.k_db

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, inf, log10, sqrt
+from math import exp, inf, sqrt
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
@@ -19,7 +19,7 @@ from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.jitter import CELLS, interpolate_ns, quantiles_ns
 from foosim.vhub.profiles import NO_RADIO, Profile, Profiles, over, preset_radio
-from foosim.vhub.propagation import THERMAL_NOISE_DBM_HZ, environment_of
+from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (
     LRWPAN_OVERHEAD_BYTES,
@@ -31,6 +31,7 @@ from foosim.vhub.radio.airtime import (
     wifi_airtime_ns,
 )
 from foosim.vhub.radio.contention import saturation_rate_hz, sensing
+from foosim.vhub.radio.noise import noise_dbm as radio_noise_dbm
 from foosim.vhub.radio.path_loss import range_m
 from foosim.vhub.radio.timings import LRWPAN
 from foosim.vhub.stages.medium import BASE_STATION_DBM, OPPORTUNITY_BYTES, mode_of, wifi_modes, wifi_timing
@@ -356,7 +357,7 @@ def ranges_of(settings: Radio) -> tuple[float | None, float | None]:
         return None, None
     gain_db, path_loss = settings.antenna.gain_dbi, settings.path_loss
     power_dbm = settings.tx_power_dbm + 2.0 * gain_db
-    noise_dbm = THERMAL_NOISE_DBM_HZ + 10.0 * log10(settings.bandwidth_hz) + settings.noise_figure_db
+    noise_dbm = radio_noise_dbm(settings.bandwidth_hz, settings.noise_figure_db)
     loss_db = power_dbm - max(settings.sensitivity_dbm, _least_dbm(settings, noise_dbm))
     environment = environment_of(settings)
     hard_m = inf if path_loss.range_m is None else path_loss.range_m

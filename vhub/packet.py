@@ -7,12 +7,12 @@ one file each.
 
 from __future__ import annotations
 
-from math import log10
 from typing import Final
 
 import msgspec
 
 from foosim.protocol.limits import PACKET_HEAD_BYTES_MAX
+from foosim.vhub.radio.noise import centi, level_of
 
 DELIVERED: Final = "delivered"
 DROPPED: Final = "dropped"
@@ -87,8 +87,8 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Whether the link makes a copy of it."""
     is_settled: bool = False
     """Whether it was acknowledged: nothing that is sent later spoils it."""
-    is_spoiled: bool = False
-    """Whether something else on air meanwhile was too strong for it to survive (LoRa)."""
+    by_factor: tuple[int, ...] = ()
+    """Of LoRa: the interference by spreading factor, from 7 on."""
     held_ns: int = 0
     """For how long clogs put off its due time."""
     outcome: str = ""
@@ -107,4 +107,4 @@ def size_of(flight: Flight) -> int:
 
 def level_cdbm(power: int) -> int:
     """Return a power in units of 1e-21 W as a level in 0.01 dBm; 0 for no power."""
-    return round(100.0 * (10.0 * log10(power) - 180.0)) if power else 0
+    return centi(level_of(power)) if power else 0

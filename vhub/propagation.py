@@ -7,7 +7,7 @@ decides nothing. Neighbours: `radio` (the formulas), `world` (places and walls),
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import log10, sqrt
+from math import sqrt
 from typing import Final
 
 from foosim.protocol.radio_materials import RadioMaterial
@@ -15,34 +15,17 @@ from foosim.protocol.radios import Radio
 from foosim.protocol.scene import Vector
 from foosim.vhub.geometry import Crossing
 from foosim.vhub.radio.materials import slab_loss_db
+from foosim.vhub.radio.noise import centi, noise_dbm
 from foosim.vhub.radio.path_loss import ENVIRONMENTS, Environment, Itu1238, LogDistance, path_loss_db
 from foosim.vhub.radio.shadowing import shadowing_db
 from foosim.vhub.world import World
 
 BLOCKED: Final = "blocked"
 OUT_OF_RANGE: Final = "out_of_range"
-THERMAL_NOISE_DBM_HZ: Final = -174.0
 NEVER_CDB: Final = 10**6
 """A loss that nothing gets over."""
 PLACES_KEPT: Final = 4096
 """Pairs of places of which the bounds of the loss are remembered, at least."""
-ZEPTOWATT_DBM: Final = -180.0
-"""1e-21 W: powers of others are summed in whole numbers of it, in any order."""
-
-
-def centi(level: float) -> int:
-    """Return a level in whole hundredths."""
-    return round(level * 100.0)
-
-
-def zeptowatt(level_cdbm: int) -> int:
-    """Return a power given in 0.01 dBm in whole units of 1e-21 W."""
-    return int(10.0 ** ((level_cdbm / 100.0 - ZEPTOWATT_DBM) / 10.0))
-
-
-def level_of(power: int) -> float:
-    """Return a power in units of 1e-21 W as a level in dBm."""
-    return 10.0 * log10(power) + ZEPTOWATT_DBM
 
 
 def _distance_m(a: Vector, b: Vector) -> float:
@@ -100,7 +83,7 @@ class Propagation:
         self._range_m, self._strict = path_loss.range_m, path_loss.strict_los
         x, y, z = settings.antenna.mount
         self._mount = x, y, z
-        self.noise_cdbm = centi(THERMAL_NOISE_DBM_HZ + 10.0 * log10(settings.bandwidth_hz) + settings.noise_figure_db)
+        self.noise_cdbm = centi(noise_dbm(settings.bandwidth_hz, settings.noise_figure_db))
         self.power_cdbm = centi(settings.tx_power_dbm + settings.antenna.gain_dbi)
         self.gain_cdb = centi(settings.antenna.gain_dbi)
         self.sense_cdbm = centi(settings.sense_dbm)

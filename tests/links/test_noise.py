@@ -7,7 +7,7 @@ from math import log10
 
 import pytest
 
-from foosim.vhub.radio.noise import milliwatts, noise_dbm, sinr_centi_db
+from foosim.vhub.radio.noise import level_of, noise_dbm, ratio_cdb, units_of
 
 
 @pytest.mark.parametrize(
@@ -19,20 +19,19 @@ def test_noise_floors(bandwidth_hz: float, figure_db: float, expected: float) ->
 
 
 def test_without_interference_it_is_the_difference() -> None:
-    assert sinr_centi_db(-70.0, -94.0) == 2400
-    assert sinr_centi_db(-70.004, -94.0) == 2400 and sinr_centi_db(-70.006, -94.0) == 2399
+    assert ratio_cdb(-7000, -9400, 0) == 2400
 
 
 def test_interference_adds_in_power() -> None:
-    assert sinr_centi_db(-70.0, -94.0, [-94.0]) == 2400 - round(1000 * log10(2))
-    assert sinr_centi_db(-70.0, -94.0, [-80.0]) == round(-100 * (70 + 10 * log10(1e-8 + milliwatts(-94.0))))
+    assert ratio_cdb(-7000, -9400, units_of(-9400)) == 2400 - round(1000 * log10(2))
+    assert ratio_cdb(-7000, -9400, units_of(-8000)) == round(-100 * (70 + 10 * log10(1e-8 + 10**-9.4)))
 
 
-def test_what_is_far_below_the_noise_is_left_out() -> None:
-    assert sinr_centi_db(-70.0, -94.0, [-104.1] * 50) == 2400
-    assert sinr_centi_db(-70.0, -94.0, [-103.9]) < 2400
+def test_powers_come_back_to_the_hundredth() -> None:
+    for level_cdbm in range(-14000, 3000, 37):
+        assert level_of(units_of(level_cdbm)) == pytest.approx(level_cdbm / 100, abs=0.005)
 
 
 def test_the_order_of_interferers_is_nothing() -> None:
-    powers = (-91.3, -60.01, -77.7, -88.8, -93.21)
-    assert len({sinr_centi_db(-66.0, -94.0, order) for order in permutations(powers)}) == 1
+    powers = [units_of(level) for level in (-9130, -6001, -7770, -8880, -9321)]
+    assert len({ratio_cdb(-6600, -9400, sum(order)) for order in permutations(powers)}) == 1

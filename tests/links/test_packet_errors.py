@@ -171,10 +171,10 @@ def test_lora_needs_its_sensitivity() -> None:
 
 
 def test_lora_captures() -> None:
-    def alone(factor: int, power_dbm: float) -> list[float]:
-        return [10 ** (power_dbm / 10) if sf == factor else 0.0 for sf in range(7, 13)]
+    def alone(factor: int, power_dbm: float) -> list[float | None]:
+        return [power_dbm if sf == factor else None for sf in range(7, 13)]
 
-    assert lora_interferer(9, -100.0, [0.0] * 6) == 0
+    assert lora_interferer(9, -100.0, [None] * 6) == 0
     assert lora_interferer(9, -100.0, alone(9, -105.9)) == 9 and lora_interferer(9, -100.0, alone(9, -106.1)) == 0
     assert lora_interferer(7, -100.0, alone(12, -80.1)) == 0 and lora_interferer(7, -100.0, alone(12, -79.9)) == 12
     assert lora_interferer(12, -100.0, alone(7, -64.1)) == 0 and lora_interferer(12, -100.0, alone(7, -63.9)) == 7

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import erfc, exp, expm1, log1p, log2, log10, sqrt
+from math import erfc, exp, expm1, log1p, log2, sqrt
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -196,16 +196,16 @@ def lora_received(factor: int, power_dbm: float, at_gateway: bool = False) -> bo
     return power_dbm >= floors[factor - 7]
 
 
-def lora_interferer(factor: int, power_dbm: float, interference_mw: Sequence[float]) -> int:
+def lora_interferer(factor: int, power_dbm: float, interference_dbm: Sequence[float | None]) -> int:
     """Return the spreading factor of the interference that destroys a frame, the lowest; 0 when it survives all.
 
-    `interference_mw` has, for each spreading factor from 7 on, the sum of the others' received powers in mW, each
-    times the share of the frame's duration for which it overlaps.
+    `interference_dbm` has, for each spreading factor from 7 on, the sum of the received powers of all that overlap with
+    the frame, however briefly; None where nothing does.
     """
     for other, (interference, isolation_db) in enumerate(
-        zip(interference_mw, LORA_ISOLATION_DB[factor - 7], strict=True), LORA_FACTORS[0]
+        zip(interference_dbm, LORA_ISOLATION_DB[factor - 7], strict=True), LORA_FACTORS[0]
     ):
-        if interference > 0.0 and power_dbm - 10.0 * log10(interference) < isolation_db:
+        if interference is not None and power_dbm - interference < isolation_db:
             return other
     return 0
 

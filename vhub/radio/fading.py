@@ -13,7 +13,6 @@ from math import exp, gamma, log, log10, sqrt
 from typing import Final, Literal
 
 from foosim.protocol.draws import draw_words
-from foosim.vhub.radio.path_loss import LIGHT_M_S
 
 Kind = Literal["none", "rayleigh", "rician", "nakagami"]
 
@@ -130,12 +129,6 @@ def nakagami_m(distance_m: float) -> float:
 
 RICIAN_K_DB: Final = 8.0
 """Source: INET's default for Rician fading."""
-
-
-def coherence_time_ns(speed_m_s: float, frequency_hz: float) -> int:
-    """Return 0.42 over the Doppler shift of a relative speed: how long a block lasts. Recalled, unverified."""
-    assert speed_m_s > 0.0, speed_m_s
-    return max(round(0.42 * LIGHT_M_S / (speed_m_s * frequency_hz) * 1e9), 1)
 
 
 def block_of(time_ns: int, coherence_ns: int) -> int:

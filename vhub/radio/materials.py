@@ -18,8 +18,6 @@ from foosim.vhub.radio.path_loss import LIGHT_M_S
 
 METAL_MAX_DB: Final = 60.0
 """Judgement: behind a closed sheet of metal, what comes round its edges and through its gaps is what is left."""
-UNKNOWN_WALL_DB: Final = 5.0
-"""Of a body whose material is not known, each time a ray passes it: ns-3's default for a wall within a building."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from foosim.protocol.draws import UNIT, Slot
 from foosim.vhub.air import DEAF
 from foosim.vhub.packet import Flight
 from foosim.vhub.propagation import OUT_OF_RANGE
-from foosim.vhub.radio.errors import LORA_SENSITIVITY_DBM
+from foosim.vhub.radio.errors import lora_interferer, lora_received
+from foosim.vhub.radio.noise import level_of
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.medium import COLLISION, SNR, error_threshold
 
@@ -57,9 +58,13 @@ class Channel:
         return COLLISION if word < flight.error_threshold else ""
 
     def _judge_lora(self, flight: Flight) -> str:
-        """LoRa captures: a signal survives others that are weaker by the isolation of their spreading factors."""
+        """LoRa captures: a signal survives others that are together weaker by their spreading factor's isolation."""
         factor = self._settings.spreading_factor
-        if flight.received_cdbm < LORA_SENSITIVITY_DBM[factor - 7] * 100:
+        power_dbm = flight.received_cdbm / 100.0
+        if not lora_received(factor, power_dbm):
             flight.error_threshold = UNIT
             return OUT_OF_RANGE
-        return COLLISION if flight.is_spoiled else ""
+        if not flight.by_factor:
+            return ""
+        others = [level_of(power) if power else None for power in flight.by_factor]
+        return COLLISION if lora_interferer(factor, power_dbm, others) else ""
