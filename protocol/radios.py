@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from foosim.protocol import units
 from foosim.protocol.hosts import Name
-from foosim.protocol.impairments import Impairments, default
+from foosim.protocol.impairments import LinkSettings, default
 from foosim.protocol.presets import PRESETS, preset_settings
 from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity
@@ -76,7 +76,7 @@ class Fading(Part):
     coherence_ns: Spread = default("10 ms", "coherence")
 
 
-class RadioKeys(Impairments):
+class RadioKeys(LinkSettings):
     """Everything that can be said of a radio."""
 
     medium: Literal["none", "wired", "radio", "wifi", "ieee802154", "lora", "lte"] = "none"

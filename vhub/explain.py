@@ -19,10 +19,12 @@ from foosim.protocol.names import nearest_name
 from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.figures import EXACT, rate_text, time_text
+from foosim.vhub.link_models import VERSION_KEY
 from foosim.vhub.propagation import crossing_db
 from foosim.vhub.rows import PACKETS, TICK, PacketRow, TickRow, edit_of
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
+from foosim.vhub.stages.own import MODEL, MODEL_FAILED
 from foosim.vhub.stages.residual import Residual
 from foosim.vhub.state import OUTBOX_SHIFT
 
@@ -77,7 +79,7 @@ class Explained:
 
 PASSED, DROPPED, ABSENT, UNREACHED = "passed", "dropped", "not on this link", "not reached"
 STAGE_NAMES: Final = (
-    *("admit", "policy", "duty", "queue", "medium", "channel", "residual", "mangle", "delay", "receiver"),
+    *("admit", "policy", "duty", "queue", "medium", "channel", "residual", "model", "mangle", "delay", "receiver"),
 )
 _AT_SENDING: Final = {
     **dict.fromkeys(("too_big", "node_down", "no_route"), "admit"),
@@ -87,6 +89,7 @@ _AT_SENDING: Final = {
     **dict.fromkeys(("collision",), "medium"),
     **dict.fromkeys(("out_of_range", "blocked", "snr"), "channel"),
     **dict.fromkeys(("random_loss", "burst_loss"), "residual"),
+    **dict.fromkeys((MODEL, MODEL_FAILED), "model"),
     **dict.fromkeys(("crc_fail",), "mangle"),
 }
 _AT_ARRIVAL: Final = {
@@ -348,6 +351,14 @@ class _Story:
         facts = {"state": state, "loss_rate": threshold / UNIT, "loss_draw": draw / UNIT}
         return f"{state} state, loss draw {_share(draw)} is {below} {_share(threshold)}", facts
 
+    def _model(self) -> tuple[str, dict[str, Any]]:
+        model, extra_ns = self.settings.model, self.row.model_ns
+        assert model is not None, "a link with a model of one's own"
+        facts = {"model": model.name, "parameters": dict(model.parameters), "extra_ns": extra_ns}
+        facts["package"] = self.capture.about.versions.get(VERSION_KEY + model.name, "")
+        failed = ", which failed" if self.row.cause == MODEL_FAILED else ""
+        return f"{model.name} of {facts['package']}{failed}, {_time(extra_ns)} more delay", facts
+
     def _mangle(self) -> tuple[str, dict[str, Any]]:
         row, settings = self.row, self.settings
         parts, facts = [], {"bits_flipped": row.bits_flipped}
@@ -380,6 +391,7 @@ class _Story:
             "airtime": row.airtime_ns,
             "way": row.propagation_ns,
             "constant": settings.delay_ns,
+            "link model": row.model_ns,
             "jitter": row.jitter_ns,
             "bad time": bad_ns,
             "reordered": reorder.extra_ns if reorder is not None and late else 0,

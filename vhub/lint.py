@@ -98,11 +98,14 @@ class Meaning:
     """Packets of SMALL_BYTES in an hour that the duty cycle allows."""
     queue_ns: int | None
     """How long the last packet of a full queue waits."""
+    model: str | None
+    """The link model of one's own that decides beside all this; the figures are without it."""
     warnings: tuple[str, ...]
 
     @property
     def name(self) -> str:
-        return self.rule if self.radio in ("", self.rule) else f"{self.rule} via {self.radio}"
+        name = self.rule if self.radio in ("", self.rule) else f"{self.rule} via {self.radio}"
+        return name if self.model is None else f"{name} with link model {self.model}"
 
 
 # --- which settings there are ----------------------------------------------------------------------------------------
@@ -207,6 +210,7 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
         nlos_m,
         int(duty * HOUR_NS / carried[0].airtime_ns) if is_limited else None,
         _queue_ns(settings, carried),
+        None if settings.model is None else settings.model.name,
         (),
     )
     return replace(meaning, warnings=tuple(_warnings(use, meaning)))

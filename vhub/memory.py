@@ -24,6 +24,8 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Copies that the link made; they are in none of the other counts."""
     causes: dict[str, int] = {}
     """How many were dropped by each cause."""
+    model: bytes = b""
+    """What a link model of one's own remembers, as msgpack."""
 
 
 class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):

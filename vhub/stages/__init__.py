@@ -19,6 +19,7 @@ from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.duty import Duty
 from foosim.vhub.stages.mangle import Mangle
 from foosim.vhub.stages.medium import make_medium
+from foosim.vhub.stages.own import Own
 from foosim.vhub.stages.policy import Policy
 from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.receiver import Receiver
@@ -46,6 +47,7 @@ STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
     make_medium,
     Channel.for_link,
     make_residual,
+    Own.for_link,
     Mangle.for_link,
     Delay.for_link,
     Receiver.for_link,
