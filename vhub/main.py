@@ -199,7 +199,7 @@ class HubProcess:
         try:
             check_link_models(deployment.network, build.deployment, build.deployment_name)
         except DeploymentError as error:
-            core.failure = f"the network: {error}"
+            core.failure = "cannot judge packets without its link models"
             core.lose("the network", error.problems[0])
             return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"

@@ -1,4 +1,4 @@
-"""A package with link models of its own, as pip would have left it in a folder: a module, and the metadata beside it."""
+"""A package with link models of its own, as pip leaves one in a folder: a module, and the metadata beside it."""
 
 from __future__ import annotations
 
@@ -76,4 +76,11 @@ def install(folder: Path, version: str = "1.2", name: str = "foggy", models: str
     return folder
 
 
-ALL: Final = "fog = foggy:Fog\nprobe = foggy:Probe\nshapeless = foggy:shapeless\nbroken = foggy:nothing\nlost = gone:Model"
+ALL: Final = """
+fog = foggy:Fog
+probe = foggy:Probe
+shapeless = foggy:shapeless
+broken = foggy:nothing
+lost = gone:Model
+"""
+"""Its models, and entry points that lead nowhere."""

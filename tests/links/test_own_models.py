@@ -142,6 +142,19 @@ def test_the_velocity_of_a_rod_and_of_a_rover() -> None:
     assert moving == pytest.approx((0.0, 0.3, 0.0))
 
 
+def test_the_example_of_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What docs/network.md shows, in a package as it says."""
+    guide = (TABLE.parents[1] / "docs" / "network.md").read_text()
+    (code,) = [block for block in guide.split("```python\n")[1:] if "Judged" in block]
+    folder = install(tmp_path / "site")
+    (folder / "foggy.py").write_text(code.partition("```")[0])
+    monkeypatch.syspath_prepend(str(folder))
+    model = "model: {name: fog, parameters: {lost_per_m: 0.1}}"
+    found = list(fates(Fabric(deployment_of(rule(model), places(5))), every(MS, 200)))
+    sys.modules.pop("foggy")
+    assert {flight.cause for flight in found} == {"", MODEL}
+
+
 # --- the laws --------------------------------------------------------------------------------------------------------
 
 SETS: Final = ("engine=pure", "network.links=[{id: all, from: '*', to: '*', delay: 1 ms, "
@@ -273,7 +286,7 @@ def test_a_model_that_cannot_be_had_is_refused_at_its_place(tmp_path: Path, mode
     assert place.startswith("t.yaml:") and all(number.isdigit() for number in place.split(":")[1:])
     file = tmp_path / "t.yaml"
     file.write_text(text)
-    with pytest.raises(DeploymentError, match="network.links"):
+    with pytest.raises(DeploymentError, match=r"network\.links"):
         linted(file, [])
     alone = tmp_path / "alone.yaml"
     alone.write_text(f"network:\n  links:\n  - {{id: one, from: a, to: b, model: {model}}}\n")
@@ -286,7 +299,7 @@ def test_a_model_that_cannot_be_had_is_refused_at_its_place(tmp_path: Path, mode
 def test_two_packages_that_give_one_name(tmp_path: Path, foggy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(install(tmp_path / "other", name="mist", version="3")))
     deployment = load_deployment(network("model: {name: fog}"), "t.yaml")
-    with pytest.raises(DeploymentError, match="a link model of foggy 1.2 and mist 3: which one is not said"):
+    with pytest.raises(DeploymentError, match=r"a link model of foggy 1\.2 and mist 3: which one is not said"):
         check_link_models(deployment.network, network("model: {name: fog}"), "t.yaml")
     assert model_versions(deployment.network) == {"link model fog": "foggy 1.2, mist 3"}
 
