@@ -20,7 +20,6 @@ from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.figures import EXACT, rate_text, time_text
 from foosim.vhub.link_models import VERSION_KEY
-from foosim.vhub.propagation import crossing_db
 from foosim.vhub.rows import PACKETS, TICK, PacketRow, TickRow, edit_of
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
@@ -328,7 +327,7 @@ class _Story:
         ends = frozenset((world.body(row.source), world.body(row.destination)))
         a, b = sorted((of.antenna(row.source), of.antenna(row.destination)))
         crossings = world.crossings(a, b, ends)
-        known = [(crossing.name, crossing_db(crossing, self.settings.frequency_hz)) for crossing in crossings]
+        known = [(crossing.name, of.taken_db(crossing, a, b, ends)) for crossing in crossings]
         total = round(sum(loss_db for _, loss_db in known) * 100.0)
         if sorted(name for name, _ in known) != sorted(row.walls) or abs(total - row.walls_cdb) > 1:
             return dict.fromkeys(row.walls)
