@@ -73,7 +73,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         ),
         "loss": _v("15 %", "[S] the same: 0 to 30 %"),
         "duplicate": _v("25 %", "[S] the same: 0 to 50 % replayed"),
-        "queue": {"packets": _v(11, "[S] the same: paths of 2 to 20")},
+        "capacity": _v(11, "[S] the same: paths of 2 to 20"),
         "order": _v("free", "[S] the same: packets overtake"),
     },
     "wifi_2_4_indoor": {

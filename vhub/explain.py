@@ -23,6 +23,7 @@ from foosim.vhub.link_models import VERSION_KEY
 from foosim.vhub.rows import PACKETS, TICK, PacketRow, TickRow, edit_of
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
+from foosim.vhub.stages.capacity import EVICTED
 from foosim.vhub.stages.own import MODEL, MODEL_FAILED
 from foosim.vhub.stages.residual import Residual
 from foosim.vhub.state import OUTBOX_SHIFT
@@ -78,7 +79,8 @@ class Explained:
 
 PASSED, DROPPED, ABSENT, UNREACHED = "passed", "dropped", "not on this link", "not reached"
 STAGE_NAMES: Final = (
-    *("admit", "policy", "duty", "queue", "medium", "channel", "residual", "model", "mangle", "delay", "receiver"),
+    *("admit", "policy", "duty", "queue", "medium", "channel", "residual", "model", "mangle", "delay"),
+    *("capacity", "receiver"),
 )
 _AT_SENDING: Final = {
     **dict.fromkeys(("too_big", "node_down", "no_route"), "admit"),
@@ -94,6 +96,7 @@ _AT_SENDING: Final = {
 _AT_ARRIVAL: Final = {
     **dict.fromkeys(("partition", "expired"), "policy"),
     **dict.fromkeys(("collision", "snr", "out_of_range"), "channel"),
+    **dict.fromkeys((EVICTED,), "capacity"),
     **dict.fromkeys(("rx_down", "rx_full"), "receiver"),
 }
 """Which stage has dropped a packet, by cause."""
@@ -397,6 +400,11 @@ class _Story:
             "clog": row.held_ns,
         }
         return ((what, ns) for what, ns in spent.items() if ns)
+
+    def _capacity(self) -> tuple[str, dict[str, Any]]:
+        most, is_evicted = self.settings.capacity, self.row.cause == EVICTED
+        text = "another one took its place" if is_evicted else "it kept its place"
+        return f"at most {most} on their way at once, {text}", {"capacity": most, "evicted": is_evicted}
 
     def _receiver(self) -> tuple[str, dict[str, Any]]:
         row = self.row

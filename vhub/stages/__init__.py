@@ -14,6 +14,7 @@ from typing import Final, Protocol
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.admit import Admit
+from foosim.vhub.stages.capacity import Capacity
 from foosim.vhub.stages.channel import Channel
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.duty import Duty
@@ -50,5 +51,6 @@ STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
     Own.for_link,
     Mangle.for_link,
     Delay.for_link,
+    Capacity.for_link,
     Receiver.for_link,
 )
