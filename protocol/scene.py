@@ -161,13 +161,6 @@ def forward_kinematics(body: Body, entity: Entity, numbers: Sequence[float]) -> 
     return poses
 
 
-def antenna_position(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
-    """Return where a body's antenna is, from the frame's numbers."""
-    _, position, orientation = forward_kinematics(body, entity, numbers)[-1]
-    dx, dy, dz = rotate(orientation, body.antenna)
-    return position[0] + dx, position[1] + dy, position[2] + dz
-
-
 def place(shape: Shape, position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
     """Return the world pose of a shape whose link has this pose."""
     dx, dy, dz = rotate(orientation, shape.position)
