@@ -146,8 +146,7 @@ def world_of(capture: CaptureData, frames: Frames) -> Iterator[Callable[[Offered
         first = capture.first_frame()
         if first is None:
             raise CaptureError(f"{capture.path}: it does not have the frame with which it begins")
-        layout, values = first.layout, first.values
-        yield lambda offered: Frame(_tick_of(offered), layout, values)
+        yield lambda offered: _later(first, offered)
     else:
         about = capture.about
         replica = Replica(about.deployment_text, about.deployment_name, capture.deployment, start=start_of(capture))
@@ -160,6 +159,12 @@ def world_of(capture: CaptureData, frames: Frames) -> Iterator[Callable[[Offered
 def _tick_of(offered: Offered) -> int:
     assert offered.row is not None, "a tick is yielded when its row was read"
     return offered.row.tick
+
+
+def _later(first: Frame, offered: Offered) -> Frame:
+    """Let time go on in a frame in which nothing else does: what is known of it stays known."""
+    first.tick = _tick_of(offered)
+    return first
 
 
 def _captured(capture: CaptureData, offered: Offered) -> Frame:
