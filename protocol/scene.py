@@ -161,6 +161,34 @@ def forward_kinematics(body: Body, entity: Entity, numbers: Sequence[float]) -> 
     return poses
 
 
+def velocity(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
+    """Return the velocity (m/s, world frame) of the origin of a body's last link, from the frame's numbers.
+
+    A rover's is that of its wheels, which slip where it is kept from where it goes.
+    """
+    orientation, sliding = UPRIGHT, ORIGIN
+    joint = entity.offsets.get("joint_positions", 0)
+    for link in body.links:
+        if link.joint == "free":
+            turned = entity.offsets["orientation"]
+            orientation = (numbers[turned], numbers[turned + 1], numbers[turned + 2], numbers[turned + 3])
+            if "wheel_speeds" in entity.offsets:
+                wheels = entity.offsets["wheel_speeds"]
+                sliding = rotate(orientation, (0.5 * (numbers[wheels] + numbers[wheels + 1]), 0.0, 0.0))
+            else:
+                start = entity.offsets["linear_velocity"]
+                sliding = numbers[start], numbers[start + 1], numbers[start + 2]
+        elif link.joint == "prismatic":
+            speed = numbers[joint - entity.offsets["joint_positions"] + entity.offsets["joint_velocities"]]
+            step = rotate(orientation, (speed * link.axis[0], speed * link.axis[1], speed * link.axis[2]))
+            sliding = _moved(sliding, step, 1.0)
+            joint += 1
+        elif link.joint == "revolute":
+            orientation = multiply(orientation, turn(link.axis, numbers[joint]))
+            joint += 1
+    return sliding
+
+
 def place(shape: Shape, position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
     """Return the world pose of a shape whose link has this pose."""
     dx, dy, dz = rotate(orientation, shape.position)

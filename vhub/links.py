@@ -18,6 +18,7 @@ from foosim.vhub.packet import Flight
 from foosim.vhub.profiles import Profile, over
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES, Stage
+from foosim.vhub.stages.capacity import leave
 from foosim.vhub.stages.delay import Delay
 
 if TYPE_CHECKING:
@@ -120,10 +121,13 @@ class Link:
             cause = stage.at_arrival(flight, hindered)
             if cause:
                 self._drop(flight, cause)
-                return False
-        state.delivered += is_offered
-        state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
-        return True
+                break
+        else:
+            state.delivered += is_offered
+            state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
+        if state.under_way:
+            leave(state, flight)
+        return not flight.cause
 
 
 def slots_of(settings: Radio, *, is_radio: bool) -> int:

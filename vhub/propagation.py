@@ -10,13 +10,21 @@ from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Final
 
+from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.radio_materials import RadioMaterial
 from foosim.protocol.radios import Radio
 from foosim.protocol.scene import Vector
 from foosim.vhub.geometry import Crossing
 from foosim.vhub.radio.materials import slab_loss_db
 from foosim.vhub.radio.noise import centi, noise_dbm
-from foosim.vhub.radio.path_loss import ENVIRONMENTS, Environment, Itu1238, LogDistance, path_loss_db
+from foosim.vhub.radio.path_loss import (
+    ENVIRONMENTS,
+    Environment,
+    Itu1238,
+    LogDistance,
+    path_loss_db,
+    vehicle_blockage_db,
+)
 from foosim.vhub.radio.shadowing import shadowing_db
 from foosim.vhub.world import World
 
@@ -127,6 +135,19 @@ class Propagation:
         path = self.path(a, b, source, destination)
         return not path.cause and path.loss_cdb <= sensed_cdb
 
+    def taken_db(self, crossing: Crossing, a: Vector, b: Vector, ends: frozenset[str]) -> float:
+        """Return what a thing takes from a signal between two places, the antennas of two bodies.
+
+        Among vehicles one in the way blocks as vehicles do: by one draw for the three, whenever they meet like that.
+        """
+        if self._environment.has_vehicles:
+            height_m = self.world.vehicle_height_m(crossing.name)
+            if height_m is not None:
+                seed = int.from_bytes(self._key[:8], "little")
+                word = draw_words(draw_key(seed, "vehicle", *sorted(ends), crossing.name), 0)[0]
+                return vehicle_blockage_db(_distance_m(a, b), a[2], b[2], height_m, word)
+        return crossing_db(crossing, self.settings.frequency_hz)
+
     def _least_and_most(self, a: Vector, b: Vector) -> tuple[int, int]:
         """Return the least and the greatest loss between two places, whatever stands between them."""
         distance_m = _distance_m(a, b)
@@ -153,7 +174,7 @@ class Propagation:
         walls = tuple(crossing.name for crossing in crossings)
         walls_db = 0.0
         for crossing in crossings:
-            walls_db += crossing_db(crossing, frequency_hz)
+            walls_db += self.taken_db(crossing, a, b, ignoring)
         if crossings and self._strict:
             return Path(distance_mm, walls, centi(walls_db), 0, 0, BLOCKED)
         heights = a[2], b[2]

@@ -61,7 +61,7 @@ class Channel:
         """LoRa captures: a signal survives others that are together weaker by their spreading factor's isolation."""
         factor = self._settings.spreading_factor
         power_dbm = flight.received_cdbm / 100.0
-        if not lora_received(factor, power_dbm):
+        if not lora_received(factor, power_dbm, self._settings.gateway):
             flight.error_threshold = UNIT
             return OUT_OF_RANGE
         if not flight.by_factor:
