@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
-from foosim.protocol.draws import UNIT, Slot
+from foosim.protocol.draws import UNIT, Slot, draw_words
 from foosim.protocol.radios import Radio
 from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
@@ -28,7 +28,7 @@ from foosim.vhub.radio.airtime import (
     wifi_ack_ns,
     wifi_airtime_ns,
 )
-from foosim.vhub.radio.contention import Access, Outcome, csma_access, wifi_access
+from foosim.vhub.radio.contention import Access, Outcome, Words, csma_access, wifi_access
 from foosim.vhub.radio.timings import (
     CATEGORIES,
     DOT11P,
@@ -39,7 +39,7 @@ from foosim.vhub.radio.timings import (
     WifiTiming,
     with_category,
 )
-from foosim.vhub.setup import LinkSetup
+from foosim.vhub.setup import BLOCK_SHIFT, LinkSetup
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
@@ -188,8 +188,10 @@ class OnAir:
     def at_arrival(self, flight: Flight, hindered: str) -> str:
         return ""
 
-    def _words(self, flight: Flight, block: int) -> tuple[int, ...]:
-        return self._setup.words(flight, ACCESS_BLOCK + block)
+    def _words(self, flight: Flight, broadcast: bool) -> Words:
+        """Return the draws of a packet's attempts, by block: a broadcast's are its sender's, whoever hears it."""
+        key = self._setup.sending_key if broadcast else self._setup.key
+        return lambda block: draw_words(key, flight.sequence, flight.copy | (ACCESS_BLOCK + block) << BLOCK_SHIFT)
 
 
 def wifi_modes(settings: Radio) -> tuple[str, ...]:
@@ -260,7 +262,7 @@ class WiFi(OnAir):
         if threshold is None:
             threshold = error_threshold(self._settings, flight, flight.snr_cdb)
             flight.error_threshold = threshold
-        words = lambda block: self._words(flight, block)  # noqa: E731
+        words = self._words(flight, broadcast)
         return wifi_access(words, flight.contenders, threshold, airtime_ns, ack_ns, self._timing), airtime_ns
 
 
@@ -285,7 +287,7 @@ class LrWpan(OnAir):
         if threshold is None:
             threshold = error_threshold(self._settings, flight, flight.snr_cdb)
             flight.error_threshold = threshold
-        words = lambda block: self._words(flight, block)  # noqa: E731
+        words = self._words(flight, broadcast)
         return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
 
 
