@@ -40,6 +40,7 @@ from foosim.vhub.radio.timings import (
     with_category,
 )
 from foosim.vhub.setup import BLOCK_SHIFT, LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
@@ -51,7 +52,7 @@ OPPORTUNITY_BYTES: Final = 1500
 """What leaves at one line of a trace of capacity."""
 
 
-class Wire:
+class Wire(Stage):
     """Serialises at a rate, or at the opportunities of a trace."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -103,11 +104,8 @@ class Wire:
             return 2**62
         return (rounds * self._trace[-1] + self._trace[place]) * 1_000_000
 
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
 
-
-class OnAir:
+class OnAir(Stage):
     """What all radios share: a broadcast is sent once for all its receivers; who is on air is known to the air."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -184,9 +182,6 @@ class OnAir:
         rate_bps = flight.rate_bps
         airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, rate_bps) if rate_bps else 0
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
 
     def _words(self, flight: Flight, broadcast: bool) -> Words:
         """Return the draws of a packet's attempts, by block: a broadcast's are its sender's, whoever hears it."""
