@@ -161,13 +161,6 @@ def forward_kinematics(body: Body, entity: Entity, numbers: Sequence[float]) -> 
     return poses
 
 
-def antenna_position(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
-    """Return where a body's antenna is, from the frame's numbers."""
-    _, position, orientation = forward_kinematics(body, entity, numbers)[-1]
-    dx, dy, dz = rotate(orientation, body.antenna)
-    return position[0] + dx, position[1] + dy, position[2] + dz
-
-
 def velocity(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
     """Return the velocity (m/s, world frame) of the origin of a body's last link, from the frame's numbers.
 

@@ -137,6 +137,7 @@ class Fabric:
             settings,
             profile.radio,
             key,
+            draw_key(self.seed, "sending", *radio),
             memory,
             sender,
             self.world,

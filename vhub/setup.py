@@ -30,6 +30,8 @@ class LinkSetup:
     radio: str
     key: bytes
     """Of its draws."""
+    sending_key: bytes
+    """Of the draws of what its sender's radio sends once for several receivers."""
     memory: LinkState
     sender: RadioState
     """The radio, or the port of a wire, that its packets leave by."""

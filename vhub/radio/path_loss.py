@@ -53,9 +53,15 @@ class Environment:
         """Return the loss in dB with line of sight."""
         raise AssertionError("each environment has its own")
 
+    def both_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> tuple[float, float]:
+        """Return the losses in dB with line of sight, and without: never less than with it, nor more than on the
+        ground."""
+        los_db = self.los_db(distance_m, frequency_hz, heights_m)
+        return los_db, los_db
+
     def nlos_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> float:
-        """Return the loss in dB without line of sight: never less than with it."""
-        return self.los_db(distance_m, frequency_hz, heights_m)
+        """Return the loss in dB without line of sight."""
+        return self.both_db(distance_m, frequency_hz, heights_m)[1]
 
 
 @dataclass(frozen=True)
@@ -67,8 +73,8 @@ class Curve:
     frequency_slope: float
 
     def __call__(self, distance_m: float, frequency_hz: float) -> float:
-        lg_f = log10(frequency_hz * 1e-9)
-        return self.offset + self.slope * log10(max(distance_m, DISTANCE_MIN_M)) + self.frequency_slope * lg_f
+        lg_d = log10(distance_m) if distance_m > DISTANCE_MIN_M else 0.0
+        return self.offset + self.slope * lg_d + self.frequency_slope * log10(frequency_hz * 1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +87,9 @@ class TwoCurves(Environment):
     def los_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> float:
         return self.los(distance_m, frequency_hz)
 
-    def nlos_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> float:
-        return max(self.los(distance_m, frequency_hz), self.nlos(distance_m, frequency_hz))
+    def both_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> tuple[float, float]:
+        los_db = self.los(distance_m, frequency_hz)
+        return los_db, max(los_db, self.nlos(distance_m, frequency_hz))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,9 +114,10 @@ class UrbanCell(TwoCurves):
         far = self.los.offset + 40.0 * log10(distance_m) + self.los.frequency_slope * log10(frequency_hz * 1e-9)
         return far - self.far_weight * log10(square)
 
-    def nlos_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> float:
+    def both_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> tuple[float, float]:
         gain = self.height_slope * (max(min(heights_m), 1.5) - 1.5)
-        return max(self.los_db(distance_m, frequency_hz, heights_m), self.nlos(distance_m, frequency_hz) - gain)
+        los_db = self.los_db(distance_m, frequency_hz, heights_m)
+        return los_db, max(los_db, self.nlos(distance_m, frequency_hz) - gain)
 
 
 class OneCurve(Environment):
@@ -192,13 +200,11 @@ def path_loss_db(
     dominates, and the shadowing is that of line of sight.
     """
     heights_m = (tx_height_m, rx_height_m)
-    los_db = environment.los_db(distance_m, frequency_hz, heights_m)
     if not has_hit:
-        return los_db, False
-    if environment.has_nlos_curve:
-        nlos_db = environment.nlos_db(distance_m, frequency_hz, heights_m)
-        if nlos_db < los_db + walls_db:
-            return nlos_db, True
+        return environment.los_db(distance_m, frequency_hz, heights_m), False
+    los_db, nlos_db = environment.both_db(distance_m, frequency_hz, heights_m)
+    if environment.has_nlos_curve and nlos_db < los_db + walls_db:
+        return nlos_db, True
     return los_db + walls_db, False
 
 

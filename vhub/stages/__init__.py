@@ -1,7 +1,8 @@
 """The stages of a link, in their fixed order: a table that the hub walks.
 
-Each stage is one file with a class that is made from a link's setup. It has two hooks, at sending and at arrival; a
-hook that drops the packet returns the name of the cause. A stage that has nothing to do on a link is left out there.
+Each stage is one file with a class (`stage.Stage`) that is made from a link's setup. It has two hooks, at sending and
+at arrival; a hook that drops the packet returns the name of the cause. A stage that has nothing to do on a link is left
+out there.
 What a stage remembers is a plain value in the hub's state: of the link, of the sender's radio or of the air. To add
 one: its file, and its row here.
 """
@@ -9,9 +10,8 @@ one: its file, and its row here.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Final
 
-from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.admit import Admit
 from foosim.vhub.stages.capacity import Capacity
@@ -25,20 +25,7 @@ from foosim.vhub.stages.policy import Policy
 from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.receiver import Receiver
 from foosim.vhub.stages.residual import make_residual
-
-
-class Stage(Protocol):
-    """One step of the pipeline on one link."""
-
-    def at_sending(self, flight: Flight) -> str:
-        """Judge a packet that is sent; return the cause of its drop, or an empty string."""
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        """Judge a packet that arrives; return the cause of its drop, or an empty string.
-
-        `hindered` is why its receiver does not take it; empty when it does.
-        """
-
+from foosim.vhub.stages.stage import Stage
 
 STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
     Admit.for_link,

@@ -11,13 +11,14 @@ from typing import Final
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 EVICTED: Final = "evicted"
 CAPACITY_BLOCK: Final = 3
 """The block of a packet's draws of which the first word says whose place it takes."""
 
 
-class Capacity:
+class Capacity(Stage):
     """Knows what is on its way on a link."""
 
     def __init__(self, setup: LinkSetup, most: int) -> None:

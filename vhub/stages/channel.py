@@ -14,9 +14,10 @@ from foosim.vhub.radio.errors import lora_interferer, lora_received
 from foosim.vhub.radio.noise import level_of
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.medium import COLLISION, SNR, error_threshold
+from foosim.vhub.stages.stage import Stage
 
 
-class Channel:
+class Channel(Stage):
     """Judges one link's signals."""
 
     def __init__(self, setup: LinkSetup) -> None:

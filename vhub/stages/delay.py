@@ -13,9 +13,10 @@ from foosim.protocol.draws import Slot, chance_threshold
 from foosim.vhub.jitter import interpolate_ns, quantiles_ns
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 
-class Delay:
+class Delay(Stage):
     """Sets the due time of a packet."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -87,6 +88,3 @@ class Delay:
 
     def _in_order(self, due_ns: int, last_ns: int) -> int:
         return max(due_ns, last_ns + 1) if self._fifo else due_ns
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""

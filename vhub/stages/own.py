@@ -18,6 +18,7 @@ from foosim.vhub.link_models import End, Judged, LinkModel, Passage, Wall
 from foosim.vhub.packet import Flight
 from foosim.vhub.propagation import crossing_db
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 MODEL: Final = "model"
 MODEL_FAILED: Final = "model_failed"
@@ -30,7 +31,7 @@ DEPTH_MAX: Final = 16
 """Of lists and dicts in a memory."""
 
 
-class Own:
+class Own(Stage):
     """Asks the model of one link."""
 
     def __init__(self, setup: LinkSetup, model: LinkModel) -> None:
@@ -92,9 +93,6 @@ class Own:
             packet = f"{flight.source}:{flight.sequence}:{flight.destination}" + (":1" if flight.copy else "")
             when = f"sent at {flight.sent_ns / 1e9:.9g} s on {flight.channel}"
             faults.append(f"link model {model.name} failed on packet {packet}, {when}: {problem}")
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
 
 
 def problem_of(said: object) -> str:
