@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.scene import Body, forward_kinematics
-from foosim.vhub.rows import FrameRow, PacketRow
+from foosim.vhub.rows import FrameRow, PacketRow, word_of
 
 Integers = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -76,7 +76,7 @@ def packet_columns(rows: Iterable[PacketRow]) -> Packets:
             if name in _TEXTS:
                 value = intern(value)
             elif name in _WORDS:
-                value = int(value, 16) if value else None
+                value = word_of(value)
             values.append(value)
     columns: list[Any] = [
         np.frombuffer(integers[field.name], dtype=np.int64) if field.name in integers else _objects(objects[field.name])
