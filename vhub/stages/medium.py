@@ -8,6 +8,7 @@ Neighbours: `queue` (what waits before), `air` (who is on air), `radio` (the for
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Final
@@ -25,10 +26,9 @@ from foosim.vhub.radio.airtime import (
     lora_airtime_ns,
     lrwpan_airtime_ns,
     serialisation_ns,
-    wifi_ack_ns,
-    wifi_airtime_ns,
 )
 from foosim.vhub.radio.contention import Access, Outcome, Words, csma_access, wifi_access
+from foosim.vhub.radio.frames import WifiFrames
 from foosim.vhub.radio.timings import (
     CATEGORIES,
     DOT11P,
@@ -44,6 +44,7 @@ from foosim.vhub.stages.stage import Stage
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
+LRWPAN_MODE: Final = "oqpsk_250"
 ACCESS_BLOCK: Final = 16
 """From here on the blocks of a packet's draws are those of its attempts."""
 BASE_STATION_DBM: Final = 30.0
@@ -124,7 +125,6 @@ class OnAir(Stage):
         if broadcast and last.is_ready:
             self._share(flight, last)
         else:
-            flight.rate_bps = self.rate_bps(flight, broadcast)
             self._transmit(flight, last, broadcast, cause)
         if cause:
             flight.outcome = cause
@@ -166,20 +166,16 @@ class OnAir(Stage):
 
     is_acknowledged = False
 
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
-        """Return the bit rate of a packet; 0 where there is none."""
-        return self._settings.rate_bps or 0
-
     def turn(self, ready_ns: int) -> tuple[int, int]:
         """Return when the sender gets its turn, and how many contend."""
         return ready_ns, 1
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        """Return what becomes of a packet on the medium, and how long it is on air once.
+        """Return what becomes of a packet on the medium, and how long it is on air once; write its bit rate.
 
         `lost` is the threshold for errors of a packet that cannot get through; None where the signal decides.
         """
-        rate_bps = flight.rate_bps
+        rate_bps = flight.rate_bps = self._settings.rate_bps or 0
         airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, rate_bps) if rate_bps else 0
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
@@ -214,16 +210,30 @@ def mode_of(modes: tuple[str, ...], rate_bps: int) -> str:
     return min(modes, key=lambda mode: (abs(errors.MODES[mode].rate_bps - rate_bps), mode))
 
 
-def error_threshold(settings: Radio, flight: Flight, snr_cdb: int) -> int:
-    """Return the packet error rate at a ratio, in units of 2^-64; 0 on media that have no curve."""
+Curve = Callable[[Flight, int], int]
+"""Gives the packet error rate of a packet at a ratio (0.01 dB), in units of 2^-64."""
+
+
+def error_curve(settings: Radio) -> Curve | None:
+    """Return the curve of a radio's errors; None on media that have none."""
     if settings.medium == "wifi":
-        mode = mode_of(wifi_modes(settings), flight.rate_bps)
-        return errors.per_threshold(mode, snr_cdb, len(flight.payload) + WIFI_OVERHEAD_BYTES)
+        modes = {errors.MODES[mode].rate_bps: mode for mode in wifi_modes(settings)}
+        return lambda flight, snr_cdb: errors.per_threshold(
+            modes[flight.rate_bps], snr_cdb, len(flight.payload) + WIFI_OVERHEAD_BYTES
+        )
     if settings.medium == "ieee802154":
-        return errors.per_threshold("oqpsk_250", snr_cdb, len(flight.payload) + LRWPAN_OVERHEAD_BYTES)
+        return lambda flight, snr_cdb: errors.per_threshold(
+            LRWPAN_MODE, snr_cdb, len(flight.payload) + LRWPAN_OVERHEAD_BYTES
+        )
     if settings.medium == "lte":
-        return UNIT if snr_cdb < errors.LTE_FLOOR_CENTI_DB else 0
-    return 0
+        return lambda flight, snr_cdb: UNIT if snr_cdb < errors.LTE_FLOOR_CENTI_DB else 0
+    return None
+
+
+@lru_cache(maxsize=64)
+def _wifi_frames(modes: tuple[str, ...], timing: WifiTiming, fixed: str | None) -> WifiFrames:
+    """Links of one kind of radio share what is known of its frames."""
+    return WifiFrames(modes, timing, fixed)
 
 
 class WiFi(OnAir):
@@ -233,31 +243,26 @@ class WiFi(OnAir):
 
     def __init__(self, setup: LinkSetup) -> None:
         super().__init__(setup)
-        self._modes = wifi_modes(setup.settings)
-        self._timing = wifi_timing(setup.settings)
-
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
-        """The fixed rate; else a broadcast goes at the lowest, a unicast at the highest with few errors."""
-        settings = self._settings
-        if settings.rates == "fixed":
-            return errors.MODES[mode_of(self._modes, settings.fixed_rate_bps)].rate_bps
-        if broadcast:
-            return errors.MODES[self._modes[0]].rate_bps
-        size = len(flight.payload) + WIFI_OVERHEAD_BYTES
-        return errors.MODES[errors.ideal_rate(self._modes, flight.snr_cdb, size)].rate_bps
+        modes, self._timing = wifi_modes(setup.settings), wifi_timing(setup.settings)
+        fixed = mode_of(modes, setup.settings.fixed_rate_bps) if setup.settings.rates == "fixed" else None
+        self._frames = _wifi_frames(modes, self._timing, fixed)
 
     def turn(self, ready_ns: int) -> tuple[int, int]:
         return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        mode = mode_of(self._modes, flight.rate_bps)
-        airtime_ns = wifi_airtime_ns(mode, len(flight.payload), self._timing)
-        ack_ns = 0 if broadcast else wifi_ack_ns(mode, self._timing)
-        threshold = 0 if broadcast else lost
-        if threshold is None:
-            threshold = error_threshold(self._settings, flight, flight.snr_cdb)
-            flight.error_threshold = threshold
-        words = self._words(flight, broadcast)
+        """At the fixed rate; else a broadcast goes at the lowest, a unicast at the highest with few errors."""
+        size, ack_ns, threshold = len(flight.payload), 0, 0
+        if broadcast:
+            frame = self._frames.broadcast(size)
+        else:
+            frame = self._frames.unicast(size, flight.snr_cdb)
+            ack_ns = frame.ack_ns
+            threshold = errors.per_threshold(frame.mode, flight.snr_cdb, frame.size_bytes) if lost is None else lost
+            if lost is None:
+                flight.error_threshold = threshold
+        flight.rate_bps = frame.rate_bps
+        words, airtime_ns = self._words(flight, broadcast), frame.airtime_ns
         return wifi_access(words, flight.contenders, threshold, airtime_ns, ack_ns, self._timing), airtime_ns
 
 
@@ -270,17 +275,16 @@ class LrWpan(OnAir):
         super().__init__(setup)
         self._timing = replace(LRWPAN, retries=setup.settings.retries)
 
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
-        return errors.MODES["oqpsk_250"].rate_bps
-
     def turn(self, ready_ns: int) -> tuple[int, int]:
         return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        airtime_ns = lrwpan_airtime_ns(len(flight.payload), self._timing)
+        size = len(flight.payload)
+        flight.rate_bps = errors.MODES[LRWPAN_MODE].rate_bps
+        airtime_ns = lrwpan_airtime_ns(size, self._timing)
         threshold = 0 if broadcast else lost
         if threshold is None:
-            threshold = error_threshold(self._settings, flight, flight.snr_cdb)
+            threshold = errors.per_threshold(LRWPAN_MODE, flight.snr_cdb, size + LRWPAN_OVERHEAD_BYTES)
             flight.error_threshold = threshold
         words = self._words(flight, broadcast)
         return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
@@ -289,13 +293,10 @@ class LrWpan(OnAir):
 class LoRa(OnAir):
     """LoRa: pure ALOHA."""
 
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
-        settings = self._settings
-        chips = settings.spreading_factor * 4 * int(settings.bandwidth_hz)
-        return chips // ((4 + settings.coding_rate) << settings.spreading_factor)
-
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
         settings = self._settings
+        chips = settings.spreading_factor * 4 * int(settings.bandwidth_hz)
+        flight.rate_bps = chips // ((4 + settings.coding_rate) << settings.spreading_factor)
         size, bandwidth_hz = len(flight.payload), int(settings.bandwidth_hz)
         airtime_ns = lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
@@ -306,15 +307,13 @@ class Lte(OnAir):
 
     is_acknowledged = True
 
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
+    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
         settings = self._settings
         direction = "down" if settings.tx_power_dbm >= BASE_STATION_DBM else "up"
-        return errors.lte_rate_bps(flight.snr_cdb, int(settings.bandwidth_hz), direction)
-
-    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        if flight.rate_bps == 0:
+        rate_bps = flight.rate_bps = errors.lte_rate_bps(flight.snr_cdb, int(settings.bandwidth_hz), direction)
+        if rate_bps == 0:
             return Access(0, 0, 0, 0, "error"), 0
-        airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, flight.rate_bps)
+        airtime_ns = serialisation_ns(len(flight.payload) + settings.overhead_bytes, rate_bps)
         retries, is_lost = errors.lte_harq(flight.words[Slot.BACKOFF])
         delay_ns = airtime_ns + retries * errors.HARQ_ROUND_NS
         outcome: Outcome = "error" if is_lost or lost is not None else "ok"
