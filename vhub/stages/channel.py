@@ -31,10 +31,10 @@ class Channel(Stage):
         return cls(setup) if setup.is_radio else None
 
     def at_sending(self, flight: Flight) -> str:
-        if flight.outcome:
+        if flight.outcome or flight.is_settled:
             return flight.outcome
         cause = self._judge(flight)
-        if not cause and self._air is not None and not flight.is_settled:
+        if not cause and self._air is not None:
             self._air.listen(flight, self._budget.propagation)
             cause = self._judge(flight) if flight.interference else ""
         return cause
@@ -48,7 +48,7 @@ class Channel(Stage):
             return COLLISION
         if self._factor:
             return self._judge_lora(flight)
-        if flight.is_settled or self._curve is None or not flight.words:
+        if self._curve is None or not flight.words:
             return ""
         clear = flight.error_threshold = self._curve(flight, flight.snr_cdb)
         word = flight.words[Slot.ERROR]

@@ -115,52 +115,57 @@ class OnAir(Stage):
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
-        self._once = setup.sends_once
+        self._once, self._factor = setup.sends_once, setup.settings.spreading_factor
 
     def at_sending(self, flight: Flight) -> str:
         cause = self._budget.measure(flight)
-        broadcast = flight.published and self._once
-        last = self._sender.sending(flight.sequence, flight.copy)
-        assert last is not None, "the queue remembers what it lets through"
-        if broadcast and last.is_ready:
-            self._share(flight, last)
+        if flight.published and self._once:
+            shared = self._sender.sending(flight.sequence, flight.copy)
+            assert shared is not None, "the queue remembers what it lets through"
+            if not shared.is_ready:
+                self._transmit(flight, True, cause)
+                self._note(flight, shared)
+            else:
+                self._share(flight, shared)
         else:
-            self._transmit(flight, last, broadcast, cause)
+            self._transmit(flight, False, cause)
         if cause:
             flight.outcome = cause
         return COLLISION if flight.outcome == COLLISION else ""
 
-    def _share(self, flight: Flight, last: Sending) -> None:
-        """Take a broadcast's times from its first receiver."""
-        flight.access_ns, flight.airtime_ns = last.access_ns, last.airtime_ns
-        flight.air_start_ns, flight.air_end_ns = last.start_ns, last.end_ns
-        flight.contenders, flight.rate_bps, flight.outcome = last.contenders, last.rate_bps, last.outcome
+    def _note(self, flight: Flight, shared: Sending) -> None:
+        """Remember what a broadcast's first receiver found out, for the others."""
+        shared.access_ns, shared.airtime_ns = flight.access_ns, flight.airtime_ns
+        shared.start_ns, shared.end_ns = flight.air_start_ns, flight.air_end_ns
+        shared.contenders, shared.rate_bps, shared.outcome = flight.contenders, flight.rate_bps, flight.outcome
+        shared.is_ready = True
 
-    def _transmit(self, flight: Flight, last: Sending, broadcast: bool, cause: str) -> None:
-        sender, air = self._sender, self._air
+    def _share(self, flight: Flight, shared: Sending) -> None:
+        """Take a broadcast's times from its first receiver."""
+        flight.access_ns, flight.airtime_ns = shared.access_ns, shared.airtime_ns
+        flight.air_start_ns, flight.air_end_ns = shared.start_ns, shared.end_ns
+        flight.contenders, flight.rate_bps, flight.outcome = shared.contenders, shared.rate_bps, shared.outcome
+
+    def _transmit(self, flight: Flight, broadcast: bool, cause: str) -> None:
+        sender, air, source = self._sender, self._air, flight.source
         air.advance(flight.sent_ns)
         ready_ns = max(flight.sent_ns + flight.phase_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
-        access, airtime_ns = self.access(flight, broadcast, UNIT if cause else None)
-        end_ns, until_ns = start_ns + access.delay_ns, start_ns + access.occupancy_ns
-        flight.air_start_ns, flight.air_end_ns = end_ns - airtime_ns, end_ns
-        flight.airtime_ns = min(airtime_ns, access.delay_ns)
-        flight.access_ns = end_ns - ready_ns - flight.airtime_ns
-        flight.retries = access.retries
-        if access.outcome == "ok":
-            flight.is_settled = not broadcast and self.is_acknowledged
+        (delay_ns, occupancy_ns, retries, _, outcome), air_ns = self.access(flight, broadcast, UNIT if cause else None)
+        end_ns, until_ns = start_ns + delay_ns, start_ns + occupancy_ns
+        flight.air_start_ns, flight.air_end_ns = end_ns - air_ns, end_ns
+        flight.airtime_ns = airtime_ns = min(air_ns, delay_ns)
+        flight.access_ns = end_ns - ready_ns - airtime_ns
+        flight.retries = retries
+        if outcome == "ok":
+            flight.is_settled = self.is_acknowledged and not broadcast
         else:
-            flight.outcome = COLLISION if access.outcome in ("collision", "busy") else SNR
+            flight.outcome = COLLISION if outcome in ("collision", "busy") else SNR
         sender.free_ns = until_ns
         sender.waiting.append((until_ns, len(flight.payload)))
-        last.access_ns, last.airtime_ns, last.start_ns = flight.access_ns, flight.airtime_ns, flight.air_start_ns
-        last.end_ns, last.contenders, last.rate_bps = end_ns, flight.contenders, flight.rate_bps
-        last.outcome, last.is_ready = flight.outcome, True
         of = self._budget.propagation
-        place, power = of.antenna(flight.source), of.power_cdbm
-        times = flight.air_start_ns, end_ns, until_ns
-        factor = self._settings.spreading_factor
-        air.register(Transmission(flight.source, flight.sequence, flight.copy, *times, place, power, factor))
+        what = source, flight.sequence, flight.copy, end_ns - air_ns, end_ns, until_ns
+        air.register(Transmission(*what, of.antenna(source), of.power_cdbm, self._factor))
 
     # --- what media differ in ----------------------------------------------------------------------------------------
 

@@ -39,7 +39,8 @@ class Queue(Stage):
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
-        if self._broadcasts and flight.published:
+        broadcast = self._broadcasts and flight.published
+        if broadcast:
             shared = sender.sending(flight.sequence, flight.copy)
             if shared is not None:
                 flight.queue_bytes, flight.queue_ns = shared.queue_bytes, shared.queue_ns
@@ -53,7 +54,8 @@ class Queue(Stage):
         wait_ns = sender.free_ns - now_ns if sender.free_ns > now_ns else 0
         cause = self._judge(len(waiting), queued + len(flight.payload) + self._overhead, now_ns, wait_ns)
         flight.queue_bytes, flight.queue_ns = queued, wait_ns
-        sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
+        if broadcast:
+            sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
         return cause
 
     def _judge(self, packets: int, size: int, now_ns: int, wait_ns: int) -> str:
