@@ -16,7 +16,6 @@ from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.stage import Stage
 
-
 _JITTER: Final = int(Slot.JITTER)
 
 
