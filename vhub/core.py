@@ -190,12 +190,17 @@ class HubCore:
 
     @property
     def lacking(self) -> tuple[Channel, int]:
-        """The channel, and how many messages of it, without which no tick is closed (Dones come on the other plane).
+        """The channel, and how many messages of it, without which no tick is closed.
 
-        Where deliveries are final nobody waits for a closing: those ticks are closed together.
+        Where deliveries are final nobody waits for a closing: those ticks are closed together. What free-running
+        clients send is for the next closing, and wakes nobody.
         """
         if self.state is None:
             return channels.COMMIT, 1
+        if self.epoch == 0:
+            return channels.UP, 1
+        if self._world is not None and self._world.waited:
+            return channels.UP, len(self._world.waited)
         if self._world is None and self.state.closed + 1 in self.commits:
             return channels.SAMPLES, 1
         return channels.COMMIT, max(1, self.state.final - self.commits.next_tick)

@@ -239,7 +239,7 @@ class HubProcess:
         self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         radio = Wire(session, Plane.RADIO, self._inbox, VHUB)
         self._loop.connect(radio)
-        radio.read(channels.VHUB_READS)
+        radio.read(channels.VHUB_READS, channels.VHUB_WAITS)
         radio.watch_alive()
         radio.declare_alive()
 
