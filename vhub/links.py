@@ -19,6 +19,7 @@ from foosim.vhub.profiles import Profile, over
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES, Stage
 from foosim.vhub.stages.delay import Delay
+from foosim.vhub.stages.queue import Queue
 
 if TYPE_CHECKING:
     from foosim.vhub.fabric import Fabric
@@ -37,7 +38,7 @@ class Link:
         self._version = -1
         self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
-        self._draws = False
+        self._draws = self._is_apart = False
         self._slots = self._phase_ns = 0
 
     @property
@@ -75,6 +76,12 @@ class Link:
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._draws = self._slots != 0
         self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
+        self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue) for stage in self._stages))
+
+    def is_apart(self, time_ns: int) -> bool:
+        """Whether what is sent at a time shares no radio, queue or air with what is sent on other links."""
+        self._settle(time_ns)
+        return self._is_apart
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """Clogs have changed: give packets on their way, in the order of sending, new due times."""

@@ -107,6 +107,7 @@ class HubProcess:
         self._loop.took = self.core.waits.took
         self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
+        self.core.speak = self._loop.perform
         self._loop.on_alive = self._on_alive
         self._loop.on_say = self._on_say
         self._loop.on_unwritten = self._on_unwritten
