@@ -92,8 +92,8 @@ class HubCore:
         self.finished = False
         self.lost = self.failure = self.capture = self.capture_file = self.radio_address = ""
         self.recording: dict[str, Any] = {}
-        self.speak: Callable[[], None] = lambda: None
-        """Called amid a closing: what is to be said by then need not wait for the rest of it, and may be performed."""
+        self.speak: Callable[[int], int] = lambda now_ns: now_ns
+        """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
         self.epoch = self._epoch_tick = 0
         self._epoch_payload = b""
@@ -239,8 +239,7 @@ class HubCore:
         state = self.state
         assert state is not None
         tick = state.closed + 1
-        committed = self.commits.get(tick)
-        if committed is None:
+        if (committed := self.commits.get(tick)) is None:
             return False
         raw, commit, frame = committed
         self.waits.begin(now_ns)
@@ -264,10 +263,10 @@ class HubCore:
 
     def _close_clients(self, now_ns: int) -> bool:
         """Phase two, when all Dones are there: judge what clients sent, write, speak; what robots get comes first."""
-        world, state = self._world, self.state
         if self._waited:
             return False
-        assert world is not None and state is not None
+        world, state, releases = self._world, self.state, self.releases
+        assert world is not None and state is not None and releases is not None
         tick = world.frame.tick
         self._tell_of_waits(now_ns)
         admitted = self.sessions.take_sent() if state.hears_clients else {}
@@ -284,16 +283,17 @@ class HubCore:
             for following in range(tick + 2, state.final + 1):
                 self._sent[following] = encode(Deliveries(following, [], branch=state.branch))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
-        self.speak()
+        now_ns = self.speak(now_ns)
+        for name, flights in world.free.items():
+            releases.add(name, state.members[name].downlink, tick, flights, now_ns)
+        self._release(now_ns)
+        self.speak(now_ns)
         world.closing.fates += state.close_rest()
         for flight in world.closing.fates:
             if not flight.cause and flight.destination not in state.members:
                 flight.released_wall_ns = now_ns
-        assert self.releases is not None
-        for name, flights in world.free.items():
-            self.releases.add(name, state.members[name].downlink, tick, flights, now_ns)
         self._keeping.add(world.closing)
-        self._release(now_ns)
+        self.actions += self._keeping.take(releases.waiting_tick)
         self._world = None
         if (tick + 1) % limits.CHECKPOINT_TICKS == 0:
             self.actions.append(Journal(self.head()))

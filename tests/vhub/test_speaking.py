@@ -12,9 +12,14 @@ def test_deliveries_may_leave_behind_their_record_and_before_the_rest_of_the_clo
     hub = Hub().begin()
     hub.said()
     spoken: list[list[object]] = []
-    hub.core.speak = lambda: spoken.append([*hub.core.actions])
+
+    def speak(now_ns: int) -> int:
+        spoken.append([*hub.core.actions])
+        return now_ns + 7
+
+    hub.core.speak = speak
     hub.close(0)
-    (actions,) = spoken
+    actions, _ = spoken
     assert isinstance(actions[-2], Journal)
     assert isinstance(actions[-1], Publish) and actions[-1].channel is channels.DELIVERIES
     assert len(hub.core.actions) > len(actions), "the capture gets the closing when it is complete"
