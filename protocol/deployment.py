@@ -151,6 +151,8 @@ class Capture(Part):
     reserve_bytes: Size = _default("64 MiB", "reserve")
     """Kept free on the disks of capture and journals, so that what has to be written in the end still fits."""
     bytes_max: Size | None = Field(default=None, alias="max_bytes")
+    payloads: Literal["exact", "hashed"] = "exact"
+    """`hashed`: a hash of 16 bytes stands for each payload, and what needs payloads cannot be done with the capture."""
 
 
 class AccessSpec(Part):

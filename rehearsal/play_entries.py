@@ -34,6 +34,7 @@ from foosim.protocol.replay_messages import (
 from foosim.vhub import rows as capture_rows
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.packet import DELIVERED
+from foosim.vhub.payload_hash import keeps_hashes
 from foosim.vhub.rows import CLIENTS, FRAME, ROW_TYPES, TICK, ClientRow, PacketRow
 from foosim.vhub.transforms import read_poses
 from foosim.vhub.viewing import POSES as TF
@@ -94,13 +95,16 @@ def make_selection(
 ) -> Selection:
     """Return a selection as people write it. Raises BadValue, which names the option.
 
-    A remap is `OLD:=NEW` for an endpoint or a body, `/OLD:=/NEW` for a channel.
+    A remap is `OLD:=NEW` for an endpoint or a body, `/OLD:=/NEW` for a channel. Packets whose payloads are hashed are
+    not played.
     """
     for topic in topics:
         if not any(topic == known or topic.startswith(f"{known}/") for known in TOPICS):
             nearest = nearest_name(topic, TOPICS)
             what = f"--topic: not one of {', '.join(TOPICS)}, nor below one"
             raise BadValue(what, topic, None if nearest is None else show(nearest))
+        if topic.startswith(capture_rows.PACKETS) and keeps_hashes(deployment):
+            raise BadValue("--topic: payloads of this capture are hashed, its packets cannot be played", topic)
     names, channels = _renamed(deployment, remaps)
     return Selection(tuple(topics), _compile("--regex", regexes), _compile("--exclude", excluded), names, channels)
 
@@ -161,7 +165,8 @@ class Entries:
         self._decoders = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
         self._poses = selection.has(TF)
         named = [topic for topic in selection.topics if topic.startswith(capture_rows.PACKETS)]
-        self._packets = bool(named or selection.regexes or not selection.topics)
+        asked = bool(named or selection.regexes or not selection.topics)
+        self._packets = asked and not keeps_hashes(deployment)
         self._topics = {topic for topic in ROW_TYPES if topic != capture_rows.PACKETS and selection.has(topic)}
         self._links: dict[str, str] = {}
 

@@ -23,6 +23,7 @@ from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_info import CaptureInfo, capture_info
 from foosim.vhub.capture_recovery import recover_capture
+from foosim.vhub.payload_hash import HASHED
 from foosim.vhub.rows import CaptureError
 
 app = new_app()
@@ -46,12 +47,19 @@ def info(capture: Capture, json: Json = False) -> None:
     typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
 
 
+HASHED_TEXT: Final = (
+    "  PAYLOADS ARE HASHED: in their place stands BLAKE2b of 16 bytes; it cannot be simulated again, nor its packets "
+    "played"
+)
+
+
 def _describe(found: CaptureInfo) -> str:
     state = (
         "finished" if found.finished else f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
     )
     lines = [
         f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
+        *([HASHED_TEXT] if found.payloads == HASHED else []),
         *(f"  {key}: {value}" for key, value in sorted({**found.metadata, **found.end}.items())),
         f"  {_span(found)} of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
         f"  digest of the last frame {found.digest}",
@@ -62,7 +70,7 @@ def _describe(found: CaptureInfo) -> str:
         f"  packets {_counted(found.packets)}",
         *([f"  dropped by {_counted(found.causes)}"] if found.causes else []),
         *([f"  on channels {_counted(found.channels)}"] if found.channels else []),
-        f"  payloads {found.payload_bytes / 1e6:.1f} MB",
+        f"  payloads {found.payload_bytes / 1e6:.1f} MB, {found.payloads}",
         f"  recoveries {found.recoveries}",
         "  topics",
         *(f"    {topic}: {count}" for topic, count in found.topics.items()),

@@ -18,6 +18,7 @@ from foosim.protocol.start import Start, added_to, first_chain, start_with
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.vhub.capture_reader import CaptureData, CapturedTick, check_whole, open_capture, origin_of, read_about
+from foosim.vhub.payload_hash import check_payloads
 from foosim.vhub.rows import CaptureError
 
 
@@ -47,9 +48,13 @@ class Verified:
 
 
 def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
-    """Verify a capture file. Raises CaptureError for one that cannot be read, or was cut out of another."""
+    """Verify a capture file.
+
+    Raises CaptureError for one that cannot be read, was cut out of another, or has no payloads.
+    """
     check_whole(read_about(Path(path)))
     capture = open_capture(path)
+    check_payloads(str(capture.path), capture.deployment, "a verification")
     about = capture.about
     start = start_of(capture)
     text, name = about.deployment_text, about.deployment_name

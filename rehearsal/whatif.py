@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+import msgspec
 import numpy as np
 
 from foosim.protocol.deployment import Deployment
@@ -23,6 +24,7 @@ from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
 from foosim.vhub.capture_reader import CaptureData, Scan, captured_tick
 from foosim.vhub.packet import IN_FLIGHT, Flight
+from foosim.vhub.payload_hash import check_payloads
 from foosim.vhub.profiles import Profiles
 from foosim.vhub.rows import CLIENTS, PACKETS, TICK, CaptureError, ClientRow, PacketRow, TickRow, edit_of, packet_row
 from foosim.vhub.state import OUTBOX_SHIFT, HubState, Joining
@@ -172,6 +174,8 @@ class _Compared:
         self._left.pop(key, None)
         flight.released_wall_ns = 0 if before is None else before.wall_released_ns
         after = packet_row(flight)
+        if before is not None and before.payload_hash:
+            after = msgspec.structs.replace(after, payload=before.payload, payload_hash=before.payload_hash)
         if before is None or _verdict(after) != _verdict(before):
             self._note(key, before, after)
         else:
@@ -242,11 +246,12 @@ def _by_tick(rows: Iterable[PacketRow], deployment: Deployment) -> dict[int, _Of
         if row.copy:
             continue
         at, key = offered[row.sent_ns // deployment.tick_ns], (row.source, row.sequence)
+        payload = row.payload or bytes(row.size)  # of one that is hashed the size is all that a fate depends on
         to = "" if row.published else row.destination
         if row.source in deployment.robots:
-            at.robots[key] = RobotPacket(row.source, row.sequence & mask, to, row.channel, row.payload)
+            at.robots[key] = RobotPacket(row.source, row.sequence & mask, to, row.channel, payload)
         else:
-            at.clients[key] = Sent(row.sequence, to, row.channel, row.stamp_ns, row.payload)
+            at.clients[key] = Sent(row.sequence, to, row.channel, row.stamp_ns, payload)
     return offered
 
 
@@ -305,6 +310,7 @@ def _worlds(
             block, index = captured[row.tick]
             yield block.frame(index), edits
         return
+    check_payloads(str(capture.path), capture.deployment, "a world that is computed again")
     text, name = capture.about.deployment_text, capture.about.deployment_name
     replica = Replica(text, name, capture.deployment, start=start_of(capture))
     try:

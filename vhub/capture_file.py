@@ -27,6 +27,7 @@ from foosim.protocol.messages import Epoch, Origin
 from foosim.vhub.mcap_file import McapWriter
 from foosim.vhub.mcap_scan import NOTHING, UNSYNCED_BYTES, Scanned, Void, scan
 from foosim.vhub.packet import IN_FLIGHT
+from foosim.vhub.payload_hash import hashed_row, keeps_hashes
 from foosim.vhub.records import Closing
 from foosim.vhub.resume import Captured
 from foosim.vhub.rows import (
@@ -38,6 +39,7 @@ from foosim.vhub.rows import (
     ROW_TYPES,
     TICK,
     CaptureError,
+    Row,
     epoch_entry,
     frame_row,
     plan_of,
@@ -167,6 +169,7 @@ class CaptureFile:
         self._plan = plan_of(described.deployment)
         self._view = View(described.deployment)
         self._encode = msgspec.json.Encoder().encode
+        self._kept = hashed_row if keeps_hashes(described.deployment) else None
         self._reserve = described.deployment.capture.reserve_bytes
         self._bytes_max = described.deployment.capture.bytes_max
         self._known: Frame | None = None
@@ -213,8 +216,9 @@ class CaptureFile:
     def _write_closing(self, closing: Closing) -> None:
         add, encode, channels, done = self.mcap.add_message, self._encode, self._channels, self.done
         tick = closing.frame.tick
+        kept = self._kept
         for topic, log_ns, publish_ns, sequence, row in rows_of(closing, self._plan, self._known):
-            add(channels[topic], log_ns, publish_ns, sequence, encode(row))
+            add(channels[topic], log_ns, publish_ns, sequence, encode(row if kept is None else kept(row)))
             if topic == FRAME:
                 done.frame = tick
         self._write_views(closing.frame)
@@ -272,7 +276,8 @@ class CaptureFile:
         """
         frame = self._known
         if frame is not None and self.done.frame < frame.tick == self.done.tick:
-            self._write_view(FRAME, frame.tick, self._encode(frame_row(frame)))
+            row: Row = frame_row(frame)
+            self._write_view(FRAME, frame.tick, self._encode(row if self._kept is None else self._kept(row)))
         self.end_chunk()
         whole = self.mcap.mark()
         try:

@@ -45,6 +45,8 @@ class CaptureInfo:
     causes: Mapping[str, int]
     channels: Mapping[str, int]
     """Packets by channel."""
+    payloads: str
+    """`exact`, or `hashed`: then what needs them cannot be done."""
     payload_bytes: int
     recoveries: int
     files: Mapping[str, int]
@@ -85,7 +87,8 @@ def capture_info(path: Path | str) -> CaptureInfo:
             nodes.update(epoch.roster)
             arithmetic.add(epoch.arithmetic)
     about, first = scan.about, max(0, first)
-    tick_ns = deployment_of(about).tick_ns
+    deployment = deployment_of(about)
+    tick_ns = deployment.tick_ns
     return CaptureInfo(
         str(path),
         path.stat().st_size,
@@ -107,6 +110,7 @@ def capture_info(path: Path | str) -> CaptureInfo:
         {"offered": fates.total(), **{fate: fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
         dict(sorted(causes.items())),
         dict(sorted(channels.items())),
+        deployment.capture.payloads,
         payload_bytes,
         topics[RECOVERIES],
         {name: len(content) for name, content in sorted(about.files.items())},
