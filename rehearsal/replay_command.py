@@ -22,6 +22,7 @@ from foosim.rehearsal import capture_commands, play_command, report_command, wha
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_info import CaptureInfo, capture_info
+from foosim.vhub.capture_parts import NEXT
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.payload_hash import HASHED
 from foosim.vhub.rows import CaptureError
@@ -54,12 +55,16 @@ HASHED_TEXT: Final = (
 
 
 def _describe(found: CaptureInfo) -> str:
-    state = (
-        "finished" if found.finished else f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
-    )
+    if NEXT in found.end:
+        state = f"it goes on in {found.end[NEXT]}, which is not here"
+    elif found.finished:
+        state = "finished"
+    else:
+        state = f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
     lines = [
         f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
         *([HASHED_TEXT] if found.payloads == HASHED else []),
+        *([f"  {len(found.parts)} files: {found.parts[0]} to {found.parts[-1]}"] if len(found.parts) > 1 else []),
         *(f"  {key}: {value}" for key, value in sorted({**found.metadata, **found.end}.items())),
         f"  {_span(found)} of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
         f"  digest of the last frame {found.digest}",

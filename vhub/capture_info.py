@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from foosim.protocol.frame import CHAIN_START, chain_next
+from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of
 from foosim.vhub.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK
 
@@ -25,6 +26,8 @@ class CaptureInfo:
     """
 
     path: str
+    parts: tuple[str, ...]
+    """The files that it was read from, in their order."""
     bytes: int
     finished: bool
     unfinished_bytes: int
@@ -86,12 +89,13 @@ def capture_info(path: Path | str) -> CaptureInfo:
             epoch = scan.decode(DECODERS[EPOCHS], message)
             nodes.update(epoch.roster)
             arithmetic.add(epoch.arithmetic)
-    about, first = scan.about, max(0, first)
+    about, first, files = scan.about, max(0, first), files_from(path)
     deployment = deployment_of(about)
     tick_ns = deployment.tick_ns
     return CaptureInfo(
         str(path),
-        path.stat().st_size,
+        tuple(file.name for file in files),
+        sum(file.stat().st_size for file in files),
         about.finished,
         about.unfinished_bytes,
         about.library,

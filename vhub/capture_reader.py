@@ -34,19 +34,16 @@ from foosim.protocol.start import first_chain
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
     ASSETS,
-    CUT,
-    CUT_CHAIN,
-    CUT_TICK,
     DEPLOYMENT,
-    END_METADATA,
-    METADATA,
     ORIGIN,
     ORIGIN_CHAIN,
     ORIGIN_DIGEST,
     ORIGIN_TICK,
     VERSIONS,
 )
-from foosim.vhub.mcap_file import MAGIC, McapFile, Message
+from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, Joined, end_of, files_from
+from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_TICK
+from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import (
     CLIENTS,
     EPOCHS,
@@ -121,23 +118,20 @@ class Scan:
 
     def messages(self) -> Iterator[Message]:
         """Yield all messages, from the first on behind the checked metadata."""
-        try:
-            with self._path.open("rb") as stream:
-                file = McapFile(stream, self._path.stat().st_size, str(self._path), self._since_ns)
-                checked = False
-                for content in file.contents():
-                    if isinstance(content, Message):
-                        if not checked:
-                            self._check(file.profile)
-                            checked = True
-                        yield content
-                    else:
-                        self._take(content)
-        except OSError as error:
-            raise CaptureError(f"{self._path}: cannot be read, {error.strerror}") from None
+        file = Joined(self._path, self._since_ns)
+        checked = False
+        for content in file.contents():
+            if isinstance(content, Message):
+                if not checked:
+                    self._check(file.profile)
+                    checked = True
+                yield content
+            else:
+                self._take(content)
         self._check(file.profile)
         self.about.library = file.library
-        self.about.finished, self.about.unfinished_bytes = file.finished, file.unfinished_bytes
+        self.about.finished = file.finished and NEXT not in self.about.end
+        self.about.unfinished_bytes = file.unfinished_bytes
         self.about.start_ns, self.about.end_ns = min(file.start_ns, file.end_ns), file.end_ns
 
     def rows(self, topics: frozenset[str]) -> Iterator[tuple[str, Row]]:
@@ -281,12 +275,8 @@ def read_about(path: Path) -> About:
     scan = Scan(path)
     for _ in scan.messages():
         break
-    try:
-        with path.open("rb") as stream:
-            stream.seek(max(0, path.stat().st_size - len(MAGIC)))
-            scan.about.finished = stream.tell() > 0 and stream.read() == MAGIC
-    except OSError as error:
-        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+    end = end_of(files_from(path)[-1])
+    scan.about.finished = end is not None and NEXT not in end
     return scan.about
 
 

@@ -42,6 +42,8 @@ CHUNK_FIELDS: Final = struct.Struct("<QQQII")
 CHUNK_HEAD_BYTES_MAX: Final = CHUNK_FIELDS.size + 64
 """Its fields, and the name of a compression."""
 _FOOTER_START: Final = struct.Struct("<BQQQ")
+FOOTER: Final = struct.Struct("<BQQQI8s")
+"""The footer, and the magic bytes behind it."""
 PLACE: Final = struct.Struct("<Q")
 
 assert sys.byteorder == "little", "indexes are written as the machine has them"
@@ -320,15 +322,17 @@ Content = Message | records.Metadata | records.Attachment
 class McapFile:
     """Reads an MCAP file from start to end. What is read of a file without an end stands in `unfinished_bytes`."""
 
-    def __init__(self, stream: BinaryIO, size: int, name: str, since_ns: int = 0) -> None:
+    def __init__(self, stream: BinaryIO, size: int, name: str, since_ns: int = 0, *, repeats: bool = False) -> None:
         """`since_ns`: chunks whose last message is before that are passed by, if the file declares its channels first.
 
         A hub's chunks are in the order of their last messages; what is wanted of them may still be before that time.
+        With `repeats` the first chunk only says again what was said before, and is passed by as well.
         """
         self._stream = stream
         self._size = size
         self._name = name
         self._since_ns = since_ns
+        self._repeats = repeats
         self._at = 0
         self._topics: dict[int, str] = {}
         self.profile = ""
@@ -403,6 +407,9 @@ class McapFile:
         """Take the times of a chunk, and return whether it is passed by."""
         if len(head) < CHUNK_FIELDS.size:  # the file became shorter while it was read
             return False
+        if self._repeats and self._topics:
+            self._repeats = False
+            return True
         start_ns, end_ns, *_ = CHUNK_FIELDS.unpack(head)
         self.start_ns, self.end_ns = min(self.start_ns, start_ns), max(self.end_ns, end_ns)
         return bool(self._topics) and end_ns < self._since_ns
