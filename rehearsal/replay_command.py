@@ -99,9 +99,15 @@ def _span(found: CaptureInfo) -> str:
 def verify(
     capture: Capture,
     nodes: Annotated[int, typer.Option(help="Number of nodes to simulate on.")] = 1,
+    from_first_frame: Annotated[
+        bool, typer.Option("--from-first-frame", help="Verify a cut: what follows on the first frame that it has.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Simulate a capture again from its orders and deliveries, and compare the digest of every tick.
+
+    A cut, and a later file of a run, is refused: how its first frame came is not in it. With --from-first-frame that
+    frame is taken as it is, and all behind it is verified.
 
     Names the first tick and the entities that differ. The number of nodes need not be the capture's. Where ticks differ
     and the capture comes from nodes with another arithmetic than this machine's, standard error says so.
@@ -109,7 +115,7 @@ def verify(
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     with reading():
-        found = verify_capture(capture, nodes)
+        found = verify_capture(capture, nodes, from_first_frame=from_first_frame)
     typer.echo(encode_json(_as_json(found)).decode() if json else _verdict(found))
     if found.tick >= 0 and found.other_arithmetic:
         typer.echo(
@@ -137,7 +143,8 @@ def _verdict(found: Verified) -> str:
     on = f"on {found.nodes} node{'s' if found.nodes > 1 else ''}"
     if found.equal:
         count = found.ticks - found.first_tick
-        return f"equal: {count} ticks simulated again {on}, digest of all ticks {found.chain.hex()}"
+        since = f" behind frame {found.first_tick}" if found.first_tick else ""
+        return f"equal: {count} ticks{since} simulated again {on}, digest of all ticks {found.chain.hex()}"
     if found.missing_tick >= 0:
         return f"tick {found.missing_tick} is missing; {found.ticks - found.first_tick} ticks before it are equal {on}"
     return f"differs at tick {found.tick} in {', '.join(found.entities)}; the ticks before it are equal {on}"

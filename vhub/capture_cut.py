@@ -2,7 +2,7 @@
 
 What was in force at that frame is repeated at the start, as it was written: the layout, the epoch, the clients that
 take part, the scene. Deployment, files and metadata are those of the whole, and the metadata say where the cut begins.
-A run can begin with any of its frames; a verification cannot, since it starts where the run began.
+A run can begin with any of its frames; a verification starts where the run began, unless asked to take its first one.
 Neighbours: `capture_reader` (reads both), `capture_file` (the form of what is written).
 """
 

@@ -42,7 +42,7 @@ from foosim.vhub.capture_file import (
     VERSIONS,
 )
 from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, Joined, end_of, files_from
-from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_TICK
+from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import (
     CLIENTS,
@@ -363,15 +363,21 @@ def origin_of(about: About) -> Origin | None:
         raise CaptureError(f"{about.path}: it does not say in full where its run began: {error}") from None
 
 
-def chain_at_start(about: About) -> bytes:
-    """Return the chain over all frames up to the first one that a capture has. Raises CaptureError."""
-    if CUT not in about.metadata:
-        return first_chain(origin_of(about))
+def beginning_of(about: About) -> Origin | None:
+    """Return where a capture begins, a cut or its run, None: at frame 0. Raises CaptureError."""
+    told = about.metadata
+    if CUT not in told:
+        return origin_of(about)
     try:
-        chain = bytes.fromhex(about.metadata[CUT_CHAIN])
+        digest, chain = bytes.fromhex(told[CUT_DIGEST]), bytes.fromhex(told[CUT_CHAIN])
+        return Origin(int(told[CUT_TICK]), told[CUT], digest, chain)
     except (KeyError, ValueError) as error:
         raise CaptureError(f"{about.path}: it does not say in full where it was cut: {error}") from None
-    return chain
+
+
+def chain_at_start(about: About) -> bytes:
+    """Return the chain over all frames up to the first one that a capture has. Raises CaptureError."""
+    return first_chain(beginning_of(about))
 
 
 def check_whole(about: About) -> None:
@@ -380,7 +386,7 @@ def check_whole(about: About) -> None:
         source, tick = about.metadata[CUT], about.metadata.get(CUT_TICK)
         raise CaptureError(
             f"{about.path}: a cut of {source} from tick {tick} on; a run is verified from where it began: "
-            f"verify {source}, or begin a run with a frame of the cut"
+            f"verify {source}, or this from its first frame on (--from-first-frame)"
         )
 
 
