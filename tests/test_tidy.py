@@ -110,6 +110,7 @@ SHELLS = {
     "vhub/capture_reader.py",
     "vhub/capture_recovery.py",
     "vhub/capture_split.py",
+    "vhub/capture_standing.py",
     "vhub/capture_writer.py",
     "vhub/main.py",
     "vhub/room_watch.py",
