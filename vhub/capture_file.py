@@ -28,6 +28,7 @@ from foosim.vhub.capture_left import Journalled, Left, Progress, look, run_of
 from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, part_path, parts_at
 from foosim.vhub.capture_split import OWN, Split
 from foosim.vhub.in_force import HOLDING
+from foosim.vhub.link_models import model_versions
 from foosim.vhub.mcap_file import Book, McapWriter, Message
 from foosim.vhub.mcap_scan import Scanned, read_messages
 from foosim.vhub.payload_hash import hashed_row, keeps_hashes
@@ -338,12 +339,14 @@ class CaptureFile:
         mcap.add_attachment(DEPLOYMENT, "application/yaml", described.text.encode())
         for path, file in deployment.asset_files.items():
             mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
-        mcap.add_attachment(VERSIONS, "application/json", encode_json(library_versions()))
+        versions = library_versions() | model_versions(deployment.network)
+        mcap.add_attachment(VERSIONS, "application/json", encode_json(versions))
         return channels
 
     def _let_go(self) -> None:
         if self._file >= 0:
             os.close(self._file)
+        self._file = -1
 
     # --- the next file -----------------------------------------------------------------------------------------------
 

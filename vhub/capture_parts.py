@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import struct
-import sys
+from array import array
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -21,9 +21,11 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from foosim.vhub.mcap_file import FOOTER, MAGIC, RECORD, Content, McapFile, Message, chunk_records
+from foosim.vhub.mcap_file import MAGIC, RECORD, Content, McapFile, Message, chunk_records
 from foosim.vhub.rows import CaptureError
 
+FOOTER: Final = struct.Struct("<BQQQI8s")
+"""The last record of an MCAP file, and the magic bytes behind it."""
 METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 PART, AFTER, LAST = "part", "part_after", "last"
@@ -160,14 +162,17 @@ def _end_in(stream: BinaryIO, summary: bytes, size: int) -> dict[str, str]:
 class Joined:
     """Reads a file and those behind it as one MCAP file, from start to end; else as `McapFile` does."""
 
-    def __init__(self, path: Path, since_ns: int = 0) -> None:
-        """`since_ns`: what was recorded long before that time is passed by, if it can be."""
+    def __init__(self, path: Path, since_ns: int = 0, topics: frozenset[str] | None = None) -> None:
+        """`since_ns`: what was recorded long before that time is passed by, if it can be; so are other topics."""
         self.finished = False
         """Whether the last of them has an end."""
         self.unfinished_bytes = 0
-        self.start_ns, self.end_ns = sys.maxsize, 0
+        self.chunk_starts: array[int] = array("Q")
+        self.end_ns = 0
+        """Times of the first message of each chunk so far, and of the last of all, passed by or not."""
         self._path = path
         self._since_ns = since_ns
+        self._topics = topics
         self._first: McapFile | None = None
 
     @property
@@ -204,10 +209,13 @@ class Joined:
         try:
             with path.open("rb") as stream:
                 is_behind = self._first is not None
-                file = McapFile(stream, path.stat().st_size, str(path), self._since_ns, repeats=is_behind)
+                size = path.stat().st_size
+                file = McapFile(stream, size, str(path), self._since_ns, self._topics)
+                file.repeats = is_behind
+                file.chunk_starts = self.chunk_starts
                 self._first = self._first or file
                 yield from file.contents()
         except OSError as error:
             raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
         self.finished, self.unfinished_bytes = file.finished, file.unfinished_bytes
-        self.start_ns, self.end_ns = min(self.start_ns, file.start_ns), max(self.end_ns, file.end_ns)
+        self.end_ns = max(self.end_ns, file.end_ns)
