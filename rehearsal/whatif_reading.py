@@ -20,6 +20,7 @@ from foosim.protocol.messages import RobotPacket, Sent
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick
+from foosim.vhub.payload_hash import check_payloads
 from foosim.vhub.rows import CLIENTS, PACKETS, TICK, CaptureError, ClientRow, EditRow, PacketRow, TickRow
 from foosim.vhub.state import OUTBOX_SHIFT
 
@@ -128,11 +129,12 @@ class Offers:
                 raise CaptureError(f"{self._capture.path}: {what}")
             return  # before a cut begins
         to = "" if row.published else row.destination
+        payload = row.payload or bytes(row.size)  # of one that is hashed the size is all that a fate depends on
         offered = self._at(tick)
         if source in self._robots:
-            offered.robots[source, sequence] = RobotPacket(source, sequence & _INDEX, to, row.channel, row.payload)
+            offered.robots[source, sequence] = RobotPacket(source, sequence & _INDEX, to, row.channel, payload)
         else:
-            offered.clients[source, sequence] = Sent(sequence, to, row.channel, row.stamp_ns, row.payload)
+            offered.clients[source, sequence] = Sent(sequence, to, row.channel, row.stamp_ns, payload)
 
     def _at(self, tick: int) -> Offered:
         offered = self._offered.get(tick)
@@ -152,6 +154,7 @@ def world_of(capture: CaptureData, frames: Frames) -> Iterator[Callable[[Offered
             raise CaptureError(f"{capture.path}: it does not have the frame with which it begins")
         yield lambda offered: _later(first, offered)
     else:
+        check_payloads(str(capture.path), capture.deployment, "a world that is computed again")
         about = capture.about
         replica = Replica(about.deployment_text, about.deployment_name, capture.deployment, start=start_of(capture))
         try:

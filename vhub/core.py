@@ -252,7 +252,7 @@ class HubCore:
             state.leave(name)
         for joining in joins:
             state.join(joining, tick)
-        closing = closing_of(frame, commit, state, joins, leaves, now_ns)
+        closing = closing_of(frame, commit, self.commits.chain_at(tick), state, joins, leaves, now_ns)
         released = state.close_world(frame, packets, closing.fates, commit.edits)
         due = state.due_members(tick)
         for name in due:

@@ -235,7 +235,7 @@ class HubProcess:
         path = path or Path("captures") / f"{deployment.world}-{wall.now_stamp()}.mcap"
         self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         if before is None:  # who is killed before the capture is there finds here that what is found is its own
-            check_new(path)
+            check_new(path, is_split=deployment.capture.is_split)
             assert self._journal is not None
             self._journal.append(first_head(build, deployment, self.core.capture_file))
         metadata = {
