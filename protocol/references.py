@@ -379,6 +379,8 @@ def _hall(view: View) -> Iterator[Finding]:
 def _scenery(view: View) -> Iterator[Finding]:
     """The pure engine has no meshes, a hall no ball that feels surfaces; waves cross a material, or have a loss."""
     for name in view.mapping("scenery"):
+        if name in view.robots:
+            yield Finding(("scenery", name), "a name that is also a robot's", name, at="key")
         if view.get("table") is None:
             surface = view.get("scenery", name, "surface")
             if surface is not None:

@@ -234,6 +234,19 @@ def test_every_module_says_what_it_is() -> None:
     assert not silent, "\n".join(silent)
 
 
+def test_the_neighbours_that_a_module_names_exist() -> None:
+    """A module, a package, or what the module itself defines: `air`, `stages.medium`, `node/main.py`."""
+    known = {path.stem for path in ALL_FILES} | {path.parent.name for path in ALL_FILES}
+    strangers = []
+    for path in ALL_FILES:
+        named = (ast.get_docstring(tree_of(path)) or "").partition("Neighbours:")[2]
+        for name in re.findall(r"`([a-z_][\w./:]*)`", named):
+            module = re.split(r"[./]", name.partition(":")[0].removesuffix(".py"))[-1]
+            if module not in known and not re.search(rf"\b{module}\b", path.read_text().split('"""', 2)[2]):
+                strangers.append(f"{name_of(path)}: {name}")
+    assert not strangers, "\n".join(strangers)
+
+
 def test_nothing_is_left_for_later() -> None:
     later = re.compile(r"\b(TO" + r"DO|FIX" + r"ME|XX" + r"X|HA" + r"CK)\b|NotImplemented" + r"Error|\bfor no" + r"w\b")
     left = [

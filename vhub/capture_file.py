@@ -24,6 +24,7 @@ from foosim.protocol.disk import Room, megabytes, room_on_disk
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch, Origin
+from foosim.vhub.link_models import model_versions
 from foosim.vhub.mcap_file import McapWriter
 from foosim.vhub.mcap_scan import NOTHING, UNSYNCED_BYTES, Scanned, Void, scan
 from foosim.vhub.packet import IN_FLIGHT
@@ -326,7 +327,8 @@ class CaptureFile:
         self.mcap.add_attachment(DEPLOYMENT, "application/yaml", described.text.encode())
         for path, file in described.deployment.asset_files.items():
             self.mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
-        self.mcap.add_attachment(VERSIONS, "application/json", encode_json(library_versions()))
+        versions = library_versions() | model_versions(deployment.network)
+        self.mcap.add_attachment(VERSIONS, "application/json", encode_json(versions))
 
     # --- a file that was left unfinished -----------------------------------------------------------------------------
 

@@ -268,6 +268,8 @@ class HubCore:
         admitted = self.sessions.take_sent() if state.hears_clients else {}
         samples = self._samples.pop(tick, [])
         deliveries = state.close_clients(world.frame, admitted, world.closing.fates)
+        if state.fabric.faults:
+            self.lose("the network", state.fabric.faults[0])
         payload = encode(deliveries)
         for name in world.free:
             state.members[name].downlink += 1

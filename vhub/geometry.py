@@ -40,17 +40,22 @@ from foosim.protocol.scene import (
 from foosim.protocol.scenes import build_scene
 from foosim.vhub.rays import (
     MARGIN_M,
+    Sides,
     Span,
     Triangles,
     box_span,
     boxes_around,
     boxes_met_by,
     cylinder_span,
+    sides_of,
     sphere_span,
+    things_met_by,
 )
 
 TOUCH_M: Final = 1e-9
 """A way through something that is no longer than this is a touch; shapes of one thing this close are one."""
+FEW: Final = 128
+"""Up to so many boxes are sooner looked at one by one than all at once."""
 PAIRS_KEPT: Final = 4096
 """Pairs of ends of which it is remembered what of the scenery is between them, at least."""
 
@@ -239,9 +244,17 @@ class Still:
         self.groups = _Groups()
         self.solids = self.groups.solids(shapes)
         boxes = [shape_box(solid.shape) for solid in self.solids]
-        self.boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes])
+        self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes])
+        sides = [sides_of(*box) for box in boxes]
+        self._few = list(zip(sides, self.solids, strict=True)) if len(boxes) <= FEW else None
         self._newer: dict[Line, tuple[Crossing, ...]] = {}
         self._older: dict[Line, tuple[Crossing, ...]] = {}
+
+    def near(self, line: Line) -> list[_Solid]:
+        """Return what of the scenery a line may cross."""
+        if self._few is not None:
+            return things_met_by(self._few, line)
+        return [self.solids[index] for index in boxes_met_by(self._boxes, line)]
 
     def known(self, line: Line) -> tuple[Crossing, ...] | None:
         """Return what a line crosses of the scenery, None if that is not remembered."""
@@ -284,11 +297,10 @@ class _Reach:
 def _reach(body: Body) -> _Reach:
     low, high = swept_box(body)
     if body.links[0].joint != "free":
-        (lx, ly, lz), (hx, hy, hz), gap = low, high, MARGIN_M
-        return _Reach((lx - gap, ly - gap, lz - gap), (hx + gap, hy + gap, hz + gap), is_free=False)
+        return _Reach(low, high, is_free=False)
     (lx, ly, lz), (hx, hy, hz), (x, y, z) = low, high, body.position
     far = [max(abs(lx - x), abs(hx - x)), max(abs(ly - y), abs(hy - y)), max(abs(lz - z), abs(hz - z))]
-    radius = sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2]) + MARGIN_M
+    radius = sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2])
     return _Reach((-radius,) * 3, (radius,) * 3, is_free=True)
 
 
@@ -310,31 +322,34 @@ class Geometry:
         return Sight(self, layout, numbers)
 
 
-@dataclass(slots=True)
 class _Placed:
     """A link at its pose in one frame."""
 
-    limb: _Limb
-    position: Vector
-    orientation: Quaternion
-    solids: list[_Solid] | None = None
+    __slots__ = ("_limb", "_middle", "_orientation", "_position", "_solids")
+
+    def __init__(self, limb: _Limb, position: Vector, orientation: Quaternion) -> None:
+        self._limb, self._position, self._orientation = limb, position, orientation
+        x, y, z = rotate(orientation, limb.middle)
+        self._middle = x + position[0], y + position[1], z + position[2]
+        self._solids: list[_Solid] | None = None
 
     def is_near(self, line: Line) -> bool:
         """Whether a line comes as near as the sphere around the link, or nearly so."""
-        x, y, z = rotate(self.orientation, self.limb.middle)
-        start, end = line
-        px, py, pz = x + self.position[0] - start[0], y + self.position[1] - start[1], z + self.position[2] - start[2]
-        dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+        (x, y, z), ((ax, ay, az), (bx, by, bz)) = self._middle, line
+        px, py, pz = x - ax, y - ay, z - az
+        dx, dy, dz = bx - ax, by - ay, bz - az
         square = dx * dx + dy * dy + dz * dz
-        share = min(1.0, max(0.0, (px * dx + py * dy + pz * dz) / square)) if square else 0.0
-        qx, qy, qz = px - share * dx, py - share * dy, pz - share * dz
-        reach = self.limb.radius + MARGIN_M
-        return qx * qx + qy * qy + qz * qz <= reach * reach
+        along = px * dx + py * dy + pz * dz
+        if along > 0.0:
+            share = along / square if along < square else 1.0
+            px, py, pz = px - share * dx, py - share * dy, pz - share * dz
+        reach = self._limb.radius + MARGIN_M
+        return px * px + py * py + pz * pz <= reach * reach
 
     def in_world(self) -> list[_Solid]:
-        if self.solids is None:
-            self.solids = [solid.placed(self.position, self.orientation) for solid in self.limb.solids]
-        return self.solids
+        if self._solids is None:
+            self._solids = [solid.placed(self._position, self._orientation) for solid in self._limb.solids]
+        return self._solids
 
 
 class Sight:
@@ -344,8 +359,8 @@ class Sight:
         self._geometry, self._layout, self._numbers = geometry, layout, numbers
         self._found: dict[Key, tuple[Crossing, ...]] = {}
         self._placed: dict[str, list[_Placed]] = {}
-        self._around: list[tuple[float, float, float, float, float, float, str]] | None = None
-        """Boxes around bodies: least and greatest x, y and z, and the body's name."""
+        self._around: list[tuple[Sides, str]] | None = None
+        """Boxes around bodies, with their names."""
 
     def between(self, a: Vector, b: Vector, ignoring: Collection[str] = ()) -> tuple[Crossing, ...]:
         """Return what the line between two points (m, world frame) crosses, the bodies `ignoring` (entities) aside.
@@ -360,51 +375,39 @@ class Sight:
         key = line, frozenset(ignoring)
         found = self._found.get(key)
         if found is None:
-            found = self._found[key] = self._look(line, key[1])
+            found = self._found[key] = self.look(line, key[1])
         return found
 
-    # --- looking -----------------------------------------------------------------------------------------------------
+    def look(self, line: Line, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
+        """Work out what a line from its lesser end crosses, for who remembers it: `between` says what that is.
 
-    def _look(self, line: Line, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
-        """Work out what a line crosses; what of the scenery is remembered is not looked at again."""
+        What of the scenery is remembered is not looked at again.
+        """
         still = self._geometry.still
         ray = None
         standing = still.known(line)
         if standing is None:
-            solids = [still.solids[index] for index in boxes_met_by(still.boxes, line)]
+            solids = still.near(line)
             ray = _ray(line)
             standing = tuple(sorted(still.groups.crossings(ray, solids), key=_by_distance)) if solids else ()
             still.keep(line, standing)
-        near = self._bodies_near(line)
+        if self._around is None:
+            self._around = self._boxes_around()
+        near = things_met_by(self._around, line)
         moving = [solid for name in near if name not in ignoring for solid in self._solids(name, line)]
         if not moving:
             return standing
         crossed = self._geometry.groups.crossings(ray or _ray(line), moving)
         return tuple(sorted((*standing, *crossed), key=_by_distance)) if crossed else standing
 
-    def _bodies_near(self, line: Line) -> list[str]:
-        """Return the bodies whose box meets the box around a line, in name order."""
-        if self._around is None:
-            self._around = self._boxes_around()
-        (ax, ay, az), (bx, by, bz) = line
-        if ay > by:
-            ay, by = by, ay
-        if az > bz:
-            az, bz = bz, az
-        return [
-            name
-            for low_x, high_x, low_y, high_y, low_z, high_z, name in self._around
-            if high_x >= ax and low_x <= bx and high_y >= ay and low_y <= by and high_z >= az and low_z <= bz
-        ]
-
-    def _boxes_around(self) -> list[tuple[float, float, float, float, float, float, str]]:
+    def _boxes_around(self) -> list[tuple[Sides, str]]:
         """Return a box around each body: however a free one is turned, wherever another one's joints are."""
-        geometry, boxes = self._geometry, []
-        for name, reach in geometry.reaches.items():
+        boxes = []
+        for name, reach in self._geometry.reaches.items():
             start = self._layout[name].offsets["position"] if reach.is_free else -1
             x, y, z = self._numbers[start : start + 3] if reach.is_free else ORIGIN
             (lx, ly, lz), (hx, hy, hz) = reach.low, reach.high
-            boxes.append((x + lx, x + hx, y + ly, y + hy, z + lz, z + hz, name))
+            boxes.append((sides_of((x + lx, y + ly, z + lz), (x + hx, y + hy, z + hz)), name))
         return boxes
 
     def _solids(self, name: str, line: Line) -> list[_Solid]:

@@ -33,7 +33,7 @@ from foosim.vhub.radio.airtime import (
 from foosim.vhub.radio.contention import saturation_rate_hz, sensing
 from foosim.vhub.radio.noise import noise_dbm as radio_noise_dbm
 from foosim.vhub.radio.path_loss import range_m
-from foosim.vhub.radio.timings import LRWPAN
+from foosim.vhub.radio.timings import LORA_DUTY_CYCLES, LRWPAN
 from foosim.vhub.stages.medium import BASE_STATION_DBM, OPPORTUNITY_BYTES, mode_of, wifi_modes, wifi_timing
 from foosim.vhub.stages.residual import chain_of_burst
 
@@ -98,11 +98,14 @@ class Meaning:
     """Packets of SMALL_BYTES in an hour that the duty cycle allows."""
     queue_ns: int | None
     """How long the last packet of a full queue waits."""
+    model: str | None
+    """The link model of one's own that decides beside all this; the figures are without it."""
     warnings: tuple[str, ...]
 
     @property
     def name(self) -> str:
-        return self.rule if self.radio in ("", self.rule) else f"{self.rule} via {self.radio}"
+        name = self.rule if self.radio in ("", self.rule) else f"{self.rule} via {self.radio}"
+        return name if self.model is None else f"{name} with link model {self.model}"
 
 
 # --- which settings there are ----------------------------------------------------------------------------------------
@@ -207,6 +210,7 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
         nlos_m,
         int(duty * HOUR_NS / carried[0].airtime_ns) if is_limited else None,
         _queue_ns(settings, carried),
+        None if settings.model is None else settings.model.name,
         (),
     )
     return replace(meaning, warnings=tuple(_warnings(use, meaning)))
@@ -373,7 +377,8 @@ def ranges_of(settings: Radio) -> tuple[float | None, float | None]:
 def _least_dbm(settings: Radio, noise_dbm: float) -> float:
     """Return the power that 90 % of single frames need."""
     if settings.medium == "lora":
-        return errors.LORA_SENSITIVITY_DBM[settings.spreading_factor - 7]
+        floors = errors.LORA_GATEWAY_SENSITIVITY_DBM if settings.gateway else errors.LORA_SENSITIVITY_DBM
+        return floors[settings.spreading_factor - 7]
     if settings.medium == "lte":
         return noise_dbm + errors.LTE_FLOOR_CENTI_DB / 100.0
     if settings.medium == "wifi":
@@ -406,6 +411,10 @@ def _warnings(use: Use, meaning: Meaning) -> Iterator[str]:
     longest = LORA_LONGEST[settings.spreading_factor - 7]
     if settings.medium == "lora" and (settings.payload_max is None or settings.payload_max > longest):
         yield f"mtu is above the {longest} B of LoRaWAN at spreading factor {settings.spreading_factor}"
+    for low_hz, high_hz, share in LORA_DUTY_CYCLES if settings.medium == "lora" else ():
+        at_hz = settings.frequency_hz
+        if low_hz <= at_hz <= high_hz and settings.duty_cycle > share:
+            yield f"duty_cycle is above the {100.0 * share:g} % that the EU allows at {at_hz / 1e6:g} MHz"
     if meaning.carried and settings.queue.bytes_max < meaning.carried[-1].size:
         yield f"a packet of {meaning.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
     if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and _has_queue(settings):

@@ -28,7 +28,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Level
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, DeploymentError
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
@@ -45,6 +45,7 @@ from foosim.vhub.capture_file import check_new, origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 from foosim.vhub.records import Closing, first_head
@@ -195,6 +196,12 @@ class HubProcess:
         self._wire.declare_alive()
         core, deployment = self.core, self.core.deployment
         assert deployment is not None
+        try:
+            check_link_models(deployment.network, build.deployment, build.deployment_name)
+        except DeploymentError as error:
+            core.failure = "cannot judge packets without its link models"
+            core.lose("the network", error.problems[0])
+            return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
         self._journal = self._loop.journal = Journal(folder, VHUB)
         records = list(read_journal(folder, VHUB))

@@ -12,9 +12,9 @@ into the world.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import inf, sqrt
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +93,42 @@ def cylinder_span(start: Vector, way: Vector, radius: float, half_length: float)
         one, other = other, one
     enter, leave = max(enter, one), min(leave, other)
     return (enter, leave) if enter < leave else None
+
+
+Sides = tuple[float, float, float, float, float, float, float, float, float, float]
+"""A box along the axes: least and greatest x, y and z; its middle and half of its lengths in x and y (m)."""
+T = TypeVar("T")
+
+
+def sides_of(low: Vector, high: Vector) -> Sides:
+    """Return the sides of a box for `things_met_by`, with a margin."""
+    (lx, ly, lz), (hx, hy, hz), gap = low, high, MARGIN_M
+    middle_x, middle_y = lx + (hx - lx) / 2, ly + (hy - ly) / 2
+    half_x, half_y = (hx - lx) / 2 + gap, (hy - ly) / 2 + gap
+    return lx - gap, hx + gap, ly - gap, hy + gap, lz - gap, hz + gap, middle_x, middle_y, half_x, half_y
+
+
+def things_met_by(boxes: Iterable[tuple[Sides, T]], line: tuple[Vector, Vector]) -> list[T]:
+    """Return the things whose boxes a line from its lesser end comes near to, seen along the axes and from above.
+
+    As `boxes_met_by` it only says where to look, and soonest where there are few boxes. Seen from above a box is beside
+    a line when its middle is farther from it than its corners reach.
+    """
+    (ax, ay, az), (bx, by, bz) = line
+    way_x, way_y = bx - ax, by - ay
+    side_y = abs(way_y)
+    (low_y, high_y), (low_z, high_z) = (ay, by) if ay <= by else (by, ay), (az, bz) if az <= bz else (bz, az)
+    return [
+        thing
+        for (lx, hx, ly, hy, lz, hz, x, y, half_x, half_y), thing in boxes
+        if hx >= ax
+        and lx <= bx
+        and hy >= low_y
+        and ly <= high_y
+        and hz >= low_z
+        and lz <= high_z
+        and abs((x - ax) * way_y - (y - ay) * way_x) <= half_x * side_y + half_y * way_x
+    ]
 
 
 def boxes_around(lows: Sequence[Vector] | Floats, highs: Sequence[Vector] | Floats) -> Floats:

@@ -165,6 +165,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     propagation_ns: Counter = 0
     jitter_ns: Counter = 0
     held_ns: Counter = 0
+    model_ns: Counter = 0
     phase_ns: Counter = 0
     is_bad: bool = False
     bits_flipped: Counter = 0
@@ -362,6 +363,7 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.propagation_ns,
         flight.jitter_ns,
         flight.held_ns,
+        flight.model_ns,
         flight.phase_ns,
         flight.is_bad,
         flight.bits_flipped,

@@ -3,7 +3,7 @@
 Closing tick k has two phases. *World*: what robots sent at k is judged; the clients due get what has reached them.
 *Clients*: what clients sent is judged; the deliveries of tick k+1 are final. Fates know frames, times and draws, never
 nodes. The journal holds the inputs of every closing, so a fold of it through this same class gives the state again,
-byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `journal_records`.
+byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `records`.
 """
 
 from __future__ import annotations

@@ -14,9 +14,10 @@ from foosim.vhub.radio.errors import lora_interferer, lora_received
 from foosim.vhub.radio.noise import level_of
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.medium import COLLISION, SNR, error_threshold
+from foosim.vhub.stages.stage import Stage
 
 
-class Channel:
+class Channel(Stage):
     """Judges one link's signals."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -61,7 +62,7 @@ class Channel:
         """LoRa captures: a signal survives others that are together weaker by their spreading factor's isolation."""
         factor = self._settings.spreading_factor
         power_dbm = flight.received_cdbm / 100.0
-        if not lora_received(factor, power_dbm):
+        if not lora_received(factor, power_dbm, self._settings.gateway):
             flight.error_threshold = UNIT
             return OUT_OF_RANGE
         if not flight.by_factor:

@@ -1,4 +1,4 @@
-"""Delay: queue, access, airtime and propagation, the constant delay, jitter, clogs; then the order of the link.
+"""Delay: queue, access, airtime and propagation, the constant delay, a model's, jitter, clogs; then the link's order.
 
 Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo unless
 they say otherwise. A clog that is asked for, or healed, while packets are on their way moves their due times: as if it
@@ -13,9 +13,10 @@ from foosim.protocol.draws import Slot, chance_threshold
 from foosim.vhub.jitter import interpolate_ns, quantiles_ns
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 
-class Delay:
+class Delay(Stage):
     """Sets the due time of a packet."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -36,11 +37,11 @@ class Delay:
         settings = setup.settings
         timed = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
         late = settings.jitter is not None or settings.reorder is not None or settings.burst is not None
-        return cls(setup) if timed or late or settings.delay_ns or setup.holds else None
+        return cls(setup) if timed or late or settings.delay_ns or setup.holds or setup.model is not None else None
 
     def at_sending(self, flight: Flight) -> str:
         spent_ns = flight.phase_ns + flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
-        due_ns = flight.sent_ns + spent_ns + self._delay_ns
+        due_ns = flight.sent_ns + spent_ns + self._delay_ns + flight.model_ns
         if self._quantiles_ns:
             flight.jitter_ns = interpolate_ns(self._quantiles_ns, flight.words[Slot.JITTER])
             due_ns += flight.jitter_ns
@@ -87,6 +88,3 @@ class Delay:
 
     def _in_order(self, due_ns: int, last_ns: int) -> int:
         return max(due_ns, last_ns + 1) if self._fifo else due_ns
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""

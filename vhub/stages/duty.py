@@ -8,11 +8,12 @@ from foosim.vhub.memory import Sending
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 DUTY_CYCLE: Final = "duty_cycle"
 
 
-class Duty:
+class Duty(Stage):
     """Takes a packet's airtime out of its sender's bucket, or drops it."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -49,6 +50,3 @@ class Duty:
             bandwidth_hz = int(settings.bandwidth_hz)
             return lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
         return serialisation_ns(size + settings.overhead_bytes, settings.rate_bps or settings.fixed_rate_bps)
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""

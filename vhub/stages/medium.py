@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
-from foosim.protocol.draws import UNIT, Slot
+from foosim.protocol.draws import UNIT, Slot, draw_words
 from foosim.protocol.radios import Radio
 from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
@@ -28,7 +28,7 @@ from foosim.vhub.radio.airtime import (
     wifi_ack_ns,
     wifi_airtime_ns,
 )
-from foosim.vhub.radio.contention import Access, Outcome, csma_access, wifi_access
+from foosim.vhub.radio.contention import Access, Outcome, Words, csma_access, wifi_access
 from foosim.vhub.radio.timings import (
     CATEGORIES,
     DOT11P,
@@ -39,7 +39,8 @@ from foosim.vhub.radio.timings import (
     WifiTiming,
     with_category,
 )
-from foosim.vhub.setup import LinkSetup
+from foosim.vhub.setup import BLOCK_SHIFT, LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
@@ -51,7 +52,7 @@ OPPORTUNITY_BYTES: Final = 1500
 """What leaves at one line of a trace of capacity."""
 
 
-class Wire:
+class Wire(Stage):
     """Serialises at a rate, or at the opportunities of a trace."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -103,11 +104,8 @@ class Wire:
             return 2**62
         return (rounds * self._trace[-1] + self._trace[place]) * 1_000_000
 
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
 
-
-class OnAir:
+class OnAir(Stage):
     """What all radios share: a broadcast is sent once for all its receivers; who is on air is known to the air."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -185,15 +183,16 @@ class OnAir:
         airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, rate_bps) if rate_bps else 0
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
-
-    def _words(self, flight: Flight, block: int) -> tuple[int, ...]:
-        return self._setup.words(flight, ACCESS_BLOCK + block)
+    def _words(self, flight: Flight, broadcast: bool) -> Words:
+        """Return the draws of a packet's attempts, by block: a broadcast's are its sender's, whoever hears it."""
+        key = self._setup.sending_key if broadcast else self._setup.key
+        return lambda block: draw_words(key, flight.sequence, flight.copy | (ACCESS_BLOCK + block) << BLOCK_SHIFT)
 
 
 def wifi_modes(settings: Radio) -> tuple[str, ...]:
     """Return the modulations of a Wi-Fi radio, in order of rising rate."""
+    if settings.standard == "802.11n":
+        return errors.DOT11N_MODES
     return errors.DOT11P_MODES if settings.bandwidth_hz < 15e6 else errors.WIFI_MODES
 
 
@@ -260,7 +259,7 @@ class WiFi(OnAir):
         if threshold is None:
             threshold = error_threshold(self._settings, flight, flight.snr_cdb)
             flight.error_threshold = threshold
-        words = lambda block: self._words(flight, block)  # noqa: E731
+        words = self._words(flight, broadcast)
         return wifi_access(words, flight.contenders, threshold, airtime_ns, ack_ns, self._timing), airtime_ns
 
 
@@ -285,7 +284,7 @@ class LrWpan(OnAir):
         if threshold is None:
             threshold = error_threshold(self._settings, flight, flight.snr_cdb)
             flight.error_threshold = threshold
-        words = lambda block: self._words(flight, block)  # noqa: E731
+        words = self._words(flight, broadcast)
         return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
 
 

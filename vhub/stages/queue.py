@@ -13,12 +13,13 @@ from foosim.vhub.memory import RadioState, Sending
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.policy import EXPIRED
+from foosim.vhub.stages.stage import Stage
 
 QUEUE_FULL: Final = "queue_full"
 CODEL: Final = "queue_codel"
 
 
-class Queue:
+class Queue(Stage):
     """Decides whether a packet may wait, and how long."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -95,9 +96,6 @@ class Queue:
 
     def _law(self, time_ns: int) -> int:
         return time_ns + int(self._interval_ns / sqrt(sender_count(self._sender)))
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
 
 
 def sender_count(sender: RadioState) -> int:

@@ -15,6 +15,7 @@ from foosim.vhub.episodes import Episodes, episodes_of_burst, episodes_of_outage
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 RANDOM_LOSS: Final = "random_loss"
 BURST_LOSS: Final = "burst_loss"
@@ -22,7 +23,7 @@ CHAIN_BLOCK: Final = 1
 """The block of a packet's draws of which the first word moves a chain on."""
 
 
-class Residual:
+class Residual(Stage):
     """Independent losses, those of outages, and those of a state that a subclass knows."""
 
     def __init__(self, setup: LinkSetup, good_loss: float = 0.0, bad_loss: float = 0.0) -> None:
@@ -50,9 +51,6 @@ class Residual:
         if word >= self._any[bad]:
             return ""
         return BURST_LOSS if word < self._burst[bad] else RANDOM_LOSS
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
 
 
 class InTime(Residual):
