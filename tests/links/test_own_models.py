@@ -16,6 +16,7 @@ from foosim.protocol.errors import DeploymentError
 from foosim.protocol.messages import Sent
 from foosim.protocol.scene import Vector
 from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.report_settings import impairments_text, radio_text
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.whatif import what_if
 from foosim.supervisor.net_command import linted
@@ -213,6 +214,16 @@ def test_a_capture_without_its_package(tmp_path: Path, foggy: Path, monkeypatch:
     assert line == "link model fog is of foggy 1.2 in the capture, here it is not installed"
     with pytest.raises(ModelError, match="link model 'fog': not a link model that is installed here, there are none"):
         what_if(capture)
+
+
+def test_a_report_shows_the_model_with_its_parameters() -> None:
+    """Whatever these are called, and are."""
+    model = "model: {name: fog, parameters: {loss: many, late_ns: [1, {a: null}]}}"
+    (link,) = deployment_of(rule(f"{model}, loss: 1 %, capacity: 3")).network.links
+    told = 'link model fog {"loss":"many","late_ns":[1,{"a":null}]}'
+    assert told in impairments_text(link)
+    radio = deployment_of(f"network.radios={{r: {{preset: wifi_5_indoor, {model}}}}}").network.radios["r"]
+    assert told in radio_text(radio)
 
 
 # --- what fails -------------------------------------------------------------------------------------------------------
