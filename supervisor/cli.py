@@ -114,7 +114,8 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     else:
         plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
         check_models_here(plan)
-        path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
+        found = capture or default_capture(plan.deployment.world)
+        path = None if no_capture else check_capture(found, is_split=plan.deployment.capture.is_split)
     warnings = check_certificates(plan)
     display = Display(sys.stderr if json else sys.stdout)
     for warning in warnings:

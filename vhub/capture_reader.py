@@ -35,19 +35,16 @@ from foosim.protocol.start import first_chain
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
     ASSETS,
-    CUT,
-    CUT_CHAIN,
-    CUT_TICK,
     DEPLOYMENT,
-    END_METADATA,
-    METADATA,
     ORIGIN,
     ORIGIN_CHAIN,
     ORIGIN_DIGEST,
     ORIGIN_TICK,
     VERSIONS,
 )
-from foosim.vhub.mcap_file import MAGIC, McapFile, Message
+from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, Joined, end_of, files_from
+from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
+from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import (
     CLIENTS,
     EPOCHS,
@@ -144,24 +141,21 @@ class Scan:
 
     def messages(self, topics: frozenset[str] | None = None) -> Iterator[Message]:
         """Yield the messages of some topics (None: all), from the first on behind the checked metadata."""
-        try:
-            with self._path.open("rb") as stream:
-                file = McapFile(stream, self._path.stat().st_size, str(self._path), self._since_ns, topics)
-                self.about.chunk_starts = file.chunk_starts
-                checked = False
-                for content in file.contents():
-                    if isinstance(content, Message):
-                        if not checked:
-                            self._check(file.profile)
-                            checked = True
-                        yield content
-                    else:
-                        self._take(content)
-        except OSError as error:
-            raise CaptureError(f"{self._path}: cannot be read, {error.strerror}") from None
+        file = Joined(self._path, self._since_ns, topics)
+        self.about.chunk_starts = file.chunk_starts
+        checked = False
+        for content in file.contents():
+            if isinstance(content, Message):
+                if not checked:
+                    self._check(file.profile)
+                    checked = True
+                yield content
+            else:
+                self._take(content)
         self._check(file.profile)
         self.about.library = file.library
-        self.about.finished, self.about.unfinished_bytes = file.finished, file.unfinished_bytes
+        self.about.finished = file.finished and NEXT not in self.about.end
+        self.about.unfinished_bytes = file.unfinished_bytes
         self.about.start_ns, self.about.end_ns = min((file.end_ns, *file.chunk_starts)), file.end_ns
 
     def rows(self, topics: frozenset[str]) -> Iterator[tuple[str, Row]]:
@@ -319,12 +313,8 @@ def read_about(path: Path) -> About:
     scan = Scan(path)
     for _ in scan.messages():
         break
-    try:
-        with path.open("rb") as stream:
-            stream.seek(max(0, path.stat().st_size - len(MAGIC)))
-            scan.about.finished = stream.tell() > 0 and stream.read() == MAGIC
-    except OSError as error:
-        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+    end = end_of(files_from(path)[-1])
+    scan.about.finished = end is not None and NEXT not in end
     return scan.about
 
 
@@ -411,15 +401,21 @@ def origin_of(about: About) -> Origin | None:
         raise CaptureError(f"{about.path}: it does not say in full where its run began: {error}") from None
 
 
-def chain_at_start(about: About) -> bytes:
-    """Return the chain over all frames up to the first one that a capture has. Raises CaptureError."""
-    if CUT not in about.metadata:
-        return first_chain(origin_of(about))
+def beginning_of(about: About) -> Origin | None:
+    """Return where a capture begins, a cut or its run, None: at frame 0. Raises CaptureError."""
+    told = about.metadata
+    if CUT not in told:
+        return origin_of(about)
     try:
-        chain = bytes.fromhex(about.metadata[CUT_CHAIN])
+        digest, chain = bytes.fromhex(told[CUT_DIGEST]), bytes.fromhex(told[CUT_CHAIN])
+        return Origin(int(told[CUT_TICK]), told[CUT], digest, chain)
     except (KeyError, ValueError) as error:
         raise CaptureError(f"{about.path}: it does not say in full where it was cut: {error}") from None
-    return chain
+
+
+def chain_at_start(about: About) -> bytes:
+    """Return the chain over all frames up to the first one that a capture has. Raises CaptureError."""
+    return first_chain(beginning_of(about))
 
 
 def check_whole(about: About) -> None:
@@ -428,7 +424,7 @@ def check_whole(about: About) -> None:
         source, tick = about.metadata[CUT], about.metadata.get(CUT_TICK)
         raise CaptureError(
             f"{about.path}: a cut of {source} from tick {tick} on; a run is verified from where it began: "
-            f"verify {source}, or begin a run with a frame of the cut"
+            f"verify {source}, or this from its first frame on (--from-first-frame)"
         )
 
 

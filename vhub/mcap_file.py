@@ -326,21 +326,19 @@ class McapFile:
     ) -> None:
         """`topics`: messages of others are passed by; None: all are read.
 
+
         `since_ns`: chunks whose last message is before that are passed by, if the file declares its channels first.
         A hub's chunks are in the order of their last messages; what is wanted of them may still be before that time.
         """
-        self._stream = stream
-        self._size = size
-        self._name = name
-        self._since_ns = since_ns
-        self._wanted = topics
+        self._stream, self._size, self._name = stream, size, name
+        self._since_ns, self._wanted = since_ns, topics
+        self.repeats = False
+        """Whether the first chunk only says again what was said in another file: then it is passed by."""
         self._at = 0
         self._topics: dict[int, str | None] = {}
         """By channel; None where its messages are passed by."""
-        self.profile = ""
-        self.library = ""
-        self._ended = False
-        self.finished = False
+        self.profile = self.library = ""
+        self._ended = self.finished = False
         """Whether the file's end was reached, and was an end."""
         self.unfinished_bytes = 0
         """Bytes behind the last whole record of an unfinished file."""
@@ -410,6 +408,9 @@ class McapFile:
         """Take the times of a chunk, and return whether it is passed by."""
         if len(head) < CHUNK_FIELDS.size:  # the file became shorter while it was read
             return False
+        if self.repeats and self._topics:
+            self.repeats = False
+            return True
         start_ns, end_ns, *_ = CHUNK_FIELDS.unpack(head)
         self.chunk_starts.append(start_ns)
         self.end_ns = max(self.end_ns, end_ns)
