@@ -2,25 +2,29 @@
 
 Endpoints stand in a hall of concrete walls and send to one another, by turns a unicast and a broadcast to three; the
 frame is another one at each tick, so nothing about places is remembered longer than in a run. Judging at sending and at
-arrival, the row and its JSON are in the time. The last two lines send the same packets among 20 endpoints and among
-200, with 40,000 possible links: cost follows the traffic.
+arrival, the row and its JSON are in the time. `rovers` are the 20 of the warehouse, among its shelves, each on a circle
+of its own: no line of sight is that of the tick before. The last two lines send the same packets among 200 endpoints,
+with 40,000 possible links: cost follows the traffic.
 Neighbours: `foosim.vhub.fabric`, `hub` (the whole core with journal and capture).
 """
 
 from __future__ import annotations
 
+import json
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
+from math import cos, sin, tau
 from typing import Any, Final
 
 import msgspec
 import numpy as np
 import yaml
 
-from bench.runs import TABLE
+from bench.runs import ROOT, TABLE
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
 from foosim.protocol.start import initial_numbers
@@ -28,6 +32,7 @@ from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
 from foosim.vhub.rows import packet_row
 
+WAREHOUSE: Final = ROOT / "deploy" / "warehouse.yaml"
 TICK_NS: Final = 2_000_000
 PAYLOAD: Final = bytes(100)
 TALKERS: Final = 20
@@ -58,6 +63,11 @@ WIFI: Final = {
     "radios": {"wifi": {"preset": "wifi_5_indoor", "fading": {"kind": "nakagami"}}},
     "robots": {"e*": ["wifi"]},
 }
+CIRCLE_M: Final = 2.0
+TURN_TICKS: Final = 5_000
+"""A circle of a rover takes 10 s."""
+Frames = Callable[[int], Frame]
+"""Gives the frame of a tick."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +85,18 @@ class Verdicts:
 def verdict(seconds: float = 4.0) -> list[Verdicts]:
     """Measure each way for so many simulated seconds of 20 packets a tick."""
     ticks = max(10, round(seconds * 100))
-    ways = (("wire", WIRE, TALKERS), ("wifi", WIFI, TALKERS), ("wire", WIRE, 200), ("wifi", WIFI, 200))
-    return [_measure(way, network, count, ticks) for way, network, count in ways]
+    found = []
+    for way, network, count in (("wire", WIRE, 20), ("wifi", WIFI, 20), ("wire", WIRE, 200), ("wifi", WIFI, 200)):
+        deployment = standing(network, count)
+        found.append(measure(way, deployment, resting(deployment), [f"e{n}" for n in range(count)], ticks))
+    deployment = driving()
+    names = [name for name in deployment.robots if name.startswith("rover")]
+    found.insert(2, measure("rovers", deployment, circling(deployment), names, ticks))
+    return found
 
 
-def _deployment(network: dict[str, Any], count: int) -> Deployment:
+def standing(network: dict[str, Any], count: int) -> Deployment:
+    """Return the table's hall with so many clients, in rows between walls."""
     data = yaml.safe_load(TABLE.read_text())
     names = [f"e{n}" for n in range(count)]
     data["players"], data["clients"] = {}, {name: {} for name in names}
@@ -91,11 +108,40 @@ def _deployment(network: dict[str, Any], count: int) -> Deployment:
     return load_deployment(yaml.safe_dump(data), TABLE.name)
 
 
-def _measure(way: str, network: dict[str, Any], count: int, ticks: int) -> Verdicts:
-    deployment = _deployment(network, count)
+def driving() -> Deployment:
+    """Return the warehouse over the bench's network."""
+    network = json.dumps({**WIFI, "robots": {"rover*": ["wifi"]}})
+    return load_deployment(apply_sets(WAREHOUSE.read_text(), WAREHOUSE.name, [f"network={network}"]), WAREHOUSE.name)
+
+
+def resting(deployment: Deployment) -> Frames:
+    """Return frames in which nothing moves."""
     layout = build_layout(deployment)
     numbers = np.array(initial_numbers(deployment, layout))
+    return lambda tick: Frame(tick, layout, numbers)
+
+
+def circling(deployment: Deployment) -> Frames:
+    """Return frames in which each rover drives on a circle."""
+    layout = build_layout(deployment)
+    numbers = np.array(initial_numbers(deployment, layout))
+    places = [entity.offsets["position"] for entity in layout.rovers]
+
+    def frame(tick: int) -> Frame:
+        moved = numbers.copy()
+        for n, at in enumerate(places):
+            angle = tau * (tick / TURN_TICKS + n / len(places))
+            moved[at] += CIRCLE_M * cos(angle)
+            moved[at + 1] += CIRCLE_M * sin(angle)
+        return Frame(tick, layout, moved)
+
+    return frame
+
+
+def measure(way: str, deployment: Deployment, frames: Frames, names: list[str], ticks: int) -> Verdicts:
+    """Measure so many ticks of what the first of the endpoints `names` send."""
     fabric = Fabric(deployment)
+    past = [frames(tick) for tick in range(WARM_TICKS + ticks)]
     fates: Counter[str] = Counter()
     judged = size = 0
     begun_s = 0.0
@@ -104,8 +150,8 @@ def _measure(way: str, network: dict[str, Any], count: int, ticks: int) -> Verdi
             fates.clear()
             judged = size = 0
             begun_s = time.process_time()
-        fabric.turn_to(Frame(WARM_TICKS + tick, layout, numbers))
-        for flight in _offered(WARM_TICKS + tick):
+        fabric.turn_to(past[WARM_TICKS + tick])
+        for flight in _offered(WARM_TICKS + tick, names):
             link = fabric.link(flight.source, flight.destination, flight.channel)
             if link.send(flight):
                 flight.arrival_tick = tick + 1
@@ -114,26 +160,26 @@ def _measure(way: str, network: dict[str, Any], count: int, ticks: int) -> Verdi
             fates[flight.cause or "delivered"] += 1
             judged += 1
     spent_s = time.process_time() - begun_s
-    return Verdicts(way, count, judged, round(spent_s / judged * 1e6, 1), round(size / judged, 1), dict(fates))
+    return Verdicts(way, len(names), judged, round(spent_s / judged * 1e6, 1), round(size / judged, 1), dict(fates))
 
 
-def _offered(tick: int) -> list[Flight]:
+def _offered(tick: int, names: list[str]) -> list[Flight]:
     """Return what is sent at a tick: by half of the talkers to the next one, by a few to three."""
     sent_ns = tick * TICK_NS
     flights = []
     for n in range(tick % 2, TALKERS, 2):
-        source = f"e{n}"
+        source = names[n]
         if n % 5:
             to, published = [(n + 1 + tick % 7) % TALKERS], False
         else:
             to, published = [(n + 1 + k) % TALKERS for k in range(RECEIVERS)], True
-        flights += [Flight(source, f"e{one}", "talk", tick, sent_ns, 0, PAYLOAD, published) for one in to if one != n]
+        flights += [Flight(source, names[one], "talk", tick, sent_ns, 0, PAYLOAD, published) for one in to if one != n]
     return flights
 
 
 def lines(rows: list[Verdicts]) -> list[str]:
     """Return the figures for people."""
-    asked = {"wire": "at most 12", "wifi": "at most 20"}
+    asked = {"wire": "at most 12", "wifi": "at most 20", "rovers": "at most 20"}
     return [
         f"{row.way:6}{row.endpoints:5} endpoints {row.us_per_packet:7.1f} us a packet with its row ({asked[row.way]}), "
         f"{row.row_bytes:.0f} bytes of JSON beside it; "

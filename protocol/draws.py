@@ -8,6 +8,7 @@ are named and permanent (`Slot`): switching one impairment on shifts no other.
 
 import struct
 from enum import IntEnum
+from functools import lru_cache
 from hashlib import blake2b
 from statistics import NormalDist
 from typing import Final
@@ -42,9 +43,17 @@ def draw_key(seed: int, *purpose: str) -> bytes:
     return hasher.digest()
 
 
+@lru_cache(maxsize=65_536)
+def _keyed(key: bytes) -> blake2b:
+    """A hash that has taken in the key: a copy of it costs half of what a new one does."""
+    return blake2b(key=key)
+
+
 def draw_words(key: bytes, counter: int, copy: int = 0) -> tuple[int, ...]:
     """Return the eight 64-bit words of `counter` (and `copy`) under `key`."""
-    return _WORDS.unpack(blake2b(_COUNTERS.pack(counter, copy), key=key).digest())
+    hasher = _keyed(key).copy()
+    hasher.update(_COUNTERS.pack(counter, copy))
+    return _WORDS.unpack(hasher.digest())
 
 
 def unit_interval(word: int) -> float:

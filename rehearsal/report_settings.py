@@ -6,7 +6,6 @@ Neighbours: `report` compares this with what was measured; the vHub's stages dec
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any, Final
 
 from foosim.protocol.impairments import Burst, Impairments, Markov4, TableJitter
@@ -15,7 +14,7 @@ from foosim.protocol.radios import Radio
 from foosim.protocol.table import Part
 from foosim.protocol.traces import read_table
 from foosim.protocol.units import format_ns
-from foosim.vhub.jitter import CELLS, quantiles_ns
+from foosim.vhub.jitter import moments_ns, quantiles_ns
 
 _UNITS: Final = (
     ("_bps", "bit/s"),
@@ -168,11 +167,7 @@ def mean_own_delay_ns(settings: Impairments, files: Mapping[str, bytes]) -> floa
     if jitter is None:
         return mean
     table = read_table(files[jitter.file].decode("ascii", "replace")) if isinstance(jitter, TableJitter) else ()
-    quantiles = quantiles_ns(jitter, table)
-    cells = [(low + high) / 2.0 for low, high in pairwise(quantiles[:CELLS])]
-    tail = [quantiles[CELLS - 1], *(quantiles[CELLS + 1 :] or quantiles[CELLS:])]
-    last = [(low + high) / 2.0 for low, high in pairwise(tail)]
-    return mean + (sum(cells) + sum(last) / len(last)) / CELLS
+    return mean + moments_ns(quantiles_ns(jitter, table))[0]
 
 
 def _bad_share(burst: Burst) -> float:

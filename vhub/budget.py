@@ -8,7 +8,7 @@ from __future__ import annotations
 from foosim.protocol.draws import draw_key
 from foosim.protocol.radios import Fading
 from foosim.vhub.packet import Flight
-from foosim.vhub.propagation import OUT_OF_RANGE, Path, Propagation
+from foosim.vhub.propagation import NOWHERE, OUT_OF_RANGE, Path, Propagation
 from foosim.vhub.radio.fading import block_of, fading_db, nakagami_m
 from foosim.vhub.radio.noise import centi, ratio_cdb
 
@@ -18,39 +18,54 @@ class Budget:
 
     def __init__(self, propagation: Propagation, source: str, destination: str, seed: int, air: str) -> None:
         self.propagation = propagation
+        self._world = propagation.world
         self._source, self._destination = source, destination
         settings = propagation.settings
         self._fading: Fading | None = settings.fading
-        first, second = sorted((propagation.world.body(source), propagation.world.body(destination)))
+        first, second = sorted((self._world.body(source), self._world.body(destination)))
         self._key = draw_key(seed, "fading", air, first, second)
         self._sensitivity_cdbm = centi(settings.sensitivity_dbm)
         self._speed_mm_ns = settings.speed_m_s * 1e-6
+        self._turns = -1
+        self._path = NOWHERE
+        self._block, self._parameter, self._fading_cdb = -1, 0.0, 0
 
     def path(self) -> Path:
         """Return the way between the ends as they are in the newest frame."""
-        of = self.propagation
-        return of.path(of.antenna(self._source), of.antenna(self._destination), self._source, self._destination)
+        if self._turns != self._world.turns:
+            of, source, destination = self.propagation, self._source, self._destination
+            self._path = of.path(of.antenna(source), of.antenna(destination), source, destination)
+            self._turns = self._world.turns
+        return self._path
 
     def measure(self, flight: Flight) -> str:
         """Write what the receiver gets; return why it gets nothing, or an empty string."""
-        of, path = self.propagation, self.path()
-        flight.distance_mm, flight.walls, flight.walls_cdb = path.distance_mm, path.walls, path.walls_cdb
-        flight.propagation_ns = int(path.distance_mm / self._speed_mm_ns)
-        if path.cause:
-            return path.cause
-        fading_cdb = 0 if self._fading is None else self._fade(self._fading, flight.sent_ns, path.distance_mm)
-        flight.shadowing_cdb, flight.fading_cdb = path.shadowing_cdb, fading_cdb
-        flight.path_loss_cdb = path.loss_cdb - fading_cdb
-        flight.received_cdbm = of.power_cdbm + of.gain_cdb - flight.path_loss_cdb
-        flight.snr_cdb = flight.received_cdbm - of.noise_cdbm
-        return OUT_OF_RANGE if flight.received_cdbm < self._sensitivity_cdbm else ""
+        distance_mm, walls, walls_cdb, loss_cdb, shadowing_cdb, cause = self.path()
+        flight.distance_mm, flight.walls, flight.walls_cdb = distance_mm, walls, walls_cdb
+        flight.propagation_ns = int(distance_mm / self._speed_mm_ns)
+        if cause:
+            return cause
+        of = self.propagation
+        flight.shadowing_cdb = shadowing_cdb
+        if self._fading is not None:
+            flight.fading_cdb = self._fade(self._fading, flight.sent_ns, distance_mm)
+            loss_cdb -= flight.fading_cdb
+        flight.path_loss_cdb = loss_cdb
+        flight.received_cdbm = received_cdbm = of.power_cdbm + of.gain_cdb - loss_cdb
+        flight.snr_cdb = received_cdbm - of.noise_cdbm
+        return OUT_OF_RANGE if received_cdbm < self._sensitivity_cdbm else ""
 
     def ratio_cdb(self, flight: Flight) -> int:
         """Return the ratio of a packet's signal to noise and to all that others send meanwhile."""
         return ratio_cdb(flight.received_cdbm, self.propagation.noise_cdbm, flight.interference)
 
     def _fade(self, fading: Fading, time_ns: int, distance_mm: int) -> int:
+        """Return what fading gives, the same throughout a block of time."""
         parameter = fading.k_db
         if fading.kind == "nakagami":
             parameter = nakagami_m(distance_mm / 1000.0) if fading.m is None else fading.m
-        return centi(fading_db(self._key, block_of(time_ns, fading.coherence_ns), fading.kind, parameter))
+        block = block_of(time_ns, fading.coherence_ns)
+        if block != self._block or parameter != self._parameter:
+            self._block, self._parameter = block, parameter
+            self._fading_cdb = centi(fading_db(self._key, block, fading.kind, parameter))
+        return self._fading_cdb

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from foosim.protocol.frame import CHAIN_START, chain_next
+from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of
 from foosim.vhub.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK
 
@@ -25,6 +26,8 @@ class CaptureInfo:
     """
 
     path: str
+    parts: tuple[str, ...]
+    """The files that it was read from, in their order."""
     bytes: int
     finished: bool
     unfinished_bytes: int
@@ -45,6 +48,8 @@ class CaptureInfo:
     causes: Mapping[str, int]
     channels: Mapping[str, int]
     """Packets by channel."""
+    payloads: str
+    """`exact`, or `hashed`: then what needs them cannot be done."""
     payload_bytes: int
     recoveries: int
     files: Mapping[str, int]
@@ -84,11 +89,13 @@ def capture_info(path: Path | str) -> CaptureInfo:
             epoch = scan.decode(DECODERS[EPOCHS], message)
             nodes.update(epoch.roster)
             arithmetic.add(epoch.arithmetic)
-    about, first = scan.about, max(0, first)
-    tick_ns = deployment_of(about).tick_ns
+    about, first, files = scan.about, max(0, first), files_from(path)
+    deployment = deployment_of(about)
+    tick_ns = deployment.tick_ns
     return CaptureInfo(
         str(path),
-        path.stat().st_size,
+        tuple(file.name for file in files),
+        sum(file.stat().st_size for file in files),
         about.finished,
         about.unfinished_bytes,
         about.library,
@@ -107,6 +114,7 @@ def capture_info(path: Path | str) -> CaptureInfo:
         {"offered": fates.total(), **{fate: fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
         dict(sorted(causes.items())),
         dict(sorted(channels.items())),
+        deployment.capture.payloads,
         payload_bytes,
         topics[RECOVERIES],
         {name: len(content) for name, content in sorted(about.files.items())},

@@ -252,7 +252,7 @@ class HubCore:
             state.leave(name)
         for joining in joins:
             state.join(joining, tick)
-        closing = closing_of(frame, commit, state, joins, leaves, now_ns)
+        closing = closing_of(frame, commit, self.commits.chain_at(tick), state, joins, leaves, now_ns)
         released = state.close_world(frame, packets, closing.fates, commit.edits)
         due = state.due_members(tick)
         for name in due:
@@ -289,6 +289,8 @@ class HubCore:
         self._release(now_ns)
         self.speak(now_ns)
         world.closing.fates += state.close_rest()
+        if state.fabric.faults:
+            self.lose("the network", state.fabric.faults[0])
         for flight in world.closing.fates:
             if not flight.cause and flight.destination not in state.members:
                 flight.released_wall_ns = now_ns

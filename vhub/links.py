@@ -7,7 +7,7 @@ that is walked), `fabric` (all links of a run, and what they share), `profiles` 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
@@ -17,9 +17,11 @@ from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.profiles import Profile, over
 from foosim.vhub.setup import LinkSetup
-from foosim.vhub.stages import STAGES, Stage
+from foosim.vhub.stages import STAGES
+from foosim.vhub.stages.capacity import leave
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.queue import Queue
+from foosim.vhub.stages.stage import Stage, arrival_hooks, sending_hooks
 
 if TYPE_CHECKING:
     from foosim.vhub.fabric import Fabric
@@ -38,7 +40,9 @@ class Link:
         self._version = -1
         self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
-        self._draws = self._is_apart = False
+        self._at_sending: list[Callable[[Flight], str]] = []
+        self._at_arrival: list[Callable[[Flight, str], str]] = []
+        self._is_apart = False
         self._slots = self._phase_ns = 0
 
     @property
@@ -73,8 +77,8 @@ class Link:
         self._version = self._fabric.timeline.version
         setup = self._setup(settings)
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
+        self._at_sending, self._at_arrival = sending_hooks(self._stages), arrival_hooks(self._stages)
         self._slots = slots_of(settings, is_radio=setup.is_radio)
-        self._draws = self._slots != 0
         self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
         self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue) for stage in self._stages))
 
@@ -99,11 +103,11 @@ class Link:
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
         flight.due_ns = flight.sent_ns
         flight.phase_ns = self._phase_ns
-        if self._draws:
+        if self._slots:
             flight.slots = self._slots
             flight.words = draw_words(self._key, flight.sequence, flight.copy)
-        for stage in self._stages:
-            cause = stage.at_sending(flight)
+        for judge in self._at_sending:
+            cause = judge(flight)
             if cause:
                 self._drop(flight, cause)
                 return False
@@ -123,14 +127,17 @@ class Link:
         """
         self._settle(flight.sent_ns)
         state, is_offered = self.state, flight.copy == 0
-        for stage in self._stages:
-            cause = stage.at_arrival(flight, hindered)
+        for judge in self._at_arrival:
+            cause = judge(flight, hindered)
             if cause:
                 self._drop(flight, cause)
-                return False
-        state.delivered += is_offered
-        state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
-        return True
+                break
+        else:
+            state.delivered += is_offered
+            state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
+        if state.under_way:
+            leave(state, flight)
+        return not flight.cause
 
 
 def slots_of(settings: Radio, *, is_radio: bool) -> int:

@@ -29,7 +29,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Level
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, DeploymentError
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
@@ -46,6 +46,7 @@ from foosim.vhub.capture_file import check_new, origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 from foosim.vhub.records import Closing, first_head
@@ -205,6 +206,12 @@ class HubProcess:
         self._wire.declare_alive()
         core, deployment = self.core, self.core.deployment
         assert deployment is not None
+        try:
+            check_link_models(deployment.network, build.deployment, build.deployment_name)
+        except DeploymentError as error:
+            core.failure = "cannot judge packets without its link models"
+            core.lose("the network", error.problems[0])
+            return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
         self._journal = self._loop.journal = Journal(folder, VHUB)
         records = list(read_journal(folder, VHUB))
@@ -228,7 +235,7 @@ class HubProcess:
         path = path or Path("captures") / f"{deployment.world}-{wall.now_stamp()}.mcap"
         self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         if before is None:  # who is killed before the capture is there finds here that what is found is its own
-            check_new(path)
+            check_new(path, is_split=deployment.capture.is_split)
             assert self._journal is not None
             self._journal.append(first_head(build, deployment, self.core.capture_file))
         metadata = {

@@ -95,6 +95,8 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Of LoRa: the interference by spreading factor, from 7 on."""
     held_ns: int = 0
     """For how long clogs put off its due time."""
+    model_ns: int = 0
+    """What a link model of one's own adds to its delay."""
     outcome: str = ""
     """What the medium found out and the channel says, at sending; empty when it came through."""
 

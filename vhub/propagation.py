@@ -6,18 +6,27 @@ decides nothing. Neighbours: `radio` (the formulas), `world` (places and walls),
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import sqrt
-from typing import Final
+from typing import Final, NamedTuple
 
+from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.radio_materials import RadioMaterial
 from foosim.protocol.radios import Radio
 from foosim.protocol.scene import Vector
 from foosim.vhub.geometry import Crossing
 from foosim.vhub.radio.materials import slab_loss_db
 from foosim.vhub.radio.noise import centi, noise_dbm
-from foosim.vhub.radio.path_loss import ENVIRONMENTS, Environment, Itu1238, LogDistance, path_loss_db
-from foosim.vhub.radio.shadowing import shadowing_db
+from foosim.vhub.radio.path_loss import (
+    ENVIRONMENTS,
+    Environment,
+    Itu1238,
+    LogDistance,
+    path_loss_db,
+    range_m,
+    vehicle_blockage_db,
+)
+from foosim.vhub.radio.shadowing import shadowing_db, shadowing_max_db
 from foosim.vhub.world import World
 
 BLOCKED: Final = "blocked"
@@ -25,7 +34,7 @@ OUT_OF_RANGE: Final = "out_of_range"
 NEVER_CDB: Final = 10**6
 """A loss that nothing gets over."""
 PLACES_KEPT: Final = 4096
-"""Pairs of places of which the bounds of the loss are remembered, at least."""
+"""Places, and pairs of places, of which the bounds of the loss are remembered, at least."""
 
 
 def _distance_m(a: Vector, b: Vector) -> float:
@@ -33,8 +42,7 @@ def _distance_m(a: Vector, b: Vector) -> float:
     return sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@dataclass(frozen=True, slots=True)
-class Path:
+class Path(NamedTuple):
     """A signal's way between two places, levels in 0.01 dB. `cause` says that nothing gets through, and why."""
 
     distance_mm: int
@@ -44,6 +52,20 @@ class Path:
     """With walls and shadowing."""
     shadowing_cdb: int
     cause: str
+
+
+NOWHERE: Final = Path(0, (), 0, 0, 0, OUT_OF_RANGE)
+"""Before anything is known of the ends."""
+
+
+class _Way(NamedTuple):
+    """What the last path between two bodies came from: the number of the frame, both places, what was between them."""
+
+    turns: int
+    a: Vector
+    b: Vector
+    crossings: tuple[Crossing, ...]
+    path: Path
 
 
 def crossing_db(crossing: Crossing, frequency_hz: float) -> float:
@@ -81,6 +103,8 @@ class Propagation:
         distances = environment.d_corr_los, environment.d_corr_nlos
         self._correlations = distances if shadowing.correlation_m is None else (shadowing.correlation_m,) * 2
         self._range_m, self._strict = path_loss.range_m, path_loss.strict_los
+        self._is_limited = environment.has_nlos_curve and not self._strict and self._range_m is None
+        """Whether there is a loss that no walls exceed."""
         x, y, z = settings.antenna.mount
         self._mount = x, y, z
         self.noise_cdbm = centi(noise_dbm(settings.bandwidth_hz, settings.noise_figure_db))
@@ -88,37 +112,64 @@ class Propagation:
         self.gain_cdb = centi(settings.antenna.gain_dbi)
         self.sense_cdbm = centi(settings.sense_dbm)
         self._turns = -1
-        self._paths: dict[tuple[Vector, Vector, str, str], Path] = {}
-        self._heard: dict[tuple[Vector, Vector], tuple[int, int]] = {}
+        self._antennas: dict[str, Vector] = {}
+        self._ways: dict[tuple[str, str], _Way] = {}
+        self._bounds: dict[tuple[Vector, Vector], tuple[int, int]] = {}
+        self._shares: dict[Vector, float] = {}
+        """Of places: what shadowing may add to a loss for their part, in 0.01 dB."""
+        self._reaches: dict[int, float] = {}
+        """The square of the distance (m2) within which walls and distance take no more than so many dB."""
 
     def antenna(self, endpoint: str) -> Vector:
         """Return where an endpoint's antenna is."""
-        return self.world.antenna(endpoint, self._mount)
-
-    def path(self, a: Vector, b: Vector, source: str, destination: str) -> Path:
-        """Return the way between two places at which the antennas of two endpoints are, or were."""
         if self._turns != self.world.turns:
             self._turns = self.world.turns
-            self._paths.clear()
-            if len(self._heard) > PLACES_KEPT:
-                self._heard.clear()
-        one, other = self.world.body(source), self.world.body(destination)
-        key = (a, b, one, other) if a <= b else (b, a, other, one)
-        found = self._paths.get(key)
+            self._antennas.clear()
+            for remembered in (self._bounds, self._shares):
+                if len(remembered) > PLACES_KEPT:
+                    remembered.clear()
+        found = self._antennas.get(endpoint)
         if found is None:
-            found = self._paths[key] = self._find(key[0], key[1], frozenset((one, other)))
+            found = self._antennas[endpoint] = self.world.antenna(endpoint, self._mount)
         return found
+
+    def path(self, a: Vector, b: Vector, source: str, destination: str) -> Path:
+        """Return the way between two places at which the antennas of two endpoints are, or were.
+
+        It is worked out anew where an end or what is between has moved.
+        """
+        one, other = self.world.body(source), self.world.body(destination)
+        if a > b:
+            a, b, one, other = b, a, other, one
+        key = one, other
+        known = self._ways.get(key)
+        if known is not None and known.a == a and known.b == b:
+            if known.turns == self.world.turns:
+                return known.path
+        else:
+            known = None
+        distance_m = _distance_m(a, b)
+        is_within = self._range_m is None or distance_m <= self._range_m
+        crossings = self.world.crossings(a, b, frozenset(key)) if is_within else ()
+        if known is None or crossings != known.crossings:
+            path = self._find(a, b, distance_m, crossings, frozenset(key)) if is_within else _out_of_range(distance_m)
+        else:
+            path = known.path
+        self._ways[key] = _Way(self.world.turns, a, b, crossings, path)
+        return path
 
     def hears(self, a: Vector, b: Vector, source: str, destination: str, power_cdbm: int) -> bool:
         """Whether who is at `b` senses what is sent with a power at `a`.
 
         That is what the path says; where walls cannot change it, it is known without looking for them.
         """
-        key = a, b
-        found = self._heard.get(key)
-        if found is None:
-            found = self._heard[key] = self._least_and_most(*sorted((a, b)))
         sensed_cdb = power_cdbm + self.gain_cdb - self.sense_cdbm
+        if self._is_limited and self._is_near(a, b, sensed_cdb):
+            return True
+        key = a, b
+        found = self._bounds.get(key)
+        if found is None:
+            found = self._bounds[key] = self._least_and_most(*sorted((a, b)))
         least_cdb, most_cdb = found
         if sensed_cdb < least_cdb:
             return False
@@ -127,33 +178,62 @@ class Propagation:
         path = self.path(a, b, source, destination)
         return not path.cause and path.loss_cdb <= sensed_cdb
 
+    def taken_db(self, crossing: Crossing, a: Vector, b: Vector, ends: frozenset[str]) -> float:
+        """Return what a thing takes from a signal between two places, the antennas of two bodies.
+
+        Among vehicles one in the way blocks as vehicles do: by one draw for the three, whenever they meet like that.
+        """
+        if self._environment.has_vehicles:
+            height_m = self.world.vehicle_height_m(crossing.name)
+            if height_m is not None:
+                seed = int.from_bytes(self._key[:8], "little")
+                word = draw_words(draw_key(seed, "vehicle", *sorted(ends), crossing.name), 0)[0]
+                return vehicle_blockage_db(_distance_m(a, b), a[2], b[2], height_m, word)
+        return crossing_db(crossing, self.settings.frequency_hz)
+
+    def _is_near(self, a: Vector, b: Vector, loss_cdb: int) -> bool:
+        """Whether it is sure, by a bound that costs little, that no more is lost between two places than that."""
+        share, other = self._shares.get(a), self._shares.get(b)
+        if share is None:
+            share = self._shares[a] = self._share_cdb(a)
+        if other is None:
+            other = self._shares[b] = self._share_cdb(b)
+        left_db = int((loss_cdb - share - other) // 100.0)
+        square = self._reaches.get(left_db)
+        if square is None:
+            reach_m = range_m(self._environment, left_db, self.settings.frequency_hz, 0.0, 0.0, nlos=True)
+            square = self._reaches[left_db] = reach_m * reach_m
+        dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+        return dx * dx + dy * dy + dz * dz < square
+
+    def _share_cdb(self, place: Vector) -> float:
+        """Return what shadowing adds at most to a loss for one end's part, and 0.01 dB for all that is rounded."""
+        curves = zip(self._sigmas, self._correlations, strict=True)
+        return 1.0 + 100.0 * max(shadowing_max_db(self._key, place, sigma, d_corr) for sigma, d_corr in curves)
+
     def _least_and_most(self, a: Vector, b: Vector) -> tuple[int, int]:
         """Return the least and the greatest loss between two places, whatever stands between them."""
         distance_m = _distance_m(a, b)
         if self._range_m is not None and distance_m > self._range_m:
             return NEVER_CDB, NEVER_CDB
         environment, heights, frequency_hz = self._environment, (a[2], b[2]), self.settings.frequency_hz
-        los_db = environment.los_db(distance_m, frequency_hz, heights)
+        los_db, nlos_db = environment.both_db(distance_m, frequency_hz, heights)
         shadow_db = shadowing_db(self._key, a, b, self._sigmas[0], self._correlations[0])
         least_cdb = centi(los_db + shadow_db)
         if self._strict or not environment.has_nlos_curve:
             return least_cdb, NEVER_CDB
-        nlos_db = environment.nlos_db(distance_m, frequency_hz, heights)
         behind_cdb = centi(nlos_db + shadowing_db(self._key, a, b, self._sigmas[1], self._correlations[1]))
         least_cdb = min(least_cdb, behind_cdb)
         return least_cdb, max(centi(nlos_db + shadow_db), behind_cdb)
 
-    def _find(self, a: Vector, b: Vector, ignoring: frozenset[str]) -> Path:
-        distance_m = _distance_m(a, b)
-        distance_mm = round(distance_m * 1000.0)
-        if self._range_m is not None and distance_m > self._range_m:
-            return Path(distance_mm, (), 0, 0, 0, OUT_OF_RANGE)
-        frequency_hz = self.settings.frequency_hz
-        crossings = self.world.crossings(a, b, ignoring)
-        walls = tuple(crossing.name for crossing in crossings)
+    def _find(
+        self, a: Vector, b: Vector, distance_m: float, crossings: tuple[Crossing, ...], ends: frozenset[str]
+    ) -> Path:
+        distance_mm, frequency_hz = round(distance_m * 1000.0), self.settings.frequency_hz
+        walls = tuple([crossing.name for crossing in crossings])
         walls_db = 0.0
         for crossing in crossings:
-            walls_db += crossing_db(crossing, frequency_hz)
+            walls_db += self.taken_db(crossing, a, b, ends)
         if crossings and self._strict:
             return Path(distance_mm, walls, centi(walls_db), 0, 0, BLOCKED)
         heights = a[2], b[2]
@@ -162,3 +242,7 @@ class Propagation:
         )
         shadow_db = shadowing_db(self._key, a, b, self._sigmas[is_nlos], self._correlations[is_nlos])
         return Path(distance_mm, walls, centi(walls_db), centi(loss_db + shadow_db), centi(shadow_db), "")
+
+
+def _out_of_range(distance_m: float) -> Path:
+    return Path(round(distance_m * 1000.0), (), 0, 0, 0, OUT_OF_RANGE)

@@ -12,9 +12,9 @@ into the world.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import inf, sqrt
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,11 +95,39 @@ def cylinder_span(start: Vector, way: Vector, radius: float, half_length: float)
     return (enter, leave) if enter < leave else None
 
 
-def boxes_around(lows: Sequence[Vector] | Floats, highs: Sequence[Vector] | Floats) -> Floats:
+Pillar = tuple[float, float, float, float, float]
+"""An upright cylinder around a thing: its x and y, the square of its radius, its least and greatest z (m)."""
+T = TypeVar("T")
+
+
+def pillar_around(x: float, y: float, radius: float, low_z: float, high_z: float) -> Pillar:
+    """Return a pillar with a margin."""
+    radius += MARGIN_M
+    return x, y, radius * radius, low_z - MARGIN_M, high_z + MARGIN_M
+
+
+def pillars_met_by(pillars: Iterable[tuple[Pillar, T]], line: tuple[Vector, Vector]) -> list[T]:
+    """Return the things whose pillars a line may pass, seen from above as if it had no ends: it says where to look."""
+    (ax, ay, az), (bx, by, bz) = line
+    way_x, way_y = bx - ax, by - ay
+    square = way_x * way_x + way_y * way_y
+    low_z, high_z = (az, bz) if az <= bz else (bz, az)
+    return [
+        thing
+        for (x, y, reach, low, high), thing in pillars
+        if high >= low_z
+        and low <= high_z
+        and (aside := (x - ax) * way_y - (y - ay) * way_x) * aside <= reach * square
+    ]
+
+
+def boxes_around(
+    lows: Sequence[Vector] | Floats, highs: Sequence[Vector] | Floats, margin_m: float = MARGIN_M
+) -> Floats:
     """Return boxes (m of them) for `boxes_met_by`, shape (2, 3, m), with a margin."""
     boxes = np.array([lows, highs], dtype=np.float64).reshape(2, -1, 3)
-    boxes[0] -= MARGIN_M
-    boxes[1] += MARGIN_M
+    boxes[0] -= margin_m
+    boxes[1] += margin_m
     return np.ascontiguousarray(boxes.transpose(0, 2, 1))
 
 

@@ -10,6 +10,7 @@ Neighbours: `capture_writer`, `capture_reader`, `viewing` (what is looked at).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
@@ -37,7 +38,8 @@ CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
 DigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 EntityDigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{16}$")]
 ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
-WordHex = Annotated[str, Meta(pattern="^([0-9a-f]{16})?$")]
+WordHex = Annotated[str, Meta(extra_json_schema={"type": "string", "pattern": "^([0-9a-f]{16})?$"})]
+"""Checked by `word_of` and not with its row: that would take a reader as long as the row's decoding."""
 Fate = Literal["delivered", "dropped", "in_flight"]
 
 
@@ -62,7 +64,7 @@ class EditRow(Row, frozen=True):
     """What happens to the network, as JSON."""
 
 
-class DeliveredRow(Row, frozen=True):
+class DeliveredRow(Row, frozen=True, omit_defaults=True):
     """A packet that reached a robot."""
 
     due_ns: Counter
@@ -72,6 +74,7 @@ class DeliveredRow(Row, frozen=True):
     destination: str
     channel: str
     payload: bytes
+    payload_hash: bytes = b""
 
 
 class TickRow(Row, frozen=True):
@@ -113,11 +116,12 @@ class LayoutRow(Row, frozen=True):
     added: list[AddedRow]
 
 
-class OutboxRow(Row, frozen=True):
+class OutboxRow(Row, frozen=True, omit_defaults=True):
     """The outbox of the entity at `index` of the layout."""
 
     index: Counter
     packets: bytes
+    packets_hash: bytes = b""
 
 
 class FrameRow(Row, frozen=True):
@@ -134,7 +138,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     Levels are hundredths of a dB or dBm. What no stage looked at has its default and is left out of the file.
     `due_ns` and `arrival_tick` are -1 when it was dropped at sending. The words are the 64-bit draws that were used,
     in hex. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when the packet left
-    for its receiver, 0 when it did not.
+    for its receiver, 0 when it did not. Where payloads are hashed `payload` is empty and `payload_hash` is there.
     """
 
     source: str
@@ -163,6 +167,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     propagation_ns: Counter = 0
     jitter_ns: Counter = 0
     held_ns: Counter = 0
+    model_ns: Counter = 0
     phase_ns: Counter = 0
     is_bad: bool = False
     bits_flipped: Counter = 0
@@ -180,6 +185,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     error_word: WordHex = ""
     contenders: Counter = 0
     retries: Counter = 0
+    payload_hash: bytes = b""
 
 
 class SubscriptionRow(Row, frozen=True):
@@ -326,13 +332,16 @@ def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
 
 
 _FATES: Final[Mapping[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
+_LOSS: Final = int(Slot.LOSS)
+_JITTER: Final = int(Slot.JITTER)
+_ERROR: Final = int(Slot.ERROR)
 
 
 def packet_row(flight: Flight) -> PacketRow:
     """Return the row of a packet whose fate is final, or that is in flight at the end."""
     fate = _FATES.get(flight.cause, DROPPED)
     on_its_way = flight.arrival_tick >= 0
-    slots, words = flight.slots, flight.words
+    slots, words, payload = flight.slots, flight.words, flight.payload
     return PacketRow(
         flight.source,
         flight.sequence,
@@ -346,10 +355,10 @@ def packet_row(flight: Flight) -> PacketRow:
         fate,
         flight.cause if fate is DROPPED else "",
         flight.rule,
-        f"{words[Slot.LOSS]:016x}" if slots & _LOSS else "",
-        f"{words[Slot.JITTER]:016x}" if slots & _JITTER and on_its_way else "",
-        len(flight.payload),
-        flight.payload,
+        f"{words[_LOSS]:016x}" if slots >> _LOSS & 1 else "",
+        f"{words[_JITTER]:016x}" if slots >> _JITTER & 1 and on_its_way else "",
+        len(payload),
+        payload,
         flight.released_wall_ns,
         flight.radio,
         flight.published,
@@ -360,6 +369,7 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.propagation_ns,
         flight.jitter_ns,
         flight.held_ns,
+        flight.model_ns,
         flight.phase_ns,
         flight.is_bad,
         flight.bits_flipped,
@@ -368,25 +378,23 @@ def packet_row(flight: Flight) -> PacketRow:
     )
 
 
-_LOSS: Final = 1 << Slot.LOSS
-_JITTER: Final = 1 << Slot.JITTER
 
 
 def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
     """Return what the stages of a radio found, in the order of a row."""
-    threshold = flight.error_threshold
+    threshold, walls = flight.error_threshold, flight.walls
     return (
         flight.distance_mm,
-        list(flight.walls),
+        list(walls) if walls else [],
         flight.walls_cdb,
         flight.path_loss_cdb,
         flight.shadowing_cdb,
         flight.fading_cdb,
         flight.received_cdbm,
         flight.snr_cdb,
-        level_cdbm(flight.interference),
+        level_cdbm(flight.interference) if flight.interference else 0,
         threshold * 1_000_000 >> 64,
-        f"{flight.words[Slot.ERROR]:016x}" if threshold else "",
+        f"{flight.words[_ERROR]:016x}" if threshold else "",
         flight.contenders,
         flight.retries,
     )
@@ -475,8 +483,22 @@ def edit_of(row: EditRow) -> Edit:
 
 
 def delivered_of(row: DeliveredRow) -> Delivered:
-    """Return the delivery that a row tells."""
+    """Return the delivery that a row tells. Raises CaptureError for one whose payload is hashed."""
+    if row.payload_hash:
+        raise CaptureError(f"{row.source} {row.sequence} to {row.destination}: its payload is hashed")
     return Delivered(row.due_ns, row.source, row.sequence, row.copy, row.destination, row.channel, row.payload)
+
+
+def word_of(text: str) -> int | None:
+    """Return the draw that a row tells in hex, None where there is none."""
+    if not text:
+        return None
+    if not _WORD.fullmatch(text):
+        raise CaptureError(f"a draw of {text!r}, it has 16 hex digits")
+    return int(text, 16)
+
+
+_WORD: Final = re.compile("[0-9a-f]{16}")
 
 
 def _vector(numbers: list[float]) -> tuple[float, float, float]:

@@ -3,7 +3,7 @@
 Closing tick k has two phases. *World*: what robots sent at k is judged; the clients due get what has reached them.
 *Clients*: what clients sent is judged; the deliveries of tick k+1 are final. Fates know frames, times and draws, never
 nodes. The journal holds the inputs of every closing, so a fold of it through this same class gives the state again,
-byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `journal_records`.
+byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `records`.
 """
 
 from __future__ import annotations
@@ -404,6 +404,8 @@ class HubState:
     def _arrive_at_clients(self, tick: int, fates: list[Flight]) -> dict[str, list[Flight]]:
         released: dict[str, list[Flight]] = {}
         arriving = self._take_arrivals(tick, to_robots=False)
+        if not arriving:
+            return released
         room = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False)
         for flight in arriving:
             member = self.members.get(flight.destination)
@@ -419,8 +421,10 @@ class HubState:
         return released
 
     def _arrive_at_robots(self, tick: int, frame: Frame, fates: list[Flight]) -> list[Delivered]:
-        deliveries = []
+        deliveries: list[Delivered] = []
         arriving = self._take_arrivals(tick, to_robots=True)
+        if not arriving:
+            return deliveries
         room = Room(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True)
         down = {robot.name for robot in frame.layout.robots if frame.numbers[robot.offsets["down"]] != 0.0}
         for flight in arriving:

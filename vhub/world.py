@@ -11,7 +11,8 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.network import Network
-from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate
+from foosim.protocol.rovers import RoverRobot
+from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate, velocity
 from foosim.protocol.scenes import build_scene
 from foosim.vhub.geometry import Crossing, LineOfSight, Sight
 
@@ -30,15 +31,21 @@ class World:
         self._poses: dict[str, Pose | None] = {}
         self._standing: dict[str, Vector] = {}
         self._antennas: dict[tuple[str, Vector], Vector] = {}
+        self._fixed: dict[tuple[str, Vector], Vector] = {}
+        """Antennas of endpoints without a body, in all frames of a layout."""
+        self._down: dict[str, bool] = {}
         self.turns = 0
         """Grows with every frame."""
 
     def turn_to(self, frame: Frame) -> None:
         """Take the newest committed frame."""
         if frame is not self._frame:
+            if self._frame is None or frame.layout is not self._frame.layout:
+                self._fixed.clear()
             self._frame, self._sight = frame, None
             self._poses.clear()
             self._antennas.clear()
+            self._down.clear()
             self.turns += 1
 
     def body(self, endpoint: str) -> str:
@@ -47,14 +54,18 @@ class World:
 
     def is_down(self, endpoint: str) -> bool:
         """Whether the robot that an endpoint is, or is on board of, is out of service."""
-        frame, body = self._frame, self.body(endpoint)
-        return frame is not None and body in frame.layout and frame.at(body, "down") != 0.0
+        found = self._down.get(endpoint)
+        if found is None:
+            frame, body = self._frame, self.body(endpoint)
+            found = frame is not None and body in frame.layout and frame.at(body, "down") != 0.0
+            self._down[endpoint] = found
+        return found
 
     def antenna(self, endpoint: str, mount: Vector) -> Vector:
         """Return the place (m, world frame) of an antenna: `mount` beside its body's own antenna, in the body's frame.
         """
         key = endpoint, mount
-        found = self._antennas.get(key)
+        found = self._antennas.get(key) or self._fixed.get(key)
         if found is None:
             body = self.body(endpoint)
             pose = self._pose(body)
@@ -63,8 +74,22 @@ class World:
                 _, position, orientation = pose
                 own = self._bodies[body].antenna
             x, y, z = rotate(orientation, (own[0] + mount[0], own[1] + mount[1], own[2] + mount[2]))
-            found = self._antennas[key] = position[0] + x, position[1] + y, position[2] + z
+            found = position[0] + x, position[1] + y, position[2] + z
+            (self._fixed if pose is None else self._antennas)[key] = found
         return found
+
+    def velocity(self, endpoint: str) -> Vector:
+        """Return how fast the body moves that an endpoint is, or is on board of (m/s, world frame); 0 without one."""
+        robot, frame = self.body(endpoint), self._frame
+        if frame is None or self._pose(robot) is None:
+            return ORIGIN
+        return velocity(self._bodies[robot], frame.layout[robot], frame.numbers)
+
+    def vehicle_height_m(self, name: str) -> float | None:
+        """Return how high the hull of a rover is; None for what is no vehicle."""
+        deployment = self._deployment
+        is_rover = deployment.is_hall and isinstance(deployment.robots.get(name), RoverRobot)
+        return deployment.hall.rover.height if is_rover else None
 
     def _pose(self, robot: str) -> Pose | None:
         """Return the pose of a robot's last link; None for what has no body."""
@@ -97,4 +122,4 @@ class World:
             if self._sights is None:
                 self._sights = LineOfSight(self._deployment)
             self._sight = self._sights.at(self._frame)
-        return self._sight.between(a, b, ignoring)
+        return self._sight.look((a, b) if a <= b else (b, a), ignoring)

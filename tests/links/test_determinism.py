@@ -68,6 +68,7 @@ NETWORKS: Final[dict[str, tuple[str, ...]]] = {
     "trace": rules("trace: {file: lte.trace}, queue: {packets: 30}, duplicate: 10 %"),
     "table": rules("jitter: {shape: table, file: wild.dist, mean: 8 ms, sd: 4 ms}, order: free"),
     "errors": rules("corrupt: {bit_error_rate: 0.002 p, deliver: true}, reorder: {probability: 20 %, extra: 9 ms}"),
+    "capacity": rules(f"delay: 15 ms, capacity: 3, duplicate: 20 %, {WORKED}"),
     "late": rules(f"rate: 300 kbit/s, ttl: 12 ms, {WORKED}"),
     "chaos": (
         *rules("delay: 1 ms"),
@@ -245,3 +246,23 @@ def test_a_broadcast_goes_once_to_all_who_hear(preset: str, duplicate: str) -> N
         assert near[key].cause == apart[key].cause, key
         if not key[2] and preset != "lte":  # a base station sends to each by itself, one after the other
             assert row(near[key]) == row(apart[key]), key
+
+
+@pytest.mark.parametrize("left_out", ["b", "d"])
+@pytest.mark.parametrize("preset", ["wifi_5_indoor", "dot11p", "zigbee", "lora_eu868", "acoustic"])
+def test_a_broadcast_gets_its_turn_whoever_hears_it(proof: Proof, preset: str, left_out: str) -> None:
+    """Its medium access draws from its sender's radio: fates of others are the same without one of the receivers.
+
+    That is so for the first of them, too (b of what a sends), and among stations that contend.
+    """
+    deployment = network(f"radio {preset}", proof.seed, "network.radios.r.duty_cycle=100 %")
+    found = []
+    for joined in (ENDS, [name for name in ENDS if name != left_out]):
+        hub = Hub(deployment, joined=joined)
+        for tick in range(150):
+            busy = {name: [Sent(tick + 1, "", "news", 0, name.encode() * 40)] for name in ("a", "c")}
+            hub.close(busy if tick % 15 == 0 else {})
+        flights = [*hub.fates, *hub.state.in_flight()]
+        found.append([row(flight) for flight in flights if flight.destination != left_out])
+    assert found[0] == found[1] and len(found[0]) == 40
+    proof.exact("T22", f"{preset}: fates of a broadcast that differ without its receiver {left_out}", 0, 0, 40)

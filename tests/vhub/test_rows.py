@@ -38,6 +38,7 @@ from foosim.vhub.rows import (
     plan_of,
     row_schema,
     rows_of,
+    word_of,
 )
 
 if TYPE_CHECKING:
@@ -213,3 +214,10 @@ def test_an_edit_of_a_wrong_shape_is_refused() -> None:
 
 def test_topics_are_those_of_the_readme() -> None:
     assert {EPOCHS, RECOVERIES, TICK, LAYOUT, FRAME, PACKETS, CLIENTS} == set(ROW_TYPES)
+
+
+def test_a_draw_is_read_or_refused() -> None:
+    assert (word_of(""), word_of("00000000000000ff")) == (None, 255)
+    for text in ("ff", "0x000000000000ff", "00000000000000FF", "00000000000000ff\n", "00000000000000f_f"):
+        with pytest.raises(CaptureError, match="it has 16 hex digits"):
+            word_of(text)

@@ -41,6 +41,8 @@ class Environment:
     sigma_nlos: float = 0.0
     d_corr_los: float = 10.0
     d_corr_nlos: float = 10.0
+    has_vehicles: bool = False
+    """Whether a vehicle in between takes away what it does between vehicles (`vehicle_blockage_db`)."""
 
     @property
     def has_nlos_curve(self) -> bool:
@@ -51,9 +53,15 @@ class Environment:
         """Return the loss in dB with line of sight."""
         raise AssertionError("each environment has its own")
 
+    def both_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> tuple[float, float]:
+        """Return the losses in dB with line of sight, and without: never less than with it, nor more than on the
+        ground."""
+        los_db = self.los_db(distance_m, frequency_hz, heights_m)
+        return los_db, los_db
+
     def nlos_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> float:
-        """Return the loss in dB without line of sight: never less than with it."""
-        return self.los_db(distance_m, frequency_hz, heights_m)
+        """Return the loss in dB without line of sight."""
+        return self.both_db(distance_m, frequency_hz, heights_m)[1]
 
 
 @dataclass(frozen=True)
@@ -65,8 +73,8 @@ class Curve:
     frequency_slope: float
 
     def __call__(self, distance_m: float, frequency_hz: float) -> float:
-        lg_f = log10(frequency_hz * 1e-9)
-        return self.offset + self.slope * log10(max(distance_m, DISTANCE_MIN_M)) + self.frequency_slope * lg_f
+        lg_d = log10(distance_m) if distance_m > DISTANCE_MIN_M else 0.0
+        return self.offset + self.slope * lg_d + self.frequency_slope * log10(frequency_hz * 1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,8 +87,9 @@ class TwoCurves(Environment):
     def los_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> float:
         return self.los(distance_m, frequency_hz)
 
-    def nlos_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> float:
-        return max(self.los(distance_m, frequency_hz), self.nlos(distance_m, frequency_hz))
+    def both_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> tuple[float, float]:
+        los_db = self.los(distance_m, frequency_hz)
+        return los_db, max(los_db, self.nlos(distance_m, frequency_hz))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,9 +114,10 @@ class UrbanCell(TwoCurves):
         far = self.los.offset + 40.0 * log10(distance_m) + self.los.frequency_slope * log10(frequency_hz * 1e-9)
         return far - self.far_weight * log10(square)
 
-    def nlos_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> float:
+    def both_db(self, distance_m: float, frequency_hz: float, heights_m: Heights) -> tuple[float, float]:
         gain = self.height_slope * (max(min(heights_m), 1.5) - 1.5)
-        return max(self.los_db(distance_m, frequency_hz, heights_m), self.nlos(distance_m, frequency_hz) - gain)
+        los_db = self.los_db(distance_m, frequency_hz, heights_m)
+        return los_db, max(los_db, self.nlos(distance_m, frequency_hz) - gain)
 
 
 class OneCurve(Environment):
@@ -190,13 +200,11 @@ def path_loss_db(
     dominates, and the shadowing is that of line of sight.
     """
     heights_m = (tx_height_m, rx_height_m)
-    los_db = environment.los_db(distance_m, frequency_hz, heights_m)
     if not has_hit:
-        return los_db, False
-    if environment.has_nlos_curve:
-        nlos_db = environment.nlos_db(distance_m, frequency_hz, heights_m)
-        if nlos_db < los_db + walls_db:
-            return nlos_db, True
+        return environment.los_db(distance_m, frequency_hz, heights_m), False
+    los_db, nlos_db = environment.both_db(distance_m, frequency_hz, heights_m)
+    if environment.has_nlos_curve and nlos_db < los_db + walls_db:
+        return nlos_db, True
     return los_db + walls_db, False
 
 
@@ -234,8 +242,8 @@ def vehicle_blockage_db(
     """Return what a vehicle between two vehicles takes away, in dB, to be added to the loss with line of sight.
 
     Nothing when both antennas stand above it; else a log-normal number of mean 9 dB and standard deviation 4.5 dB (both
-    below its height) or 5 and 4 (one below), the mean plus max(0, 15 lg d - 41). `word` is the draw: one for the whole
-    passage of a blocker, not one for each packet. Source: 3GPP TR 37.885, 6.2.1. A car is 1.6 m high, a lorry 3 m.
+    below its height) or 5 and 4 (one below), the mean plus max(0, 15 lg d - 41). `word` is the draw: one for a pair and
+    a blocker, not one for each packet. Source: 3GPP TR 37.885, 6.2.1. A car is 1.6 m high, a lorry 3 m.
     """
     if min(tx_height_m, rx_height_m) > blocker_height_m:
         return 0.0
@@ -262,6 +270,7 @@ ENVIRONMENTS: Final[Mapping[str, Environment]] = MappingProxyType(
             *(3.0, 4.0, 10.0, 13.0),
             los=Curve(38.77, 16.7, 18.2),
             nlos=_V2V_NLOS,
+            has_vehicles=True,
         ),
         "v2v_highway": TwoCurves(
             "3GPP TR 37.885 table 6.2.1-1, highway; correlation distances as ns-3 has them (25 m in line of sight in"
@@ -269,6 +278,7 @@ ENVIRONMENTS: Final[Mapping[str, Environment]] = MappingProxyType(
             *(3.0, 4.0, 10.0, 13.0),
             los=Curve(32.4, 20.0, 20.0),
             nlos=_V2V_NLOS,
+            has_vehicles=True,
         ),
         "urban_micro": UrbanCell(
             f"{_TR38901}, urban micro (street canyon)",

@@ -71,3 +71,10 @@ def shadowing_db(key: bytes, a: Sequence[float], b: Sequence[float], sigma_db: f
     shared = exp(-sqrt(dx * dx + dy * dy) / d_corr_m)
     total = field(key, a[0], a[1], d_corr_m) + field(key, b[0], b[1], d_corr_m)
     return sigma_db * total / sqrt(2.0 + 2.0 * shared)
+
+
+def shadowing_max_db(key: bytes, a: Sequence[float], sigma_db: float, d_corr_m: float) -> float:
+    """Return a share of one end, not below 0: no shadowing between two places exceeds the sum of theirs."""
+    if sigma_db == 0.0:
+        return 0.0
+    return max(0.0, sigma_db * field(key, a[0], a[1], d_corr_m) / sqrt(2.0))

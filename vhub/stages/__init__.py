@@ -1,7 +1,8 @@
 """The stages of a link, in their fixed order: a table that the hub walks.
 
-Each stage is one file with a class that is made from a link's setup. It has two hooks, at sending and at arrival; a
-hook that drops the packet returns the name of the cause. A stage that has nothing to do on a link is left out there.
+Each stage is one file with a class (`stage.Stage`) that is made from a link's setup. It has two hooks, at sending and
+at arrival; a hook that drops the packet returns the name of the cause. A stage that has nothing to do on a link is left
+out there.
 What a stage remembers is a plain value in the hub's state: of the link, of the sender's radio or of the air. To add
 one: its file, and its row here.
 """
@@ -9,34 +10,22 @@ one: its file, and its row here.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Final
 
-from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.admit import Admit
+from foosim.vhub.stages.capacity import Capacity
 from foosim.vhub.stages.channel import Channel
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.duty import Duty
 from foosim.vhub.stages.mangle import Mangle
 from foosim.vhub.stages.medium import make_medium
+from foosim.vhub.stages.own import Own
 from foosim.vhub.stages.policy import Policy
 from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.receiver import Receiver
 from foosim.vhub.stages.residual import make_residual
-
-
-class Stage(Protocol):
-    """One step of the pipeline on one link."""
-
-    def at_sending(self, flight: Flight) -> str:
-        """Judge a packet that is sent; return the cause of its drop, or an empty string."""
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        """Judge a packet that arrives; return the cause of its drop, or an empty string.
-
-        `hindered` is why its receiver does not take it; empty when it does.
-        """
-
+from foosim.vhub.stages.stage import Stage
 
 STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
     Admit.for_link,
@@ -46,7 +35,9 @@ STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
     make_medium,
     Channel.for_link,
     make_residual,
+    Own.for_link,
     Mangle.for_link,
     Delay.for_link,
+    Capacity.for_link,
     Receiver.for_link,
 )

@@ -6,13 +6,14 @@ from typing import Final
 
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 TOO_BIG: Final = "too_big"
 NODE_DOWN: Final = "node_down"
 NO_ROUTE: Final = "no_route"
 
 
-class Admit:
+class Admit(Stage):
     """Knows the longest payload, and whether the sender's body works."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -29,9 +30,6 @@ class Admit:
         if self._longest is not None and len(flight.payload) > self._longest:
             return TOO_BIG
         return NODE_DOWN if self._world.is_down(self._source) else ""
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
 
 
 class NoRoute(Admit):

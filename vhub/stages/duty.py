@@ -8,11 +8,12 @@ from foosim.vhub.memory import Sending
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 DUTY_CYCLE: Final = "duty_cycle"
 
 
-class Duty:
+class Duty(Stage):
     """Takes a packet's airtime out of its sender's bucket, or drops it."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -27,7 +28,8 @@ class Duty:
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
-        if self._broadcasts and flight.published:
+        broadcast = self._broadcasts and flight.published
+        if broadcast:
             shared = sender.sending(flight.sequence, flight.copy)
             if shared is not None:
                 return DUTY_CYCLE if shared.cause == DUTY_CYCLE else ""
@@ -38,7 +40,8 @@ class Duty:
         sender.tokens_at_ns = flight.sent_ns
         airtime_ns = self._airtime_ns(len(flight.payload))
         if airtime_ns > sender.tokens_ns:
-            sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
+            if broadcast:
+                sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
             return DUTY_CYCLE
         sender.tokens_ns -= airtime_ns
         return ""
@@ -49,6 +52,3 @@ class Duty:
             bandwidth_hz = int(settings.bandwidth_hz)
             return lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
         return serialisation_ns(size + settings.overhead_bytes, settings.rate_bps or settings.fixed_rate_bps)
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""

@@ -13,6 +13,7 @@ from foosim.protocol.draws import UNIT, Slot, chance_threshold
 from foosim.vhub.numbers import exp, ln, ln_gamma
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 CRC_FAIL: Final = "crc_fail"
 FLIP_BLOCK: Final = 1024
@@ -23,7 +24,7 @@ DEVIATIONS: Final = 12.0
 """Fewer flipped bits than the mean less this many deviations: less likely than 2^-64."""
 
 
-class Mangle:
+class Mangle(Stage):
     """Flips bits of a packet, or loses it for them; says whether it comes twice."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -97,6 +98,3 @@ class Mangle:
         rate = self._error_rate
         ln_ways = ln_gamma(bits + 1.0) - ln_gamma(count + 1.0) - ln_gamma(bits - count + 1.0)
         return ln_ways + count * ln(rate) + (bits - count) * ln(1.0 - rate)
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""

@@ -10,13 +10,14 @@ from typing import Final
 
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 PARTITION: Final = "partition"
 FILTERED: Final = "filtered"
 EXPIRED: Final = "expired"
 
 
-class Policy:
+class Policy(Stage):
     """Knows when the link is cut, whether anything may pass, and what is too late."""
 
     def __init__(self, setup: LinkSetup) -> None:

@@ -6,21 +6,19 @@ from typing import Final
 
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
 RECEIVER_DOWN: Final = "rx_down"
 RECEIVER_FULL: Final = "rx_full"
 """What reaches a receiver at one tick is one message: what does not fit into it is lost, before anybody refuses it."""
 
 
-class Receiver:
+class Receiver(Stage):
     """Is told of a robot's flag `down` in the newest frame, of clients that have left, of full messages."""
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Receiver:
         return cls()
-
-    def at_sending(self, flight: Flight) -> str:
-        return ""
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:
         return hindered

@@ -15,14 +15,16 @@ from foosim.vhub.episodes import Episodes, episodes_of_burst, episodes_of_outage
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
 
+_LOSS: Final = int(Slot.LOSS)
 RANDOM_LOSS: Final = "random_loss"
 BURST_LOSS: Final = "burst_loss"
 CHAIN_BLOCK: Final = 1
 """The block of a packet's draws of which the first word moves a chain on."""
 
 
-class Residual:
+class Residual(Stage):
     """Independent losses, those of outages, and those of a state that a subclass knows."""
 
     def __init__(self, setup: LinkSetup, good_loss: float = 0.0, bad_loss: float = 0.0) -> None:
@@ -46,13 +48,10 @@ class Residual:
         if self._outages is not None and self._outages.is_bad(flight.sent_ns):
             flight.is_bad = True
             return BURST_LOSS
-        word = flight.words[Slot.LOSS]
+        word = flight.words[_LOSS]
         if word >= self._any[bad]:
             return ""
         return BURST_LOSS if word < self._burst[bad] else RANDOM_LOSS
-
-    def at_arrival(self, flight: Flight, hindered: str) -> str:
-        return ""
 
 
 class InTime(Residual):
