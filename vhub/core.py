@@ -106,8 +106,7 @@ class HubCore:
         self._world: _World | None = None
         self._waited: list[str] = []  # clients whose Dones that tick lacks
         self._patience = Patience(now_ns)
-        self._end_ns = 0
-        self._malformed = self.repeated = 0
+        self._end_ns = self._malformed = self.repeated = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Commit: self._on_commit,
             Samples: self._on_samples,
@@ -192,10 +191,8 @@ class HubCore:
 
     @property
     def lacking(self) -> tuple[Channel, int]:
-        """The channel, and how many messages of it, without which no tick is closed: free-running clients wake nobody.
-
-        Where deliveries are final nobody waits for a closing: those ticks are closed together.
-        """
+        """The channel, and how many messages of it, without which no tick is closed; free-running clients wake nobody.
+        Where deliveries are final nobody waits for a closing: those ticks are closed together."""
         if self.state is None:
             return channels.COMMIT, 1
         if self.epoch == 0 or self._waited:

@@ -20,6 +20,7 @@ from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
 from foosim.vhub.stages.capacity import leave
 from foosim.vhub.stages.delay import Delay
+from foosim.vhub.stages.own import Own
 from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.stage import Stage, arrival_hooks, sending_hooks
 
@@ -80,10 +81,10 @@ class Link:
         self._at_sending, self._at_arrival = sending_hooks(self._stages), arrival_hooks(self._stages)
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
-        self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue) for stage in self._stages))
+        self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self._stages))
 
     def is_apart(self, time_ns: int) -> bool:
-        """Whether what is sent at a time shares no radio, queue or air with what is sent on other links."""
+        """Whether what is sent at a time shares no radio, queue or air with other links, and no model of one's own."""
         self._settle(time_ns)
         return self._is_apart
 

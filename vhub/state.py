@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import msgspec
 
@@ -206,7 +207,7 @@ class HubState:
         shares = has_radios and any(not self._is_apart(flight) for flight in self._flights.get(tick + 1, ()))
         for source in sorted(admitted, key=lambda name: (self.fabric.phase_ns(name), name)):
             copies = 0
-            for sent in sorted(admitted[source], key=lambda packet: packet.sequence):
+            for sent in sorted(admitted[source], key=attrgetter("sequence")):
                 if not self._admit(source, sent):
                     continue
                 receivers = self._addressed(source, sent.destination, sent.channel)
@@ -425,23 +426,15 @@ class HubState:
         if not arriving:
             return deliveries
         room = Room(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True)
+        down = {robot.name for robot in frame.layout.robots if frame.numbers[robot.offsets["down"]] != 0.0}
         for flight in arriving:
-            down = flight.destination in frame.layout and frame.at(flight.destination, "down") != 0.0
             fates.append(flight)
-            hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
-            if not self._arrive(flight, hindered):
-                continue
-            deliveries.append(
-                Delivered(
-                    flight.due_ns,
-                    flight.source,
-                    flight.sequence,
-                    flight.copy,
-                    flight.destination,
-                    flight.channel,
-                    content_of(flight),
-                )
-            )
+            to = flight.destination
+            hindered = RECEIVER_DOWN if to in down else "" if room.takes(flight) else RECEIVER_FULL
+            if self._arrive(flight, hindered):
+                numbers = flight.sequence, flight.copy
+                content = content_of(flight)
+                deliveries.append(Delivered(flight.due_ns, flight.source, *numbers, to, flight.channel, content))
         return deliveries
 
     def in_flight(self) -> list[Flight]:
