@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.scene import Body, forward_kinematics
-from foosim.vhub.rows import FrameRow, PacketRow, word_of
+from foosim.vhub.rows import CaptureError, FrameRow, PacketRow
 
 Integers = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -55,6 +56,18 @@ class Packets:
     def where(self, mask: NDArray[np.bool_]) -> Packets:
         """Return the packets for which the mask is true."""
         return Packets(*(getattr(self, field.name)[mask] for field in fields(self)))
+
+
+_WORD: Final = re.compile("[0-9a-f]{16}")
+
+
+def word_of(text: str) -> int | None:
+    """Return the draw that a row tells in hex, None where there is none."""
+    if not text:
+        return None
+    if not _WORD.fullmatch(text):
+        raise CaptureError(f"a draw of {text!r}, it has 16 hex digits")
+    return int(text, 16)
 
 
 _WORDS: Final = frozenset({"loss_word", "jitter_word"})

@@ -16,11 +16,12 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Disrupt
 from foosim.protocol.names import nearest_name
+from foosim.vhub.capture_columns import word_of
 from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.figures import EXACT, rate_text, time_text
 from foosim.vhub.link_models import VERSION_KEY
-from foosim.vhub.rows import PACKETS, TICK, PacketRow, TickRow, edit_of, word_of
+from foosim.vhub.rows import PACKETS, TICK, PacketRow, TickRow, edit_of
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
 from foosim.vhub.stages.capacity import EVICTED

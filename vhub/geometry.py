@@ -314,7 +314,7 @@ def _reach(body: Body) -> float | Pillar:
     (lx, ly, lz), (hx, hy, hz) = swept_box(body)
     if body.links[0].joint != "free":
         x, y = hx - lx, hy - ly
-        return pillar_around(lx + x / 2, ly + y / 2, sqrt(x * x + y * y) / 2, lz, hz)
+        return pillar_around(body.name, lx + x / 2, ly + y / 2, sqrt(x * x + y * y) / 2, lz, hz)
     x, y, z = body.position
     x, y, z = max(abs(lx - x), abs(hx - x)), max(abs(ly - y), abs(hy - y)), max(abs(lz - z), abs(hz - z))
     return sqrt(x * x + y * y + z * z)
@@ -375,8 +375,8 @@ class Sight:
         self._geometry, self._layout, self._numbers = geometry, layout, numbers
         self._found: dict[Key, tuple[Crossing, ...]] = {}
         self._placed: dict[str, list[_Placed]] = {}
-        self._around: list[tuple[Pillar, str]] | None = None
-        """What is around bodies, with their names."""
+        self._around: list[Pillar] | None = None
+        """What is around bodies."""
 
     def between(self, a: Vector, b: Vector, ignoring: Collection[str] = ()) -> tuple[Crossing, ...]:
         """Return what the line between two points (m, world frame) crosses, the bodies `ignoring` (entities) aside.
@@ -406,16 +406,16 @@ class Sight:
         crossed = self._geometry.groups.crossings(_ray(line), moving)
         return tuple(sorted((*standing, *crossed), key=_by_distance)) if crossed else standing
 
-    def _pillars(self) -> list[tuple[Pillar, str]]:
+    def _pillars(self) -> list[Pillar]:
         """Return a pillar around each body: however a free one is turned, wherever another one's joints are."""
         pillars = []
         for name, reach in self._geometry.reaches.items():
             if isinstance(reach, float):
                 start = self._layout[name].offsets["position"]
                 x, y, z = self._numbers[start : start + 3]
-                pillars.append((pillar_around(x, y, reach, z - reach, z + reach), name))
+                pillars.append(pillar_around(name, x, y, reach, z - reach, z + reach))
             else:
-                pillars.append((reach, name))
+                pillars.append(reach)
         return pillars
 
     def _solids(self, name: str, line: Line) -> list[_Solid]:

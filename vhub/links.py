@@ -98,7 +98,8 @@ class Link:
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
         state = self.state
-        self._settle(flight.sent_ns)
+        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._fabric.timeline.version:
+            self._settle(flight.sent_ns)
         is_offered = flight.copy == 0
         state.offered += is_offered
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
@@ -126,7 +127,8 @@ class Link:
         True when it is delivered, False when it is dropped. `hindered` is why its receiver does not take it; empty when
         it does.
         """
-        self._settle(flight.sent_ns)
+        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._fabric.timeline.version:
+            self._settle(flight.sent_ns)
         state, is_offered = self.state, flight.copy == 0
         for judge in self._at_arrival:
             cause = judge(flight, hindered)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from math import inf, sqrt
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,26 +95,25 @@ def cylinder_span(start: Vector, way: Vector, radius: float, half_length: float)
     return (enter, leave) if enter < leave else None
 
 
-Pillar = tuple[float, float, float, float, float]
-"""An upright cylinder around a thing: its x and y, the square of its radius, its least and greatest z (m)."""
-T = TypeVar("T")
+Pillar = tuple[float, float, float, float, float, str]
+"""An upright cylinder around a body: its x and y, the square of its radius, its least and greatest z (m); its name."""
 
 
-def pillar_around(x: float, y: float, radius: float, low_z: float, high_z: float) -> Pillar:
+def pillar_around(name: str, x: float, y: float, radius: float, low_z: float, high_z: float) -> Pillar:
     """Return a pillar with a margin."""
     radius += MARGIN_M
-    return x, y, radius * radius, low_z - MARGIN_M, high_z + MARGIN_M
+    return x, y, radius * radius, low_z - MARGIN_M, high_z + MARGIN_M, name
 
 
-def pillars_met_by(pillars: Iterable[tuple[Pillar, T]], line: tuple[Vector, Vector]) -> list[T]:
-    """Return the things whose pillars a line may pass, seen from above as if it had no ends: it says where to look."""
+def pillars_met_by(pillars: Iterable[Pillar], line: tuple[Vector, Vector]) -> list[str]:
+    """Return the names whose pillars a line may pass, seen from above as if it had no ends: it says where to look."""
     (ax, ay, az), (bx, by, bz) = line
     way_x, way_y = bx - ax, by - ay
     square = way_x * way_x + way_y * way_y
     low_z, high_z = (az, bz) if az <= bz else (bz, az)
     return [
-        thing
-        for (x, y, reach, low, high), thing in pillars
+        name
+        for x, y, reach, low, high, name in pillars
         if high >= low_z
         and low <= high_z
         and (aside := (x - ax) * way_y - (y - ay) * way_x) * aside <= reach * square

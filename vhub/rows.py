@@ -10,7 +10,6 @@ Neighbours: `capture_writer`, `capture_reader`, `viewing` (what is looked at).
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
@@ -39,7 +38,7 @@ DigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 EntityDigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{16}$")]
 ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
 WordHex = Annotated[str, Meta(extra_json_schema={"type": "string", "pattern": "^([0-9a-f]{16})?$"})]
-"""Checked by `word_of` and not with its row: that would take a reader as long as the row's decoding."""
+"""Checked by `capture_columns.word_of` and not with its row: that would take a reader as long as the row's decoding."""
 Fate = Literal["delivered", "dropped", "in_flight"]
 
 
@@ -355,8 +354,8 @@ def packet_row(flight: Flight) -> PacketRow:
         fate,
         flight.cause if fate is DROPPED else "",
         flight.rule,
-        f"{words[_LOSS]:016x}" if slots >> _LOSS & 1 else "",
-        f"{words[_JITTER]:016x}" if slots >> _JITTER & 1 and on_its_way else "",
+        words[_LOSS].to_bytes(8).hex() if slots >> _LOSS & 1 else "",
+        words[_JITTER].to_bytes(8).hex() if slots >> _JITTER & 1 and on_its_way else "",
         len(payload),
         payload,
         flight.released_wall_ns,
@@ -394,7 +393,7 @@ def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
         flight.snr_cdb,
         level_cdbm(flight.interference) if flight.interference else 0,
         threshold * 1_000_000 >> 64,
-        f"{flight.words[_ERROR]:016x}" if threshold else "",
+        flight.words[_ERROR].to_bytes(8).hex() if threshold else "",
         flight.contenders,
         flight.retries,
     )
@@ -487,18 +486,6 @@ def delivered_of(row: DeliveredRow) -> Delivered:
     if row.payload_hash:
         raise CaptureError(f"{row.source} {row.sequence} to {row.destination}: its payload is hashed")
     return Delivered(row.due_ns, row.source, row.sequence, row.copy, row.destination, row.channel, row.payload)
-
-
-def word_of(text: str) -> int | None:
-    """Return the draw that a row tells in hex, None where there is none."""
-    if not text:
-        return None
-    if not _WORD.fullmatch(text):
-        raise CaptureError(f"a draw of {text!r}, it has 16 hex digits")
-    return int(text, 16)
-
-
-_WORD: Final = re.compile("[0-9a-f]{16}")
 
 
 def _vector(numbers: list[float]) -> tuple[float, float, float]:

@@ -160,9 +160,18 @@ def test_a_heavy_tail_is_finer_the_rarer_it_is() -> None:
     assert interpolate_ns(quantiles, 2**64 - 1) == quantiles[-1] == 60 * S
 
 
-@pytest.mark.parametrize("mean", ["1 us", "2 ms", "1 s"])
-@pytest.mark.parametrize("alpha", [1.05, 1.2, 1.5, 2.0, 2.5, 5.0])
-@pytest.mark.parametrize("top", ["3 s", "60 s"])
+@pytest.mark.parametrize(
+    ("mean", "alpha", "top"),
+    [
+        ("1 us", 1.2, "60 s"),
+        ("1 us", 2.5, "60 s"),
+        ("2 ms", 1.05, "60 s"),
+        ("2 ms", 1.2, "10 s"),
+        ("2 ms", 2.0, "3 s"),
+        ("1 s", 1.5, "3 s"),
+        ("1 s", 5.0, "60 s"),
+    ],
+)
 def test_a_pareto_law_cut_anywhere_has_its_moments(mean: str, alpha: float, top: str) -> None:
     """Against the integrals of the cut law, with tails from nearly none to nearly no mean."""
     law = ParetoJitter.model_validate({"shape": "pareto", "mean": mean, "alpha": alpha, "max": top})

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Add, Edit, Push, Remove
+from foosim.vhub.capture_columns import word_of
 from foosim.vhub.rows import (
     CLIENTS,
     EPOCHS,
@@ -38,7 +39,6 @@ from foosim.vhub.rows import (
     plan_of,
     row_schema,
     rows_of,
-    word_of,
 )
 
 if TYPE_CHECKING:
