@@ -1,32 +1,43 @@
 """Packets per second through the vHub's core, in process: judged, then also journalled, then also captured.
 
 Four free-running clients send to the table's robots over the table's links (delay, jitter, loss), a hundred packets
-each tick. What they and the world say is encoded before the clock runs; reading it, judging, the record, the deliveries
-and, at the end, the finished capture are in the time. Neighbours: `foosim.vhub.core`, `foosim.vhub.capture_writer`.
+each tick. `radio` is captured, too: there they send by Wi-Fi with fading among the shelves and walls of the warehouse,
+in each tick to twelve of its rovers, which drive, and once to one another; the air has room for that. What they and the
+world say is encoded before the clock runs; reading it, judging, the record, the deliveries and, at the end, the
+finished capture are in the time. Whatever was sent and has no fate, or a fate and no row, is lost. Neighbours:
+`foosim.vhub.core`, `foosim.vhub.capture_writer`, `verdict` (a verdict alone).
 """
 
 from __future__ import annotations
 
+import json
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from bench.runs import TABLE
+from bench.verdict import WAREHOUSE, WIFI, Frames, circling, resting
 from foosim.protocol import actions, channels, limits
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.frame import Frame
 from foosim.protocol.journal import Journal
-from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Build, ClientHello, Commit, Epoch, Join, RobotPacket, Samples, Sent, Up
-from foosim.protocol.start import initial_numbers
+from foosim.protocol.messages import (
+    Build,
+    ClientHello,
+    Commit,
+    Epoch,
+    Join,
+    RobotPacket,
+    Samples,
+    Sent,
+    Subscription,
+    Up,
+)
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
@@ -34,40 +45,83 @@ from foosim.vhub.keeping import Keep
 
 CLIENTS: Final = tuple(f"client-{number}" for number in range(4))
 PACKETS_PER_TICK: Final = 25
-"""Of each client."""
+"""Of each client at the table."""
+ROVERS_PER_TICK: Final = 12
+"""To which each client sends in the warehouse."""
+NEWS: Final = "news"
 PAYLOAD: Final = bytes(16)
-WAYS: Final = ("judged", "journalled", "captured")
+TO_REACH: Final = {"captured": 50_000, "radio": 25_000}
 
 Message = tuple[Channel, str, bytes]
 
 
 @dataclass(frozen=True, slots=True)
 class HubRate:
-    """One way. `lost` are packets without a fate, and, when captured, those whose row is not in the capture."""
+    """One way. `packets` were sent, of which so many were `delivered` and `dropped` by the network, a few in flight at
+    the end; `lost` are those without a fate, and, when captured, those whose row is not in the capture."""
 
     way: str
     packets: int
     packets_per_s: float
     cpu_us_per_packet: float
+    delivered: int
+    dropped: int
     lost: int
     waits: int
     """How often the core had to wait for the capture's writer."""
 
 
 def hub(seconds: float = 2.0) -> list[HubRate]:
-    """Measure each way; `seconds` is the simulated time, at ticks of 2 ms."""
-    sets = ["tick=2 ms", "players={}", f"clients={{{', '.join(f'{name}: {{}}' for name in CLIENTS)}}}"]
-    text = apply_sets(TABLE.read_text(), TABLE.name, sets)
-    deployment = load_deployment(text, TABLE.name)
-    said = list(_script(deployment, max(2, round(seconds * 500))))
-    return [_measure(way, text, deployment, said) for way in WAYS]
+    """Measure each way; `seconds` is the simulated time of the table, at ticks of 2 ms: the warehouse has as many."""
+    ticks = max(2, round(seconds * 500))
+    table, hall = _table(ticks), _warehouse(ticks)
+    ways = (("judged", table), ("journalled", table), ("captured", table), ("radio", hall))
+    return [_measure(way, load) for way, load in ways]
 
 
-def _measure(way: str, text: str, deployment: Deployment, said: list[list[Message]]) -> HubRate:
+@dataclass(frozen=True, slots=True)
+class _Load:
+    """A world, what its hub hears tick by tick, and how many packets there are in that."""
+
+    text: str
+    deployment: Deployment
+    said: list[list[Message]]
+    packets: int
+
+
+def _deployment(path: Path, sets: list[str]) -> tuple[str, Deployment]:
+    clients = ", ".join(f"{name}: {{}}" for name in CLIENTS)
+    text = apply_sets(path.read_text(), path.name, ["players={}", f"clients={{{clients}}}", *sets])
+    return text, load_deployment(text, path.name)
+
+
+def _table(ticks: int) -> _Load:
+    text, deployment = _deployment(TABLE, ["tick=2 ms"])
+    rods = [name for name, robot in deployment.robots.items() if robot.model == "rod"]
+    to = [rods[index % len(rods)] for index in range(1, PACKETS_PER_TICK + 1)]
+    said = list(_script(deployment, resting(deployment), ticks, lambda tick: to))
+    return _Load(text, deployment, said, ticks * len(CLIENTS) * len(to))
+
+
+def _warehouse(ticks: int) -> _Load:
+    places = {name: [f"{8 * n - 12} m", f"{6 * (n % 2) - 3} m", "1 m"] for n, name in enumerate(CLIENTS)}
+    network = {**WIFI, "robots": {"rover*": ["wifi"], "client-*": ["wifi"]}, "places": places}
+    text, deployment = _deployment(WAREHOUSE, [f"network={json.dumps(network)}"])
+    rovers = [name for name in deployment.robots if name.startswith("rover")]
+
+    def to(tick: int) -> list[str]:
+        return ["", *(rovers[(tick + index) % len(rovers)] for index in range(ROVERS_PER_TICK))]
+
+    said = list(_script(deployment, circling(deployment), ticks, to))
+    return _Load(text, deployment, said, ticks * len(CLIENTS) * (ROVERS_PER_TICK + len(CLIENTS) - 1))
+
+
+def _measure(way: str, load: _Load) -> HubRate:
+    text, deployment, said = load.text, load.deployment, load.said
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "hub.mcap"
         journal = None if way == "judged" else Journal(Path(folder), "vhub")
-        writer = None if way != "captured" else CaptureWriter(path, deployment, TABLE.name, text, {})
+        writer = None if way not in TO_REACH else CaptureWriter(path, deployment, TABLE.name, text, {})
         core = HubCore("boot", bytes(32), 0)
         _start(core, text, journal)
         begun_s, begun_cpu_s = time.perf_counter(), time.process_time()
@@ -84,13 +138,13 @@ def _measure(way: str, text: str, deployment: Deployment, said: list[list[Messag
         if journal is not None:
             journal.close()
         assert core.state is not None and core.state.closed == len(said) - 1, core.waiting_for
-        packets = core.state.packets
-        without_fate = packets.in_flight - len(core.state.in_flight())
-        without_row = 0 if writer is None else packets.delivered + packets.dropped - len(open_capture(path).packets)
-    rate = packets.offered / spent_s
-    per_packet_us = round(cpu_s / packets.offered * 1e6, 1)
+        packets, in_flight = core.state.packets, len(core.state.in_flight())
+        fates = packets.delivered + packets.dropped
+        kept = fates if writer is None else len(open_capture(path).packets)
+    lost = load.packets - in_flight - min(fates, kept)
+    cpu_us = round(cpu_s / load.packets * 1e6, 1)
     return HubRate(
-        way, packets.offered, round(rate), per_packet_us, without_fate + without_row + packets.refused, waits
+        way, load.packets, round(load.packets / spent_s), cpu_us, packets.delivered, packets.dropped, lost, waits
     )
 
 
@@ -100,9 +154,10 @@ def _start(core: HubCore, text: str, journal: Journal | None) -> None:
     core.receive(channels.BUILD, channels.VHUB, encode(build), 0)
     core.begin(None, 0)
     for name in CLIENTS:
+        heard = [Subscription(other, NEWS) for other in CLIENTS if other != name]
         hello = ClientHello(name, "boot", limits.PROTOCOL_VERSION, "", 0)
         core.receive(channels.CLIENT_HELLO, name, encode(hello), 0)
-        core.receive(channels.UP, name, encode(Join(name, "boot", 0, [])), 0)
+        core.receive(channels.UP, name, encode(Join(name, "boot", 0, heard)), 0)
     assert core.deployment is not None
     owners = [(robot, "n1") for robot in core.deployment.robots]
     core.receive(channels.EPOCH, channels.SUPERVISOR, encode(Epoch(1, 0, bytes(32), ["n1"], owners, [], b"")), 0)
@@ -119,15 +174,17 @@ def _perform(core: HubCore, journal: Journal | None, writer: CaptureWriter | Non
     core.actions.clear()
 
 
-def _script(deployment: Deployment, ticks: int) -> Iterator[list[Message]]:
-    """Yield what the hub hears at each tick: the commit, the samples, and the clients' packets."""
-    layout = build_layout(deployment)
-    numbers = initial_numbers(deployment, layout)
-    robots = [entity.name for entity in layout.robots]
-    rods = [entity.name for entity in layout.rods]
+def _script(
+    deployment: Deployment, frames: Frames, ticks: int, to: Callable[[int], list[str]]
+) -> Iterator[list[Message]]:
+    """Yield what the hub hears at each tick: the commit, the samples, and the clients' packets.
+
+    `to` says to whom each client sends; a packet to nobody is news to those who hear it.
+    """
+    robots = [entity.name for entity in frames(0).layout.robots]
     sequence = 0
     for tick in range(ticks):
-        frame = Frame(tick, layout, np.array(numbers))
+        frame = frames(tick)
         commit = Commit(1, tick, frame.digest, frame.values.tobytes(), [], [], False)
         sensed = [
             RobotPacket(robot, index, "", sensor, PAYLOAD)
@@ -139,13 +196,14 @@ def _script(deployment: Deployment, ticks: int) -> Iterator[list[Message]]:
             (channels.COMMIT, channels.VHUB, encode(commit)),
             (channels.SAMPLES, "n1", encode(Samples(tick, frame.digest, "n1", robots, sensed))),
         ]
+        receivers = to(tick)
         for name in CLIENTS:
             sent = [
-                Sent(sequence + index, rods[index % len(rods)], "position", 0, PAYLOAD)
-                for index in range(1, PACKETS_PER_TICK + 1)
+                Sent(sequence + index, receiver, "position" if receiver else NEWS, 0, PAYLOAD)
+                for index, receiver in enumerate(receivers, 1)
             ]
             messages.append((channels.UP, name, encode(Up(name, "boot", sent))))
-        sequence += PACKETS_PER_TICK
+        sequence += len(receivers)
         yield messages
 
 
@@ -153,7 +211,8 @@ def lines(rows: list[HubRate]) -> list[str]:
     """Return the figures for people."""
     return [
         f"{row.way:12}{row.packets_per_s:9.0f} packets/s {row.cpu_us_per_packet:7.1f} us of processor each, "
-        f"{row.lost} lost of {row.packets}, the core waited {row.waits} times for the capture"
-        + ("   (to reach 50000, none lost)" if row.way == "captured" else "")
+        f"{row.lost} lost of {row.packets} ({row.delivered} delivered, {row.dropped} dropped by the network), "
+        f"the core waited {row.waits} times for the capture"
+        + (f"   (to reach {TO_REACH[row.way]}, none lost)" if row.way in TO_REACH else "")
         for row in rows
     ]

@@ -88,10 +88,10 @@ def verdict(seconds: float = 4.0) -> list[Verdicts]:
     found = []
     for way, network, count in (("wire", WIRE, 20), ("wifi", WIFI, 20), ("wire", WIRE, 200), ("wifi", WIFI, 200)):
         deployment = standing(network, count)
-        found.append(measure(way, deployment, _still(deployment), [f"e{n}" for n in range(count)], ticks))
+        found.append(measure(way, deployment, resting(deployment), [f"e{n}" for n in range(count)], ticks))
     deployment = driving()
     names = [name for name in deployment.robots if name.startswith("rover")]
-    found.insert(2, measure("rovers", deployment, _circling(deployment), names, ticks))
+    found.insert(2, measure("rovers", deployment, circling(deployment), names, ticks))
     return found
 
 
@@ -114,13 +114,15 @@ def driving() -> Deployment:
     return load_deployment(apply_sets(WAREHOUSE.read_text(), WAREHOUSE.name, [f"network={network}"]), WAREHOUSE.name)
 
 
-def _still(deployment: Deployment) -> Frames:
+def resting(deployment: Deployment) -> Frames:
+    """Return frames in which nothing moves."""
     layout = build_layout(deployment)
     numbers = np.array(initial_numbers(deployment, layout))
     return lambda tick: Frame(tick, layout, numbers)
 
 
-def _circling(deployment: Deployment) -> Frames:
+def circling(deployment: Deployment) -> Frames:
+    """Return frames in which each rover drives on a circle."""
     layout = build_layout(deployment)
     numbers = np.array(initial_numbers(deployment, layout))
     places = [entity.offsets["position"] for entity in layout.rovers]

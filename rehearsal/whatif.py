@@ -99,10 +99,6 @@ class _Series:
     sent_ns: array[int] = field(default_factory=lambda: array("q"))
     due_ns: array[int] = field(default_factory=lambda: array("q"))
 
-    def add(self, sent_ns: int, due_ns: int) -> None:
-        self.sent_ns.append(sent_ns)
-        self.due_ns.append(due_ns)
-
     def side(self) -> Side:
         if not self.due_ns:
             return Side(0, 0.0, 0.0, 0.0)
@@ -175,7 +171,8 @@ class _Compared:
             link = self._links[row.source, row.destination] = _Link()
         link.offered += row.copy == 0
         if row.fate == "delivered":
-            link.before.add(row.sent_ns, row.due_ns)
+            link.before.sent_ns.append(row.sent_ns)
+            link.before.due_ns.append(row.due_ns)
         elif row.fate == "dropped":
             self._causes[row.cause] += 1
 
@@ -193,7 +190,9 @@ class _Compared:
             else:
                 self._inputs_changed += 1
         if after.fate == "delivered":
-            self._links[after.source, after.destination].after.add(after.sent_ns, after.due_ns)
+            delivered = self._links[after.source, after.destination].after
+            delivered.sent_ns.append(after.sent_ns)
+            delivered.due_ns.append(after.due_ns)
         elif after.fate == "dropped":
             self._new_causes[after.cause] += 1
 

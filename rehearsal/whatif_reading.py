@@ -76,13 +76,14 @@ class Offers:
         self._waiting: deque[int] = deque()
         """Ticks of which all is read but packets, perhaps, whose fates became final later."""
         self._topics = frozenset({PACKETS, CLIENTS, TICK, *(FrameReader.TOPICS if frames == "captured" else ())})
-        self._decoders = {**DECODERS, TICK: DECODERS[TICK] if frames == "computed" else TICK_MARKS}
+        self._ticks = DECODERS[TICK] if frames == "computed" else TICK_MARKS
 
     def ticks(self) -> Iterator[Offered]:
         """Yield the ticks in their order. Raises CaptureError."""
         scan = Scan(self._capture.path)
         reader = FrameReader(scan, self._capture.deployment)
         starts_ns = self._capture.about.chunk_starts
+        packets = DECODERS[PACKETS]
         rests_ns = list(accumulate(reversed(starts_ns), min))[::-1]
         chunk = 0
         for message in scan.messages(self._topics):
@@ -91,12 +92,18 @@ class Offers:
                 if chunk > len(rests_ns):  # it was written since the capture was opened
                     break
                 yield from self._before(rests_ns[chunk - 1])
-            if message.topic in FrameReader.TOPICS:
+            topic = message.topic
+            if topic == PACKETS:
+                self._take_packet(scan.decode(packets, message))
+            elif topic == TICK:
+                self._take_tick(scan.decode(self._ticks, message))
+            elif topic == CLIENTS:
+                client = scan.decode(DECODERS[CLIENTS], message)
+                self._at(client.tick).came.append(client)
+            else:
                 frame = reader.frame(message)
                 if frame is not None:
                     self._at(frame.tick).frame = frame
-            else:
-                self._read(scan.decode(self._decoders[message.topic], message))
         yield from self._before(None)
 
     def _before(self, until_ns: int | None) -> Iterator[Offered]:
@@ -106,31 +113,28 @@ class Offers:
             self._next = tick + 1
             yield self._offered.pop(tick)
 
-    def _read(self, row: PacketRow | ClientRow | TickRow | TickMark) -> None:
-        if isinstance(row, PacketRow):
-            self._take(row)
-            if row.copy == 0:
-                self._offer(row)
-        elif isinstance(row, ClientRow):
-            self._at(row.tick).came.append(row)
-        elif row.tick < self._stop:
+    def _take_tick(self, row: TickRow | TickMark) -> None:
+        if row.tick < self._stop:
             self._at(row.tick).row = row
             self._waiting.append(row.tick)
 
-    def _offer(self, row: PacketRow) -> None:
-        tick, key = row.sent_ns // self._tick_ns, (row.source, row.sequence)
+    def _take_packet(self, row: PacketRow) -> None:
+        self._take(row)
+        if row.copy:
+            return
+        tick, source, sequence = row.sent_ns // self._tick_ns, row.source, row.sequence
         if tick < self._next:
             if tick >= self.first:
-                what = f"a packet of {row.source} that was sent at tick {tick} stands behind what was sent later"
+                what = f"a packet of {source} that was sent at tick {tick} stands behind what was sent later"
                 raise CaptureError(f"{self._capture.path}: {what}")
             return  # before a cut begins
-        offered = self._at(tick)
         to = "" if row.published else row.destination
         payload = row.payload or bytes(row.size)  # of one that is hashed the size is all that a fate depends on
-        if row.source in self._robots:
-            offered.robots[key] = RobotPacket(row.source, row.sequence & _INDEX, to, row.channel, payload)
+        offered = self._at(tick)
+        if source in self._robots:
+            offered.robots[source, sequence] = RobotPacket(source, sequence & _INDEX, to, row.channel, payload)
         else:
-            offered.clients[key] = Sent(row.sequence, to, row.channel, row.stamp_ns, payload)
+            offered.clients[source, sequence] = Sent(sequence, to, row.channel, row.stamp_ns, payload)
 
     def _at(self, tick: int) -> Offered:
         offered = self._offered.get(tick)

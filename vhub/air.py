@@ -9,6 +9,7 @@ Neighbours: `memory` (what is on air, in the hub's state), `stages.medium` regis
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from foosim.protocol.scene import Vector
@@ -24,26 +25,46 @@ sums of cut numbers do not depend on their order either, and a state has 64 bits
 NOTHING_CDBM: Final = -(10**6)
 
 
+class _Heard:
+    """A transmission as its receivers have it: packets that are on air together, and who is on air beside them."""
+
+    __slots__ = ("beside", "end_ns", "flights", "of", "source", "start_ns")
+
+    def __init__(self, flight: Flight, of: Propagation, on_air: Iterable[Transmission]) -> None:
+        self.source, self.of = flight.source, of
+        self.start_ns, self.end_ns = flight.air_start_ns, flight.air_end_ns
+        self.flights: list[Flight] = []
+        self.beside = [known for known in on_air if self.overlaps(known)]
+
+    def has(self, flight: Flight, of: Propagation) -> bool:
+        """Whether a packet belongs to it."""
+        times_ns = self.start_ns, self.end_ns
+        return self.of is of and self.source == flight.source and times_ns == (flight.air_start_ns, flight.air_end_ns)
+
+    def overlaps(self, known: Transmission) -> bool:
+        return known.start_ns < self.end_ns and known.end_ns > self.start_ns and known.source != self.source
+
+
 class Air:
     """One air in one world: its state, and the packets that are on it, each with how its radio's signals spread."""
 
     def __init__(self, state: AirState) -> None:
         self.state = state
-        self._flights: list[tuple[Flight, Propagation]] = []
+        self._heard: list[_Heard] = []
+        self._advanced_ns = -1
 
     def restore(self, flight: Flight, of: Propagation) -> None:
         """Take a packet in flight of a state that was written down."""
         if flight.air_end_ns > flight.sent_ns and not flight.is_settled:
-            self._flights.append((flight, of))
+            self._group(flight, of).flights.append(flight)
 
     def advance(self, now_ns: int) -> None:
         """Forget what is over."""
-        on_air = self.state.on_air
-        if on_air and any(known.until_ns <= now_ns for known in on_air):
-            on_air[:] = [known for known in on_air if known.until_ns > now_ns]
-        flights = self._flights
-        if flights and any(flight.air_end_ns <= now_ns for flight, _ in flights):
-            self._flights = [entry for entry in flights if entry[0].air_end_ns > now_ns]
+        if now_ns == self._advanced_ns:
+            return
+        self._advanced_ns = now_ns
+        self.state.on_air[:] = [known for known in self.state.on_air if known.until_ns > now_ns]
+        self._heard = [heard for heard in self._heard if heard.end_ns > now_ns]
 
     def turn(self, source: str, ready_ns: int, of: Propagation) -> tuple[int, int]:
         """Return when a station gets its turn that is ready to send, and how many contend with it, itself included.
@@ -54,28 +75,39 @@ class Air:
         start_ns = ready_ns
         heard: set[str] = set()
         for known in self.state.on_air:
-            if known.source == source or known.until_ns <= ready_ns:
+            until_ns, other = known.until_ns, known.source
+            if until_ns <= ready_ns or other == source:
                 continue
-            if known.source not in heard and not of.hears(
-                known.position, place, known.source, source, known.power_cdbm
-            ):
-                continue
-            heard.add(known.source)
-            start_ns = max(start_ns, known.until_ns)
+            if other not in heard:
+                if not of.hears(known.position, place, other, source, known.power_cdbm):
+                    continue
+                heard.add(other)
+            start_ns = max(start_ns, until_ns)
         return start_ns, 1 + len(heard)
 
     def register(self, known: Transmission) -> None:
-        """Take a transmission: it spoils what is on air beside it."""
-        self.state.on_air.append(known)
-        for flight, of in self._flights:
-            if not flight.cause:  # the inputs of a fate do not change behind it
-                _spoil(flight, known, of)
+        """Take a transmission: it spoils what is on air beside it. One without a duration is over at once."""
+        if known.until_ns > self._advanced_ns:
+            self.state.on_air.append(known)
+        for heard in self._heard:
+            if heard.overlaps(known):
+                heard.beside.append(known)
+                for flight in heard.flights:
+                    if not flight.cause:  # the inputs of a fate do not change behind it
+                        _spoil(flight, known, heard.of)
 
     def listen(self, flight: Flight, of: Propagation) -> None:
         """Take a packet on air, which those who are on air beside it spoil."""
-        for known in self.state.on_air:
+        heard = self._group(flight, of)
+        for known in heard.beside:
             _spoil(flight, known, of)
-        self._flights.append((flight, of))
+        heard.flights.append(flight)
+
+    def _group(self, flight: Flight, of: Propagation) -> _Heard:
+        """Return the transmission that a packet belongs to: the newest one, where others have heard that."""
+        if not self._heard or not self._heard[-1].has(flight, of):
+            self._heard.append(_Heard(flight, of, self.state.on_air))
+        return self._heard[-1]
 
 
 def _power_cdbm(known: Transmission, at: str, place: Vector, of: Propagation) -> int:
@@ -85,9 +117,7 @@ def _power_cdbm(known: Transmission, at: str, place: Vector, of: Propagation) ->
 
 
 def _spoil(flight: Flight, known: Transmission, of: Propagation) -> None:
-    """Add a transmission to what disturbs a packet, where the two overlap."""
-    if known.source == flight.source or known.end_ns <= flight.air_start_ns or known.start_ns >= flight.air_end_ns:
-        return
+    """Add a transmission that is on air beside a packet to what disturbs it."""
     if known.source == flight.destination:
         flight.interference = DEAF
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.scene import Body, forward_kinematics
-from foosim.vhub.rows import FrameRow, PacketRow
+from foosim.vhub.rows import CaptureError, FrameRow, PacketRow
 
 Integers = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -57,6 +58,18 @@ class Packets:
         return Packets(*(getattr(self, field.name)[mask] for field in fields(self)))
 
 
+_WORD: Final = re.compile("[0-9a-f]{16}")
+
+
+def word_of(text: str) -> int | None:
+    """Return the draw that a row tells in hex, None where there is none."""
+    if not text:
+        return None
+    if not _WORD.fullmatch(text):
+        raise CaptureError(f"a draw of {text!r}, it has 16 hex digits")
+    return int(text, 16)
+
+
 _WORDS: Final = frozenset({"loss_word", "jitter_word"})
 _TEXTS: Final = frozenset({"source", "destination", "channel", "fate", "cause", "rule"})
 
@@ -78,7 +91,7 @@ def packet_columns(rows: Iterable[PacketRow]) -> Packets:
             if name in _TEXTS:
                 value = intern(value)
             elif name in _WORDS:
-                value = int(value, 16) if value else None
+                value = word_of(value)
             values.append(value)
     columns: list[Any] = [
         np.frombuffer(integers[field.name], dtype=np.int64) if field.name in integers else _objects(objects[field.name])

@@ -16,6 +16,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Disrupt
 from foosim.protocol.names import nearest_name
+from foosim.vhub.capture_columns import word_of
 from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.figures import EXACT, rate_text, time_text
@@ -310,8 +311,8 @@ class _Story:
         text += f", received {row.received_cdbm / 100.0:g} dBm over {noise:g} dBm of noise: {row.snr_cdb / 100.0:g} dB"
         if row.interference_cdbm:
             text += f", others {row.interference_cdbm / 100.0:g} dBm"
-        if row.error_word:
-            word = int(row.error_word, 16)
+        word = word_of(row.error_word)
+        if word is not None:
             text += f", error rate {row.error_ppm / 1e6:.6g}, draw {_share(word)}"
             facts["error_draw"] = word / UNIT
         return text, facts

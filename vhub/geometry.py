@@ -10,9 +10,8 @@ line is asked for. Neighbours: `rays` (lines and shapes), `protocol.scene` (what
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
 from math import sqrt
-from typing import Final, NamedTuple
+from typing import Final, Generic, NamedTuple, TypeVar
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
@@ -40,24 +39,24 @@ from foosim.protocol.scene import (
 from foosim.protocol.scenes import build_scene
 from foosim.vhub.rays import (
     MARGIN_M,
-    Sides,
+    Pillar,
     Span,
     Triangles,
     box_span,
     boxes_around,
     boxes_met_by,
     cylinder_span,
-    sides_of,
+    pillar_around,
+    pillars_met_by,
     sphere_span,
-    things_met_by,
 )
 
 TOUCH_M: Final = 1e-9
 """A way through something that is no longer than this is a touch; shapes of one thing this close are one."""
-FEW: Final = 128
-"""Up to so many boxes are sooner looked at one by one than all at once."""
+CELL_M: Final = 0.5
+"""Of lines that begin in one cell of this size and end in another it is remembered what of the scenery may be there."""
 PAIRS_KEPT: Final = 4096
-"""Pairs of ends of which it is remembered what of the scenery is between them, at least."""
+"""Pairs of ends, and of cells, of which it is remembered what of the scenery is between them, at least."""
 
 Line = tuple[Vector, Vector]
 """Two ends in the world frame (m)."""
@@ -236,6 +235,33 @@ def _chord(piece: Piece) -> float:
     return chord
 
 
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+class _Memory(Generic[K, V]):
+    """What was worked out lately: what nobody has asked for since PAIRS_KEPT others came is forgotten."""
+
+    def __init__(self) -> None:
+        self._newer: dict[K, V] = {}
+        self._older: dict[K, V] = {}
+
+    def known(self, key: K) -> V | None:
+        """Return what is remembered, None if it is not."""
+        found = self._newer.get(key)
+        if found is None:
+            found = self._older.get(key)
+            if found is not None:
+                self.keep(key, found)
+        return found
+
+    def keep(self, key: K, value: V) -> None:
+        """Remember."""
+        if len(self._newer) >= PAIRS_KEPT:
+            self._older, self._newer = self._newer, {}
+        self._newer[key] = value
+
+
 class Still:
     """The scenery, and what of it lies between pairs of ends that were asked for lately."""
 
@@ -244,32 +270,30 @@ class Still:
         self.groups = _Groups()
         self.solids = self.groups.solids(shapes)
         boxes = [shape_box(solid.shape) for solid in self.solids]
-        self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes])
-        sides = [sides_of(*box) for box in boxes]
-        self._few = list(zip(sides, self.solids, strict=True)) if len(boxes) <= FEW else None
-        self._newer: dict[Line, tuple[Crossing, ...]] = {}
-        self._older: dict[Line, tuple[Crossing, ...]] = {}
+        # A line from cell to cell is within half a cell of the line between their middles.
+        self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes], CELL_M / 2 + MARGIN_M)
+        self._crossed = _Memory[Line, tuple[Crossing, ...]]()
+        self._near = _Memory[tuple[float, ...], list[_Solid]]()
 
     def near(self, line: Line) -> list[_Solid]:
         """Return what of the scenery a line may cross."""
-        if self._few is not None:
-            return things_met_by(self._few, line)
-        return [self.solids[index] for index in boxes_met_by(self._boxes, line)]
-
-    def known(self, line: Line) -> tuple[Crossing, ...] | None:
-        """Return what a line crosses of the scenery, None if that is not remembered."""
-        found = self._newer.get(line)
+        (ax, ay, az), (bx, by, bz) = line
+        cells = ax // CELL_M, ay // CELL_M, az // CELL_M, bx // CELL_M, by // CELL_M, bz // CELL_M
+        found = self._near.known(cells)
         if found is None:
-            found = self._older.get(line)
-            if found is not None:
-                self.keep(line, found)
+            ax, ay, az, bx, by, bz = ((cell + 0.5) * CELL_M for cell in cells)
+            found = [self.solids[index] for index in boxes_met_by(self._boxes, ((ax, ay, az), (bx, by, bz)))]
+            self._near.keep(cells, found)
         return found
 
-    def keep(self, line: Line, crossings: tuple[Crossing, ...]) -> None:
-        """Remember; what nobody has asked for since as many others came is forgotten."""
-        if len(self._newer) >= PAIRS_KEPT:
-            self._older, self._newer = self._newer, {}
-        self._newer[line] = crossings
+    def crossed(self, line: Line) -> tuple[Crossing, ...]:
+        """Return what a line crosses of the scenery."""
+        found = self._crossed.known(line)
+        if found is None:
+            near = self.near(line)
+            found = tuple(sorted(self.groups.crossings(_ray(line), near), key=_by_distance)) if near else ()
+            self._crossed.keep(line, found)
+        return found
 
 
 class _Limb:
@@ -285,23 +309,15 @@ class _Limb:
         self.radius = sqrt(x * x + y * y + z * z) / 2
 
 
-@dataclass(frozen=True, slots=True)
-class _Reach:
-    """How far a body can reach: about its own origin when it is free to move, else in the world."""
-
-    low: Vector
-    high: Vector
-    is_free: bool
-
-
-def _reach(body: Body) -> _Reach:
-    low, high = swept_box(body)
+def _reach(body: Body) -> float | Pillar:
+    """Return how far a body reaches: about its own origin (m) when it is free to move, else in the world."""
+    (lx, ly, lz), (hx, hy, hz) = swept_box(body)
     if body.links[0].joint != "free":
-        return _Reach(low, high, is_free=False)
-    (lx, ly, lz), (hx, hy, hz), (x, y, z) = low, high, body.position
-    far = [max(abs(lx - x), abs(hx - x)), max(abs(ly - y), abs(hy - y)), max(abs(lz - z), abs(hz - z))]
-    radius = sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2])
-    return _Reach((-radius,) * 3, (radius,) * 3, is_free=True)
+        x, y = hx - lx, hy - ly
+        return pillar_around(body.name, lx + x / 2, ly + y / 2, sqrt(x * x + y * y) / 2, lz, hz)
+    x, y, z = body.position
+    x, y, z = max(abs(lx - x), abs(hx - x)), max(abs(ly - y), abs(hy - y)), max(abs(lz - z), abs(hz - z))
+    return sqrt(x * x + y * y + z * z)
 
 
 class Geometry:
@@ -359,8 +375,8 @@ class Sight:
         self._geometry, self._layout, self._numbers = geometry, layout, numbers
         self._found: dict[Key, tuple[Crossing, ...]] = {}
         self._placed: dict[str, list[_Placed]] = {}
-        self._around: list[tuple[Sides, str]] | None = None
-        """Boxes around bodies, with their names."""
+        self._around: list[Pillar] | None = None
+        """What is around bodies."""
 
     def between(self, a: Vector, b: Vector, ignoring: Collection[str] = ()) -> tuple[Crossing, ...]:
         """Return what the line between two points (m, world frame) crosses, the bodies `ignoring` (entities) aside.
@@ -379,36 +395,28 @@ class Sight:
         return found
 
     def look(self, line: Line, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
-        """Work out what a line from its lesser end crosses, for who remembers it: `between` says what that is.
-
-        What of the scenery is remembered is not looked at again.
-        """
-        still = self._geometry.still
-        ray = None
-        standing = still.known(line)
-        if standing is None:
-            solids = still.near(line)
-            ray = _ray(line)
-            standing = tuple(sorted(still.groups.crossings(ray, solids), key=_by_distance)) if solids else ()
-            still.keep(line, standing)
+        """Work out what a line from its lesser end crosses, for who remembers it: `between` says what that is."""
+        standing = self._geometry.still.crossed(line)
         if self._around is None:
-            self._around = self._boxes_around()
-        near = things_met_by(self._around, line)
+            self._around = self._pillars()
+        near = pillars_met_by(self._around, line)
         moving = [solid for name in near if name not in ignoring for solid in self._solids(name, line)]
         if not moving:
             return standing
-        crossed = self._geometry.groups.crossings(ray or _ray(line), moving)
+        crossed = self._geometry.groups.crossings(_ray(line), moving)
         return tuple(sorted((*standing, *crossed), key=_by_distance)) if crossed else standing
 
-    def _boxes_around(self) -> list[tuple[Sides, str]]:
-        """Return a box around each body: however a free one is turned, wherever another one's joints are."""
-        boxes = []
+    def _pillars(self) -> list[Pillar]:
+        """Return a pillar around each body: however a free one is turned, wherever another one's joints are."""
+        pillars = []
         for name, reach in self._geometry.reaches.items():
-            start = self._layout[name].offsets["position"] if reach.is_free else -1
-            x, y, z = self._numbers[start : start + 3] if reach.is_free else ORIGIN
-            (lx, ly, lz), (hx, hy, hz) = reach.low, reach.high
-            boxes.append((sides_of((x + lx, y + ly, z + lz), (x + hx, y + hy, z + hz)), name))
-        return boxes
+            if isinstance(reach, float):
+                start = self._layout[name].offsets["position"]
+                x, y, z = self._numbers[start : start + 3]
+                pillars.append(pillar_around(name, x, y, reach, z - reach, z + reach))
+            else:
+                pillars.append(reach)
+        return pillars
 
     def _solids(self, name: str, line: Line) -> list[_Solid]:
         """Return the solids of a body's links that a line comes near to."""

@@ -20,6 +20,8 @@ from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
 from foosim.vhub.stages.capacity import leave
 from foosim.vhub.stages.delay import Delay
+from foosim.vhub.stages.own import Own
+from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.stage import Stage, arrival_hooks, sending_hooks
 
 if TYPE_CHECKING:
@@ -41,6 +43,7 @@ class Link:
         self._stages: list[Stage] = []
         self._at_sending: list[Callable[[Flight], str]] = []
         self._at_arrival: list[Callable[[Flight, str], str]] = []
+        self._is_apart = False
         self._slots = self._phase_ns = 0
 
     @property
@@ -78,6 +81,12 @@ class Link:
         self._at_sending, self._at_arrival = sending_hooks(self._stages), arrival_hooks(self._stages)
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
+        self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self._stages))
+
+    def is_apart(self, time_ns: int) -> bool:
+        """Whether what is sent at a time shares no radio, queue or air with other links, and no model of one's own."""
+        self._settle(time_ns)
+        return self._is_apart
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """Clogs have changed: give packets on their way, in the order of sending, new due times."""
@@ -89,7 +98,8 @@ class Link:
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
         state = self.state
-        self._settle(flight.sent_ns)
+        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._fabric.timeline.version:
+            self._settle(flight.sent_ns)
         is_offered = flight.copy == 0
         state.offered += is_offered
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
@@ -117,7 +127,8 @@ class Link:
         True when it is delivered, False when it is dropped. `hindered` is why its receiver does not take it; empty when
         it does.
         """
-        self._settle(flight.sent_ns)
+        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._fabric.timeline.version:
+            self._settle(flight.sent_ns)
         state, is_offered = self.state, flight.copy == 0
         for judge in self._at_arrival:
             cause = judge(flight, hindered)

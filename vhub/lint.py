@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, inf, sqrt
+from math import exp, inf
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
@@ -17,7 +17,7 @@ from foosim.protocol.impairments import GilbertElliott, Impairments, Markov4, Ta
 from foosim.protocol.network import LinkRule, Network
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
-from foosim.vhub.jitter import CELLS, interpolate_ns, quantiles_ns
+from foosim.vhub.jitter import interpolate_ns, moments_ns, quantiles_ns
 from foosim.vhub.profiles import NO_RADIO, Profile, Profiles, over, preset_radio
 from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
@@ -285,14 +285,9 @@ def delay_of(settings: Impairments, files: Mapping[str, bytes]) -> tuple[int, in
         return base_ns, 0, base_ns
     table = read_table(files[jitter.file].decode("ascii")) if isinstance(jitter, TableJitter) else ()
     quantiles = quantiles_ns(jitter, table)
-    cells = [(quantiles[n], quantiles[n + 1], 1.0 / CELLS) for n in range(CELLS)]
-    tail = [quantiles[CELLS - 1], *quantiles[CELLS + 1 :]]
-    if len(tail) > 1:
-        cells[-1:] = [(tail[n], tail[n + 1], 1.0 / CELLS / (len(tail) - 1)) for n in range(len(tail) - 1)]
-    mean = sum((low + high) / 2.0 * share for low, high, share in cells)
-    square = sum((low * low + low * high + high * high) / 3.0 * share for low, high, share in cells)
+    mean_ns, sd_ns = moments_ns(quantiles)
     p99_ns = interpolate_ns(quantiles, int(0.99 * 2**64))
-    return base_ns + round(mean), round(sqrt(max(0.0, square - mean * mean))), base_ns + p99_ns
+    return base_ns + round(mean_ns), round(sd_ns), base_ns + p99_ns
 
 
 def _is_air(settings: Radio) -> bool:

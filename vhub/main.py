@@ -8,6 +8,7 @@ core writes goes to the journal before it is spoken; the capture follows behind,
 from __future__ import annotations
 
 import logging
+import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -53,6 +54,8 @@ from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_capt
 from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
+SWITCH_S = 0.0005
+"""For how long the capture's thread may keep the interpreter from the loop; Python's own 5 ms would hold up ticks."""
 FORGET_EVERY_NS = 1_000_000_000
 LOOK_EVERY_NS = 50_000_000
 
@@ -108,6 +111,7 @@ class HubProcess:
         self._loop.took = self.core.waits.took
         self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
+        self.core.speak = self._speak
         self._loop.on_alive = self._on_alive
         self._loop.on_say = self._on_say
         self._loop.on_unwritten = self._on_unwritten
@@ -116,6 +120,7 @@ class HubProcess:
 
     def run(self) -> int:
         """Take part until the end, close the capture, say farewell; return the exit code."""
+        sys.setswitchinterval(SWITCH_S)
         try:
             self._loop.run(self._is_over)
             self._loop.perform()
@@ -170,6 +175,11 @@ class HubProcess:
             except JournalError as error:
                 self._loop.journal = None
                 self._on_unwritten(error)
+
+    def _speak(self, now_ns: int) -> int:
+        """Perform what the core has to say amid a closing; return the time."""
+        self._loop.perform()
+        return time.monotonic_ns()
 
     def _look_at_room(self, room: RoomWatch, now_ns: int) -> None:
         """Say what gets little, and end the run while what is left to be written still fits."""
@@ -246,7 +256,7 @@ class HubProcess:
         self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         radio = Wire(session, Plane.RADIO, self._inbox, VHUB)
         self._loop.connect(radio)
-        radio.read(channels.VHUB_READS)
+        radio.read(channels.VHUB_READS, channels.VHUB_WAITS)
         radio.watch_alive()
         radio.declare_alive()
 

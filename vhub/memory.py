@@ -31,7 +31,7 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """One transmission as the queue and the medium saw it; a broadcast's receivers share it."""
+    """A broadcast as the queue and the medium saw it; its receivers share it."""
 
     sequence: int
     copy: int
@@ -67,10 +67,10 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     opportunity_bytes: int = 0
     """How far a trace of capacity is used up."""
     last: Sending | None = None
-    """The last transmission."""
+    """The last broadcast."""
 
     def sending(self, sequence: int, copy: int) -> Sending | None:
-        """Return the last transmission if it is that of a packet: a broadcast's receivers share it."""
+        """Return the last broadcast if it is that of a packet: its receivers share it."""
         last = self.last
         return last if last is not None and last.sequence == sequence and last.copy == copy else None
 

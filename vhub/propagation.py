@@ -7,7 +7,7 @@ decides nothing. Neighbours: `radio` (the formulas), `world` (places and walls),
 from __future__ import annotations
 
 from dataclasses import replace
-from math import sqrt
+from math import inf, sqrt
 from typing import Final, NamedTuple
 
 from foosim.protocol.draws import draw_key, draw_words
@@ -54,18 +54,22 @@ class Path(NamedTuple):
     cause: str
 
 
+UNKNOWN: Final[Vector] = (inf, inf, inf)
 NOWHERE: Final = Path(0, (), 0, 0, 0, OUT_OF_RANGE)
 """Before anything is known of the ends."""
 
 
-class _Way(NamedTuple):
-    """What the last path between two bodies came from: the number of the frame, both places, what was between them."""
+class _Way:
+    """The last path between two bodies, and what it came from: the frame's number, both places, what was between."""
 
-    turns: int
-    a: Vector
-    b: Vector
-    crossings: tuple[Crossing, ...]
-    path: Path
+    __slots__ = ("a", "b", "crossings", "ends", "path", "turns")
+
+    def __init__(self, ends: frozenset[str]) -> None:
+        self.ends = ends
+        self.turns = -1
+        self.a = self.b = UNKNOWN
+        self.crossings: tuple[Crossing, ...] = ()
+        self.path = NOWHERE
 
 
 def crossing_db(crossing: Crossing, frequency_hz: float) -> float:
@@ -142,21 +146,18 @@ class Propagation:
         if a > b:
             a, b, one, other = b, a, other, one
         key = one, other
-        known = self._ways.get(key)
-        if known is not None and known.a == a and known.b == b:
-            if known.turns == self.world.turns:
-                return known.path
-        else:
-            known = None
-        distance_m = _distance_m(a, b)
-        is_within = self._range_m is None or distance_m <= self._range_m
-        crossings = self.world.crossings(a, b, frozenset(key)) if is_within else ()
-        if known is None or crossings != known.crossings:
-            path = self._find(a, b, distance_m, crossings, frozenset(key)) if is_within else _out_of_range(distance_m)
-        else:
-            path = known.path
-        self._ways[key] = _Way(self.world.turns, a, b, crossings, path)
-        return path
+        turns, way = self.world.turns, self._ways.get(key)
+        if way is None:
+            way = self._ways[key] = _Way(frozenset(key))
+        has_moved = way.a != a or way.b != b
+        if has_moved or way.turns != turns:
+            if self._range_m is not None and _distance_m(a, b) > self._range_m:
+                return Path(round(_distance_m(a, b) * 1000.0), (), 0, 0, 0, OUT_OF_RANGE)
+            crossings = self.world.crossings(a, b, way.ends)
+            if has_moved or crossings != way.crossings:
+                way.a, way.b, way.crossings, way.path = a, b, crossings, self._find(a, b, crossings, way.ends)
+            way.turns = turns
+        return way.path
 
     def hears(self, a: Vector, b: Vector, source: str, destination: str, power_cdbm: int) -> bool:
         """Whether who is at `b` senses what is sent with a power at `a`.
@@ -226,10 +227,9 @@ class Propagation:
         least_cdb = min(least_cdb, behind_cdb)
         return least_cdb, max(centi(nlos_db + shadow_db), behind_cdb)
 
-    def _find(
-        self, a: Vector, b: Vector, distance_m: float, crossings: tuple[Crossing, ...], ends: frozenset[str]
-    ) -> Path:
-        distance_mm, frequency_hz = round(distance_m * 1000.0), self.settings.frequency_hz
+    def _find(self, a: Vector, b: Vector, crossings: tuple[Crossing, ...], ends: frozenset[str]) -> Path:
+        distance_m, frequency_hz = _distance_m(a, b), self.settings.frequency_hz
+        distance_mm = round(distance_m * 1000.0)
         walls = tuple([crossing.name for crossing in crossings])
         walls_db = 0.0
         for crossing in crossings:
@@ -242,7 +242,3 @@ class Propagation:
         )
         shadow_db = shadowing_db(self._key, a, b, self._sigmas[is_nlos], self._correlations[is_nlos])
         return Path(distance_mm, walls, centi(walls_db), centi(loss_db + shadow_db), centi(shadow_db), "")
-
-
-def _out_of_range(distance_m: float) -> Path:
-    return Path(round(distance_m * 1000.0), (), 0, 0, 0, OUT_OF_RANGE)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from math import inf, sqrt
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,47 +95,38 @@ def cylinder_span(start: Vector, way: Vector, radius: float, half_length: float)
     return (enter, leave) if enter < leave else None
 
 
-Sides = tuple[float, float, float, float, float, float, float, float, float, float]
-"""A box along the axes: least and greatest x, y and z; its middle and half of its lengths in x and y (m)."""
-T = TypeVar("T")
+Pillar = tuple[float, float, float, float, float, str]
+"""An upright cylinder around a body: its x and y, the square of its radius, its least and greatest z (m); its name."""
 
 
-def sides_of(low: Vector, high: Vector) -> Sides:
-    """Return the sides of a box for `things_met_by`, with a margin."""
-    (lx, ly, lz), (hx, hy, hz), gap = low, high, MARGIN_M
-    middle_x, middle_y = lx + (hx - lx) / 2, ly + (hy - ly) / 2
-    half_x, half_y = (hx - lx) / 2 + gap, (hy - ly) / 2 + gap
-    return lx - gap, hx + gap, ly - gap, hy + gap, lz - gap, hz + gap, middle_x, middle_y, half_x, half_y
+def pillar_around(name: str, x: float, y: float, radius: float, low_z: float, high_z: float) -> Pillar:
+    """Return a pillar with a margin."""
+    radius += MARGIN_M
+    return x, y, radius * radius, low_z - MARGIN_M, high_z + MARGIN_M, name
 
 
-def things_met_by(boxes: Iterable[tuple[Sides, T]], line: tuple[Vector, Vector]) -> list[T]:
-    """Return the things whose boxes a line from its lesser end comes near to, seen along the axes and from above.
-
-    As `boxes_met_by` it only says where to look, and soonest where there are few boxes. Seen from above a box is beside
-    a line when its middle is farther from it than its corners reach.
-    """
+def pillars_met_by(pillars: Iterable[Pillar], line: tuple[Vector, Vector]) -> list[str]:
+    """Return the names whose pillars a line may pass, seen from above as if it had no ends: it says where to look."""
     (ax, ay, az), (bx, by, bz) = line
     way_x, way_y = bx - ax, by - ay
-    side_y = abs(way_y)
-    (low_y, high_y), (low_z, high_z) = (ay, by) if ay <= by else (by, ay), (az, bz) if az <= bz else (bz, az)
+    square = way_x * way_x + way_y * way_y
+    low_z, high_z = (az, bz) if az <= bz else (bz, az)
     return [
-        thing
-        for (lx, hx, ly, hy, lz, hz, x, y, half_x, half_y), thing in boxes
-        if hx >= ax
-        and lx <= bx
-        and hy >= low_y
-        and ly <= high_y
-        and hz >= low_z
-        and lz <= high_z
-        and abs((x - ax) * way_y - (y - ay) * way_x) <= half_x * side_y + half_y * way_x
+        name
+        for x, y, reach, low, high, name in pillars
+        if high >= low_z
+        and low <= high_z
+        and (aside := (x - ax) * way_y - (y - ay) * way_x) * aside <= reach * square
     ]
 
 
-def boxes_around(lows: Sequence[Vector] | Floats, highs: Sequence[Vector] | Floats) -> Floats:
+def boxes_around(
+    lows: Sequence[Vector] | Floats, highs: Sequence[Vector] | Floats, margin_m: float = MARGIN_M
+) -> Floats:
     """Return boxes (m of them) for `boxes_met_by`, shape (2, 3, m), with a margin."""
     boxes = np.array([lows, highs], dtype=np.float64).reshape(2, -1, 3)
-    boxes[0] -= MARGIN_M
-    boxes[1] += MARGIN_M
+    boxes[0] -= margin_m
+    boxes[1] += margin_m
     return np.ascontiguousarray(boxes.transpose(0, 2, 1))
 
 

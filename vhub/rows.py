@@ -37,7 +37,8 @@ CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
 DigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 EntityDigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{16}$")]
 ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
-WordHex = Annotated[str, Meta(pattern="^([0-9a-f]{16})?$")]
+WordHex = Annotated[str, Meta(extra_json_schema={"type": "string", "pattern": "^([0-9a-f]{16})?$"})]
+"""Checked by `capture_columns.word_of` and not with its row: that would take a reader as long as the row's decoding."""
 Fate = Literal["delivered", "dropped", "in_flight"]
 
 
@@ -330,13 +331,16 @@ def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
 
 
 _FATES: Final[Mapping[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
+_LOSS: Final = int(Slot.LOSS)
+_JITTER: Final = int(Slot.JITTER)
+_ERROR: Final = int(Slot.ERROR)
 
 
 def packet_row(flight: Flight) -> PacketRow:
     """Return the row of a packet whose fate is final, or that is in flight at the end."""
     fate = _FATES.get(flight.cause, DROPPED)
     on_its_way = flight.arrival_tick >= 0
-    slots, words = flight.slots, flight.words
+    slots, words, payload = flight.slots, flight.words, flight.payload
     return PacketRow(
         flight.source,
         flight.sequence,
@@ -350,10 +354,10 @@ def packet_row(flight: Flight) -> PacketRow:
         fate,
         flight.cause if fate is DROPPED else "",
         flight.rule,
-        f"{words[Slot.LOSS]:016x}" if slots & _LOSS else "",
-        f"{words[Slot.JITTER]:016x}" if slots & _JITTER and on_its_way else "",
-        len(flight.payload),
-        flight.payload,
+        words[_LOSS].to_bytes(8).hex() if slots >> _LOSS & 1 else "",
+        words[_JITTER].to_bytes(8).hex() if slots >> _JITTER & 1 and on_its_way else "",
+        len(payload),
+        payload,
         flight.released_wall_ns,
         flight.radio,
         flight.published,
@@ -373,25 +377,23 @@ def packet_row(flight: Flight) -> PacketRow:
     )
 
 
-_LOSS: Final = 1 << Slot.LOSS
-_JITTER: Final = 1 << Slot.JITTER
 
 
 def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
     """Return what the stages of a radio found, in the order of a row."""
-    threshold = flight.error_threshold
+    threshold, walls = flight.error_threshold, flight.walls
     return (
         flight.distance_mm,
-        list(flight.walls),
+        list(walls) if walls else [],
         flight.walls_cdb,
         flight.path_loss_cdb,
         flight.shadowing_cdb,
         flight.fading_cdb,
         flight.received_cdbm,
         flight.snr_cdb,
-        level_cdbm(flight.interference),
+        level_cdbm(flight.interference) if flight.interference else 0,
         threshold * 1_000_000 >> 64,
-        f"{flight.words[Slot.ERROR]:016x}" if threshold else "",
+        flight.words[_ERROR].to_bytes(8).hex() if threshold else "",
         flight.contenders,
         flight.retries,
     )

@@ -276,7 +276,7 @@ class Motes:
 
 
 @pytest.mark.parametrize("size", [20, 50, 100])
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 10])
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 10, 20])
 def test_802154_against_its_stations(n: int, size: int) -> None:
     """The closed loop through the access function against the stations: throughput, delay, and what is lost and why."""
     airtime_ns = lrwpan_airtime_ns(size)

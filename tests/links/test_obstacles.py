@@ -11,12 +11,13 @@ import pytest
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
+from foosim.protocol.radios import Shadowing
 from foosim.protocol.scene import Vector
 from foosim.protocol.start import initial_frame, place_ball
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.materials import slab_loss_db
-from tests.links.offered import deployment_of
+from tests.links.offered import deployment_of, uniforms
 from tests.links.proof import Proof
 
 HIGH: Final = 0.5
@@ -146,3 +147,29 @@ def test_strict_sight_is_cut_by_anything() -> None:
         fabric.turn_to(frame_with(fabric.deployment, (0.0, y, HIGH), tick))
         causes.append(heard(fabric, sequence=tick + 1).cause)
     assert causes == ["", "blocked", ""]
+
+
+@pytest.mark.parametrize("path_loss", ["environment: indoor", "environment: urban_micro", FREE,
+                                       "environment: indoor, range: 30 m",
+                                       "environment: indoor, strict_los: true"])  # fmt: skip
+def test_a_station_senses_what_the_path_says(path_loss: str) -> None:
+    """Whatever is known without looking for walls: at every power, near and far, beside walls and behind them."""
+    things = [wall("concrete", at=at).replace("wall:", f"wall-{at[0]}:") for at in ("3 m", "6 m", "9 m")]
+    deployment = world(*things, path_loss=path_loss)
+    shadowed = deployment.network.radios["r"].model_copy(update={"shadowing": Shadowing()})
+    network = deployment.network.model_copy(update={"radios": {"r": shadowed}})
+    fabric = Fabric(deployment, network)
+    fabric.turn_to(frame_with(deployment, AWAY))
+    budget = fabric.link("a", "b", "data").setup_at(0).budget
+    assert budget is not None
+    of, heard_by = budget.propagation, [0, 0]
+    places = iter(uniforms(600, 7, "places"))
+    for ax, ay, bx, by in zip(places, places, places, places, strict=True):
+        a, b = (30.0 * ax - 10.0, 8.0 * ay - 4.0, HIGH), (90.0 * bx - 30.0, 8.0 * by - 4.0, 1.4)
+        path = of.path(a, b, "a", "b")
+        for power_cdbm in (-9000, *range(-2500, 3000, 500)):
+            senses = not path.cause and path.loss_cdb <= power_cdbm + of.gain_cdb - of.sense_cdbm
+            assert of.hears(a, b, "a", "b", power_cdbm) == senses
+            assert of.hears(b, a, "b", "a", power_cdbm) == senses
+            heard_by[senses] += 1
+    assert min(heard_by) > 60

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foosim.protocol.draws import UNIT
+from foosim.vhub.radio.airtime import wifi_ack_ns, wifi_airtime_ns
 from foosim.vhub.radio.errors import (
     DOT11P_MODES,
     HT_MODES,
@@ -18,7 +19,6 @@ from foosim.vhub.radio.errors import (
     LORA_SENSITIVITY_DBM,
     MODES,
     WIFI_MODES,
-    ideal_rate,
     lora_interferer,
     lora_received,
     lte_harq,
@@ -26,6 +26,8 @@ from foosim.vhub.radio.errors import (
     per_threshold,
     snr_needed,
 )
+from foosim.vhub.radio.frames import WifiFrames
+from foosim.vhub.radio.timings import WIFI_5
 from tests.links.statistics import Z_ALPHA, binomial_z
 
 # Share of frames of 2000 bytes that get through, by Mb/s and dB: numbers of ns-3's wifi-error-rate-models test (NIST).
@@ -150,14 +152,21 @@ def test_half_the_bandwidth_is_half_the_rate_at_the_same_ratio() -> None:
     ]
 
 
-def test_rate_control() -> None:
-    assert ideal_rate(WIFI_MODES, 3000, 1500) == "ofdm_54"
-    assert ideal_rate(WIFI_MODES, -500, 1500) == "ofdm_6", "none is good: the slowest"
-    for mode, following in pairwise(WIFI_MODES[2:]):
-        needed = snr_needed(following, 1500)
-        assert ideal_rate(WIFI_MODES, needed, 1500) == following
-        assert ideal_rate(WIFI_MODES, needed - 1, 1500) == mode
-    assert ideal_rate(HT_MODES, 2500, 300) == "ht_mcs7"
+@pytest.mark.parametrize("modes", [WIFI_MODES, HT_MODES, DOT11P_MODES])
+def test_rate_control_takes_the_fastest_with_few_errors(modes: tuple[str, ...]) -> None:
+    frames = WifiFrames(modes, WIFI_5)
+    for size in (1, 300, 1464):
+        for snr in range(-600, 3200, 7):
+            good = [mode for mode in modes if per_threshold(mode, snr, size + 36) <= 0.1 * UNIT]
+            frame = frames.unicast(size, snr)
+            assert frame.mode == (good or modes)[-1 if good else 0], (size, snr)
+            assert frame.airtime_ns == wifi_airtime_ns(frame.mode, size, WIFI_5)
+            assert frame.ack_ns == wifi_ack_ns(frame.mode, WIFI_5)
+    assert frames.unicast(300, -10_000).mode == frames.broadcast(300).mode == modes[0], "none is good: the slowest"
+    assert frames.unicast(300, 10_000).mode == modes[-1]
+    fixed = WifiFrames(modes, WIFI_5, modes[3])
+    assert {fixed.unicast(300, snr).mode for snr in range(-3000, 3000, 100)} == {modes[3]}
+    assert fixed.broadcast(300).mode == modes[3]
 
 
 # --- LoRa and LTE ----------------------------------------------------------------------------------------------------

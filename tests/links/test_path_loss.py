@@ -255,3 +255,14 @@ def test_metal_is_capped() -> None:
 def test_an_environment_must_have_its_curve() -> None:
     with pytest.raises(AssertionError):
         Environment("none").los_db(1.0, 1e9, (1.0, 1.0))
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_nothing_is_lost_beyond_what_is_lost_between_antennas_on_the_ground(name: str) -> None:
+    environment = ENVIRONMENTS[name]
+    for distance_m, f_ghz in [*POINTS, (0.1, 5.25), (5_000.0, 2.0), (20_000.0, 0.868)]:
+        most_db = environment.nlos_db(distance_m, f_ghz * 1e9, (0.0, 0.0))
+        for heights_m in [(0.0, 0.0), (0.2, 1.0), (1.5, 3.0), (2.0, 25.0), (30.0, 30.0)]:
+            los_db, nlos_db = environment.both_db(distance_m, f_ghz * 1e9, heights_m)
+            assert los_db == environment.los_db(distance_m, f_ghz * 1e9, heights_m)
+            assert los_db <= nlos_db <= most_db + 1e-9

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.vhub.radio import shadowing
-from foosim.vhub.radio.shadowing import field, shadowing_db
+from foosim.vhub.radio.shadowing import field, shadowing_db, shadowing_max_db
 from tests.links.statistics import ALPHA, Z_ALPHA, correlation, ks_normal, mean_and_deviation
 
 KEY = draw_key(1, "shadowing")
@@ -78,6 +78,8 @@ def test_it_is_the_same_both_ways_to_the_last_bit(
     assert there == shadowing_db(KEY, b, a, sigma, d_corr)
     assert there == shadowing_db(KEY, (a[0], a[1], 0.0), b, sigma, d_corr), "the height does not enter"
     assert abs(there) < 12 * sigma
+    shares = (shadowing_max_db(KEY, place, sigma, d_corr) for place in (a, b))
+    assert there <= sum(shares) + 1e-9, "no more than the shares of both ends"
 
 
 def test_it_is_the_same_on_every_visit_in_any_order() -> None:

@@ -217,9 +217,7 @@ class Reader:
 
     def __init__(self, path: Path, span: Span, entries_max: int = 1000) -> None:
         self.woken = threading.Event()
-        self.ahead = ReadAhead(
-            path, deployment_of(read_about(path)), Selection(), span, entries_max, self.woken.set
-        )
+        self.ahead = ReadAhead(path, deployment_of(read_about(path)), Selection(), span, entries_max, self.woken.set)
 
     def take(self) -> Read:
         while (read := self.ahead.take()) is None:

@@ -90,7 +90,8 @@ WIFI_MODES: Final = tuple(mode.name for mode in MODES.values() if mode.family ==
 HT_MODES: Final = tuple(mode.name for mode in MODES.values() if mode.family == "ht")
 DOT11P_MODES: Final = tuple(mode.name for mode in MODES.values() if mode.family == "ofdm10")
 DOT11N_MODES: Final = ("ofdm_6", *HT_MODES)
-"""Each in order of rising rate, as `ideal_rate` wants it. The first is that of broadcasts; 802.11n's is one of old."""
+"""Each in order of rising rate, as `frames.WifiFrames` wants it. The first is that of broadcasts; 802.11n's is one of
+old."""
 
 
 def _bit_error(points: int, snr: float) -> float:
@@ -149,20 +150,8 @@ def per_threshold(mode: str, snr_centi_db: int, size_bytes: int) -> int:
     return int(-expm1(8 * size_bytes * log1p(-bit)) * UNIT)
 
 
-_GOOD: Final = int(GOOD_PER * UNIT)
-
-
-@lru_cache(maxsize=262_144)
-def ideal_rate(modes: tuple[str, ...], snr_centi_db: int, size_bytes: int) -> str:
-    """Return the last of `modes` (in order of rising rate) with at most 10 % errors; the first when there is none."""
-    for mode in reversed(modes):
-        if per_threshold(mode, snr_centi_db, size_bytes) <= _GOOD:
-            return mode
-    return modes[0]
-
-
 def snr_needed(mode: str, size_bytes: int, per: float = GOOD_PER) -> int:
-    """Return the least ratio, in hundredths of a dB, with at most `per` errors: for what a configuration means."""
+    """Return the least ratio, in hundredths of a dB, with at most `per` errors: from there on there are fewer."""
     low, high, most = SNR_MIN, SNR_MAX, int(per * UNIT)
     while low < high:
         middle = (low + high) // 2

@@ -13,7 +13,7 @@ from foosim.vhub.propagation import OUT_OF_RANGE
 from foosim.vhub.radio.errors import lora_interferer, lora_received
 from foosim.vhub.radio.noise import level_of
 from foosim.vhub.setup import LinkSetup
-from foosim.vhub.stages.medium import COLLISION, SNR, error_threshold
+from foosim.vhub.stages.medium import COLLISION, SNR, error_curve
 from foosim.vhub.stages.stage import Stage
 
 
@@ -23,17 +23,19 @@ class Channel(Stage):
     def __init__(self, setup: LinkSetup) -> None:
         assert setup.budget is not None
         self._budget, self._air = setup.budget, setup.air
-        self._settings = setup.settings
+        self._factor = setup.settings.spreading_factor if setup.settings.medium == "lora" else 0
+        self._is_gateway = setup.settings.gateway
+        self._curve = error_curve(setup.settings)
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Channel | None:
         return cls(setup) if setup.is_radio else None
 
     def at_sending(self, flight: Flight) -> str:
-        if flight.outcome:
+        if flight.outcome or flight.is_settled:
             return flight.outcome
         cause = self._judge(flight)
-        if not cause and self._air is not None and not flight.is_settled:
+        if not cause and self._air is not None:
             self._air.listen(flight, self._budget.propagation)
             cause = self._judge(flight) if flight.interference else ""
         return cause
@@ -45,24 +47,23 @@ class Channel(Stage):
         """Return why the signal is lost, with all that is known of others by now."""
         if flight.interference >= DEAF:
             return COLLISION
-        if self._settings.medium == "lora":
+        if self._factor:
             return self._judge_lora(flight)
-        if flight.is_settled or not flight.words:
+        if self._curve is None or not flight.words:
             return ""
-        clear = error_threshold(self._settings, flight, flight.snr_cdb)
-        flight.error_threshold = clear
+        clear = flight.error_threshold = self._curve(flight, flight.snr_cdb)
         word = flight.words[Slot.ERROR]
         if word < clear:
             return SNR
         if flight.interference:
-            flight.error_threshold = error_threshold(self._settings, flight, self._budget.ratio_cdb(flight))
+            flight.error_threshold = self._curve(flight, self._budget.ratio_cdb(flight))
         return COLLISION if word < flight.error_threshold else ""
 
     def _judge_lora(self, flight: Flight) -> str:
         """LoRa captures: a signal survives others that are together weaker by their spreading factor's isolation."""
-        factor = self._settings.spreading_factor
+        factor = self._factor
         power_dbm = flight.received_cdbm / 100.0
-        if not lora_received(factor, power_dbm, self._settings.gateway):
+        if not lora_received(factor, power_dbm, self._is_gateway):
             flight.error_threshold = UNIT
             return OUT_OF_RANGE
         if not flight.by_factor:

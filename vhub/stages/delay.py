@@ -8,12 +8,15 @@ had been known when they were sent. Neighbours: `jitter` makes the table.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Final
 
 from foosim.protocol.draws import Slot, chance_threshold
 from foosim.vhub.jitter import interpolate_ns, quantiles_ns
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.stage import Stage
+
+_JITTER: Final = int(Slot.JITTER)
 
 
 class Delay(Stage):
@@ -43,19 +46,22 @@ class Delay(Stage):
         spent_ns = flight.phase_ns + flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
         due_ns = flight.sent_ns + spent_ns + self._delay_ns + flight.model_ns
         if self._quantiles_ns:
-            flight.jitter_ns = interpolate_ns(self._quantiles_ns, flight.words[Slot.JITTER])
-            due_ns += flight.jitter_ns
+            flight.jitter_ns = jitter_ns = interpolate_ns(self._quantiles_ns, flight.words[_JITTER])
+            due_ns += jitter_ns
         if flight.is_bad:
             due_ns += self._bad_ns
-        if self._is_late(flight):
+        is_late = self._extra_ns > 0 and self._is_late(flight)
+        if is_late:
             due_ns += self._extra_ns
-            flight.due_ns = self._held_ns(due_ns)
-        else:
-            flight.due_ns = self._in_order(self._held_ns(due_ns), self._memory.last_due_ns)
-            if self._fifo:
-                self._memory.last_due_ns = flight.due_ns
+        held_ns = self._held_ns(due_ns) if self._holds else due_ns
+        if self._fifo and not is_late:
+            memory = self._memory
+            if held_ns <= memory.last_due_ns:
+                held_ns = memory.last_due_ns + 1
+            memory.last_due_ns = held_ns
+        flight.due_ns = held_ns
         if self._holds:
-            flight.held_ns = flight.due_ns - due_ns
+            flight.held_ns = held_ns - due_ns
         return ""
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:

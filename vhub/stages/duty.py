@@ -28,7 +28,8 @@ class Duty(Stage):
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
-        if self._broadcasts and flight.published:
+        broadcast = self._broadcasts and flight.published
+        if broadcast:
             shared = sender.sending(flight.sequence, flight.copy)
             if shared is not None:
                 return DUTY_CYCLE if shared.cause == DUTY_CYCLE else ""
@@ -39,7 +40,8 @@ class Duty(Stage):
         sender.tokens_at_ns = flight.sent_ns
         airtime_ns = self._airtime_ns(len(flight.payload))
         if airtime_ns > sender.tokens_ns:
-            sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
+            if broadcast:
+                sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
             return DUTY_CYCLE
         sender.tokens_ns -= airtime_ns
         return ""

@@ -8,6 +8,7 @@ Neighbours: `queue` (what waits before), `air` (who is on air), `radio` (the for
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Final
@@ -25,10 +26,9 @@ from foosim.vhub.radio.airtime import (
     lora_airtime_ns,
     lrwpan_airtime_ns,
     serialisation_ns,
-    wifi_ack_ns,
-    wifi_airtime_ns,
 )
 from foosim.vhub.radio.contention import Access, Outcome, Words, csma_access, wifi_access
+from foosim.vhub.radio.frames import WifiFrames
 from foosim.vhub.radio.timings import (
     CATEGORIES,
     DOT11P,
@@ -44,6 +44,7 @@ from foosim.vhub.stages.stage import Stage
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
+LRWPAN_MODE: Final = "oqpsk_250"
 ACCESS_BLOCK: Final = 16
 """From here on the blocks of a packet's draws are those of its attempts."""
 BASE_STATION_DBM: Final = 30.0
@@ -114,72 +115,72 @@ class OnAir(Stage):
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
-        self._once = setup.sends_once
+        self._once, self._factor = setup.sends_once, setup.settings.spreading_factor
 
     def at_sending(self, flight: Flight) -> str:
         cause = self._budget.measure(flight)
-        broadcast = flight.published and self._once
-        last = self._sender.sending(flight.sequence, flight.copy)
-        assert last is not None, "the queue remembers what it lets through"
-        if broadcast and last.is_ready:
-            self._share(flight, last)
+        if flight.published and self._once:
+            shared = self._sender.sending(flight.sequence, flight.copy)
+            assert shared is not None, "the queue remembers what it lets through"
+            if not shared.is_ready:
+                self._transmit(flight, True, cause)
+                self._note(flight, shared)
+            else:
+                self._share(flight, shared)
         else:
-            flight.rate_bps = self.rate_bps(flight, broadcast)
-            self._transmit(flight, last, broadcast, cause)
+            self._transmit(flight, False, cause)
         if cause:
             flight.outcome = cause
         return COLLISION if flight.outcome == COLLISION else ""
 
-    def _share(self, flight: Flight, last: Sending) -> None:
-        """Take a broadcast's times from its first receiver."""
-        flight.access_ns, flight.airtime_ns = last.access_ns, last.airtime_ns
-        flight.air_start_ns, flight.air_end_ns = last.start_ns, last.end_ns
-        flight.contenders, flight.rate_bps, flight.outcome = last.contenders, last.rate_bps, last.outcome
+    def _note(self, flight: Flight, shared: Sending) -> None:
+        """Remember what a broadcast's first receiver found out, for the others."""
+        shared.access_ns, shared.airtime_ns = flight.access_ns, flight.airtime_ns
+        shared.start_ns, shared.end_ns = flight.air_start_ns, flight.air_end_ns
+        shared.contenders, shared.rate_bps, shared.outcome = flight.contenders, flight.rate_bps, flight.outcome
+        shared.is_ready = True
 
-    def _transmit(self, flight: Flight, last: Sending, broadcast: bool, cause: str) -> None:
-        sender, air = self._sender, self._air
+    def _share(self, flight: Flight, shared: Sending) -> None:
+        """Take a broadcast's times from its first receiver."""
+        flight.access_ns, flight.airtime_ns = shared.access_ns, shared.airtime_ns
+        flight.air_start_ns, flight.air_end_ns = shared.start_ns, shared.end_ns
+        flight.contenders, flight.rate_bps, flight.outcome = shared.contenders, shared.rate_bps, shared.outcome
+
+    def _transmit(self, flight: Flight, broadcast: bool, cause: str) -> None:
+        sender, air, source = self._sender, self._air, flight.source
         air.advance(flight.sent_ns)
         ready_ns = max(flight.sent_ns + flight.phase_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
-        access, airtime_ns = self.access(flight, broadcast, UNIT if cause else None)
-        end_ns, until_ns = start_ns + access.delay_ns, start_ns + access.occupancy_ns
-        flight.air_start_ns, flight.air_end_ns = end_ns - airtime_ns, end_ns
-        flight.airtime_ns = min(airtime_ns, access.delay_ns)
-        flight.access_ns = end_ns - ready_ns - flight.airtime_ns
-        flight.retries = access.retries
-        if access.outcome == "ok":
-            flight.is_settled = not broadcast and self.is_acknowledged
+        (delay_ns, occupancy_ns, retries, _, outcome), air_ns = self.access(flight, broadcast, UNIT if cause else None)
+        end_ns, until_ns = start_ns + delay_ns, start_ns + occupancy_ns
+        flight.air_start_ns, flight.air_end_ns = end_ns - air_ns, end_ns
+        flight.airtime_ns = airtime_ns = min(air_ns, delay_ns)
+        flight.access_ns = end_ns - ready_ns - airtime_ns
+        flight.retries = retries
+        if outcome == "ok":
+            flight.is_settled = self.is_acknowledged and not broadcast
         else:
-            flight.outcome = COLLISION if access.outcome in ("collision", "busy") else SNR
+            flight.outcome = COLLISION if outcome in ("collision", "busy") else SNR
         sender.free_ns = until_ns
         sender.waiting.append((until_ns, len(flight.payload)))
-        last.access_ns, last.airtime_ns, last.start_ns = flight.access_ns, flight.airtime_ns, flight.air_start_ns
-        last.end_ns, last.contenders, last.rate_bps = end_ns, flight.contenders, flight.rate_bps
-        last.outcome, last.is_ready = flight.outcome, True
         of = self._budget.propagation
-        place, power = of.antenna(flight.source), of.power_cdbm
-        times = flight.air_start_ns, end_ns, until_ns
-        factor = self._settings.spreading_factor
-        air.register(Transmission(flight.source, flight.sequence, flight.copy, *times, place, power, factor))
+        what = source, flight.sequence, flight.copy, end_ns - air_ns, end_ns, until_ns
+        air.register(Transmission(*what, of.antenna(source), of.power_cdbm, self._factor))
 
     # --- what media differ in ----------------------------------------------------------------------------------------
 
     is_acknowledged = False
-
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
-        """Return the bit rate of a packet; 0 where there is none."""
-        return self._settings.rate_bps or 0
 
     def turn(self, ready_ns: int) -> tuple[int, int]:
         """Return when the sender gets its turn, and how many contend."""
         return ready_ns, 1
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        """Return what becomes of a packet on the medium, and how long it is on air once.
+        """Return what becomes of a packet on the medium, and how long it is on air once; write its bit rate.
 
         `lost` is the threshold for errors of a packet that cannot get through; None where the signal decides.
         """
-        rate_bps = flight.rate_bps
+        rate_bps = flight.rate_bps = self._settings.rate_bps or 0
         airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, rate_bps) if rate_bps else 0
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
@@ -216,16 +217,30 @@ def mode_of(modes: tuple[str, ...], rate_bps: int) -> str:
     return min(modes, key=lambda mode: (abs(errors.MODES[mode].rate_bps - rate_bps), mode))
 
 
-def error_threshold(settings: Radio, flight: Flight, snr_cdb: int) -> int:
-    """Return the packet error rate at a ratio, in units of 2^-64; 0 on media that have no curve."""
+Curve = Callable[[Flight, int], int]
+"""Gives the packet error rate of a packet at a ratio (0.01 dB), in units of 2^-64."""
+
+
+def error_curve(settings: Radio) -> Curve | None:
+    """Return the curve of a radio's errors; None on media that have none."""
     if settings.medium == "wifi":
-        mode = mode_of(wifi_modes(settings), flight.rate_bps)
-        return errors.per_threshold(mode, snr_cdb, len(flight.payload) + WIFI_OVERHEAD_BYTES)
+        modes = {errors.MODES[mode].rate_bps: mode for mode in wifi_modes(settings)}
+        return lambda flight, snr_cdb: errors.per_threshold(
+            modes[flight.rate_bps], snr_cdb, len(flight.payload) + WIFI_OVERHEAD_BYTES
+        )
     if settings.medium == "ieee802154":
-        return errors.per_threshold("oqpsk_250", snr_cdb, len(flight.payload) + LRWPAN_OVERHEAD_BYTES)
+        return lambda flight, snr_cdb: errors.per_threshold(
+            LRWPAN_MODE, snr_cdb, len(flight.payload) + LRWPAN_OVERHEAD_BYTES
+        )
     if settings.medium == "lte":
-        return UNIT if snr_cdb < errors.LTE_FLOOR_CENTI_DB else 0
-    return 0
+        return lambda flight, snr_cdb: UNIT if snr_cdb < errors.LTE_FLOOR_CENTI_DB else 0
+    return None
+
+
+@lru_cache(maxsize=64)
+def _wifi_frames(modes: tuple[str, ...], timing: WifiTiming, fixed: str | None) -> WifiFrames:
+    """Links of one kind of radio share what is known of its frames."""
+    return WifiFrames(modes, timing, fixed)
 
 
 class WiFi(OnAir):
@@ -235,31 +250,26 @@ class WiFi(OnAir):
 
     def __init__(self, setup: LinkSetup) -> None:
         super().__init__(setup)
-        self._modes = wifi_modes(setup.settings)
-        self._timing = wifi_timing(setup.settings)
-
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
-        """The fixed rate; else a broadcast goes at the lowest, a unicast at the highest with few errors."""
-        settings = self._settings
-        if settings.rates == "fixed":
-            return errors.MODES[mode_of(self._modes, settings.fixed_rate_bps)].rate_bps
-        if broadcast:
-            return errors.MODES[self._modes[0]].rate_bps
-        size = len(flight.payload) + WIFI_OVERHEAD_BYTES
-        return errors.MODES[errors.ideal_rate(self._modes, flight.snr_cdb, size)].rate_bps
+        modes, self._timing = wifi_modes(setup.settings), wifi_timing(setup.settings)
+        fixed = mode_of(modes, setup.settings.fixed_rate_bps) if setup.settings.rates == "fixed" else None
+        self._frames = _wifi_frames(modes, self._timing, fixed)
 
     def turn(self, ready_ns: int) -> tuple[int, int]:
         return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        mode = mode_of(self._modes, flight.rate_bps)
-        airtime_ns = wifi_airtime_ns(mode, len(flight.payload), self._timing)
-        ack_ns = 0 if broadcast else wifi_ack_ns(mode, self._timing)
-        threshold = 0 if broadcast else lost
-        if threshold is None:
-            threshold = error_threshold(self._settings, flight, flight.snr_cdb)
-            flight.error_threshold = threshold
-        words = self._words(flight, broadcast)
+        """At the fixed rate; else a broadcast goes at the lowest, a unicast at the highest with few errors."""
+        size, ack_ns, threshold = len(flight.payload), 0, 0
+        if broadcast:
+            frame = self._frames.broadcast(size)
+        else:
+            frame = self._frames.unicast(size, flight.snr_cdb)
+            ack_ns = frame.ack_ns
+            threshold = errors.per_threshold(frame.mode, flight.snr_cdb, frame.size_bytes) if lost is None else lost
+            if lost is None:
+                flight.error_threshold = threshold
+        flight.rate_bps = frame.rate_bps
+        words, airtime_ns = self._words(flight, broadcast), frame.airtime_ns
         return wifi_access(words, flight.contenders, threshold, airtime_ns, ack_ns, self._timing), airtime_ns
 
 
@@ -272,17 +282,16 @@ class LrWpan(OnAir):
         super().__init__(setup)
         self._timing = replace(LRWPAN, retries=setup.settings.retries)
 
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
-        return errors.MODES["oqpsk_250"].rate_bps
-
     def turn(self, ready_ns: int) -> tuple[int, int]:
         return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        airtime_ns = lrwpan_airtime_ns(len(flight.payload), self._timing)
+        size = len(flight.payload)
+        flight.rate_bps = errors.MODES[LRWPAN_MODE].rate_bps
+        airtime_ns = lrwpan_airtime_ns(size, self._timing)
         threshold = 0 if broadcast else lost
         if threshold is None:
-            threshold = error_threshold(self._settings, flight, flight.snr_cdb)
+            threshold = errors.per_threshold(LRWPAN_MODE, flight.snr_cdb, size + LRWPAN_OVERHEAD_BYTES)
             flight.error_threshold = threshold
         words = self._words(flight, broadcast)
         return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
@@ -291,13 +300,10 @@ class LrWpan(OnAir):
 class LoRa(OnAir):
     """LoRa: pure ALOHA."""
 
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
-        settings = self._settings
-        chips = settings.spreading_factor * 4 * int(settings.bandwidth_hz)
-        return chips // ((4 + settings.coding_rate) << settings.spreading_factor)
-
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
         settings = self._settings
+        chips = settings.spreading_factor * 4 * int(settings.bandwidth_hz)
+        flight.rate_bps = chips // ((4 + settings.coding_rate) << settings.spreading_factor)
         size, bandwidth_hz = len(flight.payload), int(settings.bandwidth_hz)
         airtime_ns = lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
@@ -308,15 +314,13 @@ class Lte(OnAir):
 
     is_acknowledged = True
 
-    def rate_bps(self, flight: Flight, broadcast: bool) -> int:
+    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
         settings = self._settings
         direction = "down" if settings.tx_power_dbm >= BASE_STATION_DBM else "up"
-        return errors.lte_rate_bps(flight.snr_cdb, int(settings.bandwidth_hz), direction)
-
-    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        if flight.rate_bps == 0:
+        rate_bps = flight.rate_bps = errors.lte_rate_bps(flight.snr_cdb, int(settings.bandwidth_hz), direction)
+        if rate_bps == 0:
             return Access(0, 0, 0, 0, "error"), 0
-        airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, flight.rate_bps)
+        airtime_ns = serialisation_ns(len(flight.payload) + settings.overhead_bytes, rate_bps)
         retries, is_lost = errors.lte_harq(flight.words[Slot.BACKOFF])
         delay_ns = airtime_ns + retries * errors.HARQ_ROUND_NS
         outcome: Outcome = "error" if is_lost or lost is not None else "ok"

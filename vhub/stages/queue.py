@@ -39,20 +39,23 @@ class Queue(Stage):
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
-        if self._broadcasts and flight.published:
+        broadcast = self._broadcasts and flight.published
+        if broadcast:
             shared = sender.sending(flight.sequence, flight.copy)
             if shared is not None:
                 flight.queue_bytes, flight.queue_ns = shared.queue_bytes, shared.queue_ns
                 return shared.cause
         now_ns, waiting = flight.sent_ns + flight.phase_ns, sender.waiting
-        gone = next((n for n, (departure_ns, _) in enumerate(waiting) if departure_ns > now_ns), len(waiting))
-        if gone:
-            del waiting[:gone]
-        queued = sum(size for _, size in waiting)
-        wait_ns = max(0, sender.free_ns - now_ns)
+        while waiting and waiting[0][0] <= now_ns:
+            del waiting[0]
+        queued = 0
+        for _, size in waiting:
+            queued += size
+        wait_ns = sender.free_ns - now_ns if sender.free_ns > now_ns else 0
         cause = self._judge(len(waiting), queued + len(flight.payload) + self._overhead, now_ns, wait_ns)
         flight.queue_bytes, flight.queue_ns = queued, wait_ns
-        sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
+        if broadcast:
+            sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
         return cause
 
     def _judge(self, packets: int, size: int, now_ns: int, wait_ns: int) -> str:

@@ -17,6 +17,7 @@ from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.stage import Stage
 
+_LOSS: Final = int(Slot.LOSS)
 RANDOM_LOSS: Final = "random_loss"
 BURST_LOSS: Final = "burst_loss"
 CHAIN_BLOCK: Final = 1
@@ -47,7 +48,7 @@ class Residual(Stage):
         if self._outages is not None and self._outages.is_bad(flight.sent_ns):
             flight.is_bad = True
             return BURST_LOSS
-        word = flight.words[Slot.LOSS]
+        word = flight.words[_LOSS]
         if word >= self._any[bad]:
             return ""
         return BURST_LOSS if word < self._burst[bad] else RANDOM_LOSS
