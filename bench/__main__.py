@@ -27,6 +27,7 @@ from bench import (
     table_one_process,
     verdict,
     vhub_loss,
+    whatif,
 )
 from bench.runs import BenchError
 
@@ -87,6 +88,7 @@ BENCHES: Final = (
     ),
     Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),
     Bench("rays", "lines of sight through a hall of shelves and vehicles", with_default(rays.rays), rays.lines),
+    Bench("whatif", "captured packets through another network", with_default(whatif.whatif), whatif.lines),
     Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),
     Bench("swarm", "rehearsals under random faults, by seed", swarm.swarm, swarm.lines),

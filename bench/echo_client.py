@@ -13,6 +13,7 @@ import json
 import struct
 import time
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -69,6 +70,8 @@ class EchoClient:
         self._numbers: set[int] = set()
         self._times: list[tuple[int, int, int]] = []
         """Of each packet that came back, in ns: when, end to end, and when less what was due in simulated time."""
+        self._names: list[tuple[str, int]] = []
+        """Of the same, by whom it was sent, and its number there."""
 
     def run(self) -> Echoed:
         """Wait for the first echo, send all, wait for the last ones."""
@@ -132,6 +135,12 @@ class EchoClient:
                 continue
             self._numbers.add(number)
             self._times.append((now_ns, now_ns - self._sent_ns[number], now_ns - packet.due_ns))
+            self._names.append((packet.source, packet.sequence))
+
+    def save_times(self, path: Path) -> None:
+        """Write down when each packet came back: arrays `source`, `sequence` and `received_ns`."""
+        names, numbers = zip(*self._names, strict=True)
+        np.savez(path, source=names, sequence=numbers, received_ns=[at_ns for at_ns, _, _ in self._times])
 
     def _perform(self) -> None:
         for action in self.core.actions:
@@ -164,10 +173,14 @@ def main() -> None:
     parser.add_argument("--connect", required=True)
     parser.add_argument("--rate", type=int, required=True)
     parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--times", type=Path)
     chosen = parser.parse_args()
     use_client_runtime()
     with Session.client(chosen.connect, CONNECT_S, limits.RADIO_MESSAGE_BYTES_MAX) as session:
-        echoed = EchoClient(chosen.name, session, chosen.rate, chosen.seconds).run()
+        client = EchoClient(chosen.name, session, chosen.rate, chosen.seconds)
+        echoed = client.run()
+        if chosen.times is not None:
+            client.save_times(chosen.times)
         print(json.dumps(asdict(echoed)), flush=True)
 
 

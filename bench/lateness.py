@@ -1,80 +1,143 @@
-"""How late packets leave the vHub in real time: 5,000 a second to a client, due at any time between ticks.
+"""How late packets leave the vHub in real time, and where that comes from: 5,000 a second to a client.
 
-A client sends at this rate to a robot that answers; the answers come over a link whose delay is spread over several
-ticks. What is due within a tick reaches a client at that tick's end (fates know ticks), so lateness is that of the
-release behind the end of the tick at which the packet arrives; beyond its own due time it is half a tick more in the
-mean. The wall time of simulated time 0 is that of the promptest packet of the same tenth of a second, which was not
-before its time: a run that lagged far behind the clock does not make up for it.
-Neighbours: `runs`, `echo_client`, `foosim.vhub.release`.
+A client sends at this rate to robots that answer; the answers come over a link whose delay is spread over several
+ticks. What is due within a tick reaches a client at that tick's end: fates know ticks. So a packet is late by how much
+the wall clock is further, when the packet leaves, than the end of the tick at which it arrives; behind its own due time
+it is half a tick more in the mean. Wall time 0 of the run is that of its promptest tick within half a second around: a
+run that lags for longer has another time 0, as its pacing has behind a lag of 100 ms, and its lags are told beside.
+
+The lateness has two parts: when the vHub had all that closes the tick (commit and samples; then the run itself is
+late), and what its closing takes up to the release: verdicts, journal, deliveries. Behind the release come message and
+network until the client has it. All times are of one machine's monotonic clock. Neighbours: `runs`, `echo_client`,
+`foosim.vhub.release`.
 """
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bench.runs import watch
+from bench.runs import BenchError, Watched, watch
+from foosim.vhub.capture_columns import Packets
 from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.rows import TICK, TickRow
 
 RATE_HZ: Final = 5_000
 TICK_NS: Final = 2_000_000
 NAME: Final = "probe"
 MARGIN_S: Final = 5.0
 """Simulated time for the client to start in, and for the last packets to come back."""
-WARM_S: Final = 1.0
-"""Of the packets' time, left out: the anchor is learnt."""
-WINDOW_NS: Final = 100_000_000
+WARM_NS: Final = 1_000_000_000
+"""Of the packets' time, left out: everything runs for the first time."""
+HALF_WINDOW: Final = 500_000_000 // TICK_NS
+"""In ticks, of those among which the promptest is."""
 P50_MS: Final = 0.5
 P99_MS: Final = 2.0
+
+Times = NDArray[np.int64]
+Quantiles = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Release less arrival, in ms, over all packets that were released to the client; and less due, in the median."""
+    """Release less the end of the tick of arrival, in ms, over all packets that were released to the client.
+
+    Its parts and what comes behind it as p50, p99 and the greatest: `run_ms` until the vHub had all that closes the
+    tick, `closing_ms` from there to the release, `way_ms` from there to the client. `lag_ms` is that of the run's
+    commits behind its own pacing, as the supervisor counts it.
+    """
 
     packets: int
     p50_ms: float
     p99_ms: float
     max_ms: float
     beyond_due_p50_ms: float
+    run_ms: Quantiles
+    closing_ms: Quantiles
+    way_ms: Quantiles
+    lag_ms: Quantiles
 
 
 def lateness(seconds: float = 10.0) -> Lateness:
-    """Measure for so many seconds, in real time at ticks of 2 ms."""
-
-    def client(simulation: str, radio: str) -> list[list[str]]:
-        options = ["--name", NAME, "--connect", radio, "--rate", str(RATE_HZ), "--seconds", str(seconds)]
-        return [["-m", "bench.echo_client", *options]]
-
+    """Measure for so many seconds, in real time at ticks of 2 ms. Raises BenchError when nothing was released."""
     spread = f"{{id: spread, from: '*', to: {NAME}, delay: 3 ms, jitter: {{shape: uniform, width: 6 ms}}, order: free}}"
     sets = ["tick=2 ms", "substeps=4", "players={}", f"clients={{{NAME}: {{}}}}", f"network.links=[{spread}]"]
-    run = watch("realtime", seconds + MARGIN_S, sets, every_s=1.0, helpers=client, read=read)
-    found: Lateness = run.found
-    return found
+    with tempfile.TemporaryDirectory() as folder:
+        times = Path(folder) / "times.npz"
+
+        def client(simulation: str, radio: str) -> list[list[str]]:
+            options = ["--name", NAME, "--connect", radio, "--rate", str(RATE_HZ), "--seconds", str(seconds)]
+            return [["-m", "bench.echo_client", *options, "--times", str(times)]]
+
+        run = watch("realtime", seconds + MARGIN_S, sets, 1.0, client, read=_captured)
+        return _lateness(run, _received(times))
 
 
-def read(path: Path) -> Lateness:
-    """Return the lateness of what a capture's run released to the client."""
-    packets = open_capture(path).packets
-    ours = packets.where((packets.destination == NAME) & (packets.wall_released_ns > 0))
-    arrival_ns, released_ns = ours.arrival_tick * TICK_NS, ours.wall_released_ns
-    late_ns = released_ns - arrival_ns
-    window = (released_ns - released_ns.min()) // WINDOW_NS
-    for n in np.unique(window):
-        late_ns[window == n] -= late_ns[window == n].min()
-    is_warm = arrival_ns >= arrival_ns.min() + int(WARM_S * 1e9)
-    late_ms, due_ms = late_ns[is_warm] / 1e6, (late_ns + arrival_ns - ours.due_ns)[is_warm] / 1e6
-    p50, p99 = np.percentile(late_ms, [50, 99])
-    figures = float(p50), float(p99), float(late_ms.max()), float(np.median(due_ms))
-    return Lateness(len(late_ms), *(round(figure, 3) for figure in figures))
+def _captured(path: Path) -> tuple[Packets, Times, Times]:
+    """Return what was released to the client; and, by tick, when the vHub had all that closes it, and the wall time of
+    simulated time 0 around it."""
+    capture = open_capture(path)
+    packets = capture.packets
+    rows = [row for row in capture.rows(TICK) if isinstance(row, TickRow)]
+    known_ns = np.array([row.wall_closed_ns for row in rows], dtype=np.int64)
+    behind_ns = known_ns - np.array([row.tick for row in rows]) * TICK_NS
+    places = range(len(rows))
+    zero_ns = np.array([behind_ns[max(0, at - HALF_WINDOW) : at + HALF_WINDOW + 1].min() for at in places])
+    return packets.where((packets.destination == NAME) & (packets.wall_released_ns > 0)), known_ns, zero_ns
+
+
+def _lateness(run: Watched, received_ns: dict[tuple[str, int], int]) -> Lateness:
+    packets, known_ns, zero_ns = run.found
+    if len(packets) == 0:
+        raise BenchError("nothing was released to the client")
+    packets = packets.where(packets.arrival_tick * TICK_NS >= packets.arrival_tick.min() * TICK_NS + WARM_NS)
+    released_ns, zero_ns = packets.wall_released_ns, zero_ns[packets.arrival_tick]
+    known_ns, end_ns = known_ns[packets.arrival_tick], zero_ns + packets.arrival_tick * TICK_NS
+    keys = zip(packets.source.tolist(), packets.sequence.tolist(), strict=True)
+    way_ns = [
+        received_ns[key] - at_ns for key, at_ns in zip(keys, released_ns.tolist(), strict=True) if key in received_ns
+    ]
+    lag = run.result["lag_ms"]
+    return Lateness(
+        len(packets),
+        *_quantiles(released_ns - end_ns),
+        round(float(np.median(released_ns - zero_ns - packets.due_ns)) / 1e6, 3),
+        _quantiles(known_ns - end_ns),
+        _quantiles(released_ns - known_ns),
+        _quantiles(way_ns),
+        (lag["p50"], lag["p99"], lag["max"]),
+    )
+
+
+def _received(path: Path) -> dict[tuple[str, int], int]:
+    """Return when the client had each packet, by source and number."""
+    with np.load(path) as content:
+        names, sequences, received = (content[name].tolist() for name in ("source", "sequence", "received_ns"))
+    return {(name, sequence): at for name, sequence, at in zip(names, sequences, received, strict=True)}
+
+
+def _quantiles(times_ns: Times | Sequence[int]) -> Quantiles:
+    """Return p50, p99 and the greatest in ms."""
+    p50, p99, most = np.percentile(times_ns, [50, 99, 100]) / 1e6
+    return round(float(p50), 3), round(float(p99), 3), round(float(most), 3)
 
 
 def lines(row: Lateness) -> list[str]:
     """Return the figures for people."""
+    parts = {
+        "until the vHub had all that closes the tick": row.run_ms,
+        "from there to the release": row.closing_ms,
+        "from the release to the client": row.way_ms,
+        "lag of the run's commits": row.lag_ms,
+    }
     return [
         f"release less arrival: p50 {row.p50_ms:.2f} (to stay below {P50_MS:g}), p99 {row.p99_ms:.2f} (below {P99_MS:g}"
-        f"), max {row.max_ms:.2f} ms over {row.packets} packets; less due p50 {row.beyond_due_p50_ms:.2f} ms"
+        f"), max {row.max_ms:.2f} ms over {row.packets} packets; less due p50 {row.beyond_due_p50_ms:.2f} ms",
+        *(f"    {what:44} p50 {p50:.2f}, p99 {p99:.2f}, max {most:.2f} ms" for what, (p50, p99, most) in parts.items()),
     ]

@@ -1,8 +1,9 @@
 """The process `foosim-player`: players that the deployment declares, between their classes and the radio plane.
 
 One address is all that it needs: class, rate, robots and parameters come with the welcome. Several players in a process
-have a thread, a session and a presence each, and are to the run what they would be alone. Neighbours: `core`, `player`
-(the loop that the rehearsal shares), `protocol.loop`.
+have a presence each, and are to the run what they would be alone. They share a session, a loop and a thread; those with
+certificates, which are of one name each, have their own. Neighbours: `crew`, `core`, `player` (the loop that the
+rehearsal shares), `protocol.loop`.
 """
 
 from __future__ import annotations
@@ -17,13 +18,12 @@ from typing import Annotated
 import typer
 
 from foosim.client.core import ClientCore
-from foosim.client.player import PlayerLoop
+from foosim.client.crew import Crew
 from foosim.protocol import channels, identity, limits
-from foosim.protocol.actions import Say
 from foosim.protocol.admission import Admission
 from foosim.protocol.certificates import Credentials, load_credentials, warn_of_end
 from foosim.protocol.channels import VHUB, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
+from foosim.protocol.command import DONE, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
@@ -37,70 +37,69 @@ CONNECT_S = 60.0
 
 
 class PlayerProcess:
-    """One player on one session, until the run ends, the vHub is gone for good, or `stop`."""
+    """The players of one session, until the run ends, the vHub is gone for good, or `stop`."""
 
     def __init__(
         self,
-        name: str,
+        names: Sequence[str],
         session: Session,
         inbox: Inbox,
         world: str = "",
         credentials: Credentials | None = None,
         progress: Path | None = None,
     ) -> None:
-        self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
+        now_ns = time.monotonic_ns()
+        self.crew = Crew([ClientCore(name, new_boot(), now_ns, world) for name in names])
         self.stopped = False
-        self._player = PlayerLoop(self.core)
         self._inbox = inbox
-        self._is_present = False
-        self._admission = Admission(credentials, VHUB, session.locator, time.monotonic_ns())
-        self._wire = Wire(session, Plane.RADIO, inbox, name)
-        log = start_log(name)
+        self._absent = [Wire(session, Plane.RADIO, inbox, name) for name in names]
+        """Those of players that are not present yet, since they were not let in."""
+        self._admission = Admission(credentials, VHUB, session.locator, now_ns)
+        log = start_log(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} others")
         warn_of_end(credentials, log)
-        self._loop = Loop(self.core, inbox, log, self._deadline_ns)
-        self._loop.connect(self._wire)
+        self._loop = Loop(self.crew, inbox, log, lambda now_ns: self.crew.deadline_ns())
+        self._loop.connect(self._absent[0])
         self._loop.show_progress(progress)
         self._loop.turn = self._turn
         self._loop.on_alive = self._on_alive
-        self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
-        self._wire.watch_alive(VHUB)
+        for wire in self._absent:  # who is alone waits for its downlinks itself; of several queues nobody can
+            wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS if len(names) == 1 else ())
+        self._absent[0].watch_alive(VHUB)
 
     def run(self) -> int:
         """Take part until the end; return the exit code."""
-        self._loop.run(self._is_over)
-        if self.core.lost:
-            self.core.actions.append(Say("error", "lost the vHub"))
+        self._loop.run(lambda: self.stopped or self.crew.is_over)
+        code = self.crew.leave()
         self._loop.perform()
-        if self.core.refusal:
-            return REFUSED
-        return DONE if self.core.ended else FAILED
+        return code
 
     def stop(self) -> None:
         """Have `run` return soon; a signal handler may call this."""
         self.stopped = True
         self._inbox.wake()
 
-    def _is_over(self) -> bool:
-        return self.stopped or self.core.ended or self.core.lost or bool(self.core.refusal)
-
     def _turn(self, now_ns: int) -> None:
         self._admission.check(now_ns)
-        if self.core.deployment is not None and not self._is_present:
-            self._is_present = True
-            self._wire.declare_alive()
-        self._player.step(now_ns)
+        if self._absent:
+            self._be_present()
+        self.crew.step(now_ns)
 
-    def _deadline_ns(self, now_ns: int) -> int:
-        return min(self.core.deadline_ns(), self._player.deadline_ns())
+    def _be_present(self) -> None:
+        """Show who has been let in."""
+        welcome = {core.name for core in self.crew.cores if core.deployment is not None}
+        for wire in self._absent:
+            if wire.name in welcome:
+                wire.declare_alive()
+        self._absent = [wire for wire in self._absent if wire.name not in welcome]
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         self._admission.heard(name, is_alive)
         if name == VHUB:
-            (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
+            self.crew.hub_alive(is_alive, time.monotonic_ns())
 
 
 class Fleet:
-    """The players of one process, each in a thread. The first one that fails, or is refused, stops all."""
+    """The sessions of one process, each in a thread. The first one that fails, or is refused, stops all."""
 
     def __init__(self, players: Sequence[PlayerProcess]) -> None:
         self._players = players
@@ -137,16 +136,16 @@ def run_players(
             raise BadValue("a player that is named twice", name)
     use_client_runtime()
     stop = Stop()
+    limit = limits.RADIO_MESSAGE_BYTES_MAX
     with ExitStack() as stack:
         players: list[PlayerProcess] = []
-        for name in names:
-            credentials = load_credentials(pki, identity.client(name))
+        for crew in [names] if pki is None else [[name] for name in names]:  # a session has one certificate
+            credentials = load_credentials(pki, identity.client(crew[0]))
             security = None if credentials is None else Security(credentials)
-            limit = limits.RADIO_MESSAGE_BYTES_MAX
             session = stack.enter_context(Session.client(connect, CONNECT_S, limit, stop.is_set, security))
             inbox = Inbox(limits.INBOX_MESSAGES_MAX)
             first = progress if not players else None  # the others end when its loop does not go round any more
-            players.append(PlayerProcess(name, session, inbox, world, credentials, first))
+            players.append(PlayerProcess(crew, session, inbox, world, credentials, first))
         if len(players) == 1:
             stop.then(players[0].stop)
             return players[0].run()

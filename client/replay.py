@@ -34,7 +34,15 @@ from foosim.protocol.errors import BadValue, Malformed, Refused, show
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.messages import Answer, Request
 from foosim.protocol.names import nearest_name
-from foosim.protocol.replay_messages import STREAMS, Played, PlayedPacket, PlayedPoses, PlayedRow
+from foosim.protocol.replay_messages import (
+    STREAMS,
+    Played,
+    PlayedLine,
+    PlayedPacket,
+    PlayedPoses,
+    PlayedRow,
+    PlayedScene,
+)
 
 if TYPE_CHECKING:
     from foosim.protocol.session import Session
@@ -89,6 +97,23 @@ class ReplayedPoses:
 
 
 @dataclass(frozen=True, slots=True)
+class ReplayedScene:
+    """What there is to see from here on: a Foxglove SceneUpdate as Protobuf, for a viewer."""
+
+    time_ns: int
+    update: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayedLine:
+    """A line of the run's log; `level` is info, warning or error."""
+
+    time_ns: int
+    level: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class ReplayedRow:
     """A row of any other kind, as in the capture: of `/clients`, `/epochs`, ..."""
 
@@ -107,7 +132,7 @@ class ReplayTime:
     jumps: int
 
 
-Replayed = ReplayedPacket | ReplayedPoses | ReplayedRow | ReplayTime
+Replayed = ReplayedPacket | ReplayedPoses | ReplayedScene | ReplayedLine | ReplayedRow | ReplayTime
 
 
 class Replay:
@@ -201,6 +226,10 @@ class Replay:
         elif isinstance(message, PlayedPoses):
             poses = {pose.link: ReplayedPose(pose.position, pose.orientation) for pose in message.poses}
             self._heard.append(ReplayedPoses(message.time_ns, poses))
+        elif isinstance(message, PlayedScene):
+            self._heard.append(ReplayedScene(message.time_ns, message.update))
+        elif isinstance(message, PlayedLine):
+            self._heard.append(ReplayedLine(message.time_ns, message.level, message.text))
         elif isinstance(message, PlayedRow):
             row = decode_json(message.row)
             if not isinstance(row, dict):
@@ -317,10 +346,10 @@ def hear_replay(
 ) -> Replay:
     """Connect to the replay that listens at `address`, `tcp/HOST:PORT`, and hear some of its streams.
 
-    `streams` are of `packets`, `poses`, `rows` and `clock`; none is enough to ask. Where the replay has certificates
-    the address is `tls/HOST:PORT`, and `pki` the folder with an operator's. Raises BadValue for an unknown stream or an
-    address that is none, CertificateError, ConnectionFailed when nobody listens within `timeout_s`, ReplayGone when no
-    replay answers within `answer_s`, which is also how one looks that does not know this operator.
+    `streams` are of `packets`, `poses`, `scene`, `log`, `rows` and `clock`; none is enough to ask. Where the replay has
+    certificates the address is `tls/HOST:PORT`, and `pki` the folder with an operator's. Raises BadValue for an unknown
+    stream or an address that is none, CertificateError, ConnectionFailed when nobody listens within `timeout_s`,
+    ReplayGone when no replay answers within `answer_s`, which is also how one looks that does not know this operator.
     """
     from foosim.protocol.session import ConnectError, Session
     from foosim.protocol.session_settings import Security

@@ -187,7 +187,7 @@ LISTENER_READS: Final = ((PLAYED, False), (REPLAY_ANSWER, True))
 
 NODE_WAITS: Final = (ORDER, PART, DELIVERIES)
 SUPERVISOR_WAITS: Final = (PART, DELIVERIES)
-VHUB_WAITS: Final = (COMMIT, SAMPLES)
+VHUB_WAITS: Final = (COMMIT, SAMPLES, UP)
 CLIENT_WAITS: Final = (DOWN,)
 """What every tick brings to each role: it waits for these itself, in the queue of the one that it lacks."""
 

@@ -52,6 +52,7 @@ Rate = Annotated[Fraction, Quantity(units.RATE, "1 mHz", "10 kHz")]
 LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
 AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
 Size = Annotated[int, Quantity(units.SIZE, "64 KiB", "1000 TiB")]
+Span = Annotated[int, Quantity(units.TIME, "10 ms", "10000 h")]
 Deadline = Annotated[int, Quantity(units.TIME, "1 ms", "24 h")]
 
 
@@ -151,6 +152,18 @@ class Capture(Part):
     reserve_bytes: Size = _default("64 MiB", "reserve")
     """Kept free on the disks of capture and journals, so that what has to be written in the end still fits."""
     bytes_max: Size | None = Field(default=None, alias="max_bytes")
+    split_bytes: Size | None = Field(default=None, alias="split_size")
+    split_ns: Span | None = Field(default=None, alias="split_time")
+    """Another file is begun, with the next captured frame, when one has so many bytes, or so much simulated time."""
+    last_ns: Span | None = Field(default=None, alias="last")
+    """Of a capture that is split, files are removed that hold nothing of so much simulated time."""
+    payloads: Literal["exact", "hashed"] = "exact"
+    """`hashed`: a hash of 16 bytes stands for each payload, and what needs payloads cannot be done with the capture."""
+
+    @property
+    def is_split(self) -> bool:
+        """Whether the capture goes on in further files."""
+        return self.split_bytes is not None or self.split_ns is not None
 
 
 class AccessSpec(Part):

@@ -106,12 +106,21 @@ def check_open_meshes(text: str, name: str, deployment: Deployment) -> None:
 
     `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
     """
+    what = "a wall without a thickness: the mesh is not closed, so its radio needs thickness or loss"
     found = deployment.open_meshes()
-    if found:
+    findings = [Finding(("scenery", thing, "radio"), what, deployment.scenery[thing].radio) for thing in found]
+    refuse_findings(text, name, findings)
+
+
+def refuse_findings(text: str, name: str, findings: Sequence[Finding], sets: Sequence[str] = ()) -> None:
+    """Refuse what was loaded for what was found in it later, if anything was; raises DeploymentError.
+
+    `text`, `name` and `sets` are what it was loaded from.
+    """
+    if findings:
         tree, _ = read_tree(text, locate_in(name))
         assert tree is not None, "it was loaded"
-        what = "a wall without a thickness: the mesh is not closed, so its radio needs thickness or loss"
-        findings = [Finding(("scenery", thing, "radio"), what, deployment.scenery[thing].radio) for thing in found]
+        tree, _ = place_sets(tree, sets)
         raise DeploymentError(_report([_problem(tree, finding) for finding in findings]))
 
 

@@ -6,9 +6,10 @@ delays are one way. Neighbours: `radios`, `network`; the vHub's stages compute w
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
 from foosim.protocol import units
+from foosim.protocol.hosts import Name
 from foosim.protocol.scenery import AssetPath, Digest
 from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity
@@ -220,6 +221,8 @@ class Impairments(Part):
     overhead_bytes: Annotated[int, Quantity(units.SIZE, "0 B", "10 kB")] = default("0 B", "overhead")
     queue: Queue = Field(default_factory=Queue)
     trace: Trace | None = None
+    capacity: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    """How many packets are on their way at once at most; one more takes the place of a random one (`evicted`)."""
     corrupt: Corrupt | None = None
     duplicate: Probability = default("0 %")
     reorder: Reorder | None = None
@@ -229,6 +232,19 @@ class Impairments(Part):
     """What would come later than this is dropped (`expired`)."""
     allow: bool = True
     """Whether packets may pass at all; else they are `filtered`."""
+
+
+class OwnModel(Part):
+    """A link model of one's own, which a package gives that is installed where the vHub runs, and its parameters."""
+
+    name: Name
+    parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
+
+
+class LinkSettings(Impairments):
+    """What a radio or a rule says of links; a model of one's own is theirs alone, no event changes it."""
+
+    model: OwnModel | None = None
 
 
 BURSTS: Final = ("burst", "gilbert_elliott", "markov4")

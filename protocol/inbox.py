@@ -114,7 +114,7 @@ class Inbox:
         self._ring()
 
     def attach(self, source: Source, channel: str) -> None:
-        """Let the reader wait in this channel's queue; before its first take."""
+        """Let the reader wait in this channel's queue; to be called by the reader, or before its first take."""
         assert channel not in self._sources, channel
         if self._alarm is None:
             self._alarm = _Alarm(self._ring)

@@ -76,6 +76,8 @@ UPLINKS_KEPT_MAX: Final = 65_536
 """How many packets a client keeps that the vHub has not recorded yet."""
 EVENT_BYTES_MAX: Final = 4_096
 """What one request may say that shall happen to the network."""
+MODEL_MEMORY_BYTES_MAX: Final = 4_096
+"""What a link model of one's own may remember of a link."""
 EDITED_TICKS_KEPT: Final = 256
 """Ticks whose edits the supervisor knows after they are committed: a branch orders them again."""
 CHECKPOINT_TICKS: Final = 500

@@ -56,10 +56,12 @@ class Wire:
             return known[0].key, known[1]
 
         for channel, own in reads:
+            if channel.plane is not self.plane:
+                continue
             key = channel.key_for(self.name) if own else channel.key_for_all
             if channel in waits:
                 self.session.receive(key, channel.key, read_key, self._inbox)
-            elif channel.plane is self.plane:
+            else:
                 self.session.subscribe(key, channel.key, self._inbox)
 
     def put(self, channel: Channel, name: str, payload: bytes) -> None:

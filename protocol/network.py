@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, StringConstraints
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
 from foosim.protocol.hosts import Name
-from foosim.protocol.impairments import Delay, Impairments, default
+from foosim.protocol.impairments import Delay, Impairments, LinkSettings, default
 from foosim.protocol.radios import PresetName, Radio, Site
 from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity, custom_error
@@ -50,7 +50,7 @@ def selects(globs: Sequence[str], name: str) -> bool:
     return any(fnmatchcase(name, glob) for glob in globs)
 
 
-class LinkRule(Impairments):
+class LinkRule(LinkSettings):
     """What the directed links between the endpoints that `from` and `to` select do to a packet.
 
     What is not written comes from the radio.

@@ -16,6 +16,8 @@ from foosim.protocol.network import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_
 from foosim.protocol.presets import PRESETS, preset_settings
 from foosim.protocol.references import Finding, Location, View, quoted
 
+HT: Final = "802.11n"
+HT_BANDWIDTH: Final = "20 MHz"
 JITTER_RATIO_MAX: Final = 100
 NO_ENDPOINT: Final = "a selector that matches no endpoint"
 CHAOS_NS_MAX: Final = 3_600_000_000_000
@@ -61,7 +63,25 @@ def _matches(view: View, location: Location, endpoints: Sequence[str], beside: S
 
 def _radios(view: View) -> Iterator[Finding]:
     for name in list(view.mapping("network", "radios"))[:RADIOS_MAX]:
-        yield from _impairments(view, ("network", "radios", name))
+        location: Location = ("network", "radios", name)
+        yield from _impairments(view, location)
+        yield from _standard(view, location)
+
+
+def _standard(view: View, location: Location) -> Iterator[Finding]:
+    """802.11n is that in 20 MHz."""
+    written = view.mapping(*location)
+    if written.get("standard") != HT:
+        return
+    preset = written.get("preset", "perfect")
+    inherited = preset_settings(preset) if preset in PRESETS else {}
+    bandwidth = written.get("bandwidth", inherited.get("bandwidth", HT_BANDWIDTH))
+    try:
+        fits = units.parse(bandwidth, units.FREQUENCY) == units.parse(HT_BANDWIDTH, units.FREQUENCY)
+    except BadValue:
+        return
+    if not fits:
+        yield Finding((*location, "standard"), f"has {HT_BANDWIDTH} here, not {bandwidth}", HT)
 
 
 def _carriers(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:

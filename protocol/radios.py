@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from foosim.protocol import units
 from foosim.protocol.hosts import Name
-from foosim.protocol.impairments import Impairments, default
+from foosim.protocol.impairments import LinkSettings, default
 from foosim.protocol.presets import PRESETS, preset_settings
 from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity
@@ -72,11 +72,12 @@ class Fading(Part):
 
     kind: Literal["rayleigh", "rician", "nakagami"]
     k_db: Level = default("8 dB", "k")
+    """By default as INET has it."""
     m: Annotated[float, Field(ge=0.5, le=100.0)] | None = None
     coherence_ns: Spread = default("10 ms", "coherence")
 
 
-class RadioKeys(Impairments):
+class RadioKeys(LinkSettings):
     """Everything that can be said of a radio."""
 
     medium: Literal["none", "wired", "radio", "wifi", "ieee802154", "lora", "lte"] = "none"
@@ -94,6 +95,9 @@ class RadioKeys(Impairments):
     path_loss: PathLoss = Field(default_factory=PathLoss)
     shadowing: Shadowing = Field(default_factory=Shadowing)
     fading: Fading | None = None
+    standard: Literal["802.11a/g", "802.11n"] = "802.11a/g"
+    """Of Wi-Fi: 6 to 54 Mbit/s (half of it in 10 MHz, 802.11p), or MCS 0 to 7 in 20 MHz with the long guard interval,
+    6.5 to 65 Mbit/s, broadcasts at 6 Mbit/s."""
     rates: Literal["ideal", "fixed"] = "ideal"
     fixed_rate_bps: Annotated[int, Quantity(units.BITRATE, "1 kbit/s", "1 Gbit/s")] = default("6 Mbit/s", "fixed_rate")
     access: Literal["best_effort", "video", "voice"] = "best_effort"
@@ -106,6 +110,8 @@ class RadioKeys(Impairments):
     spreading_factor: Annotated[int, Field(ge=7, le=12)] = 7
     coding_rate: Annotated[int, Field(ge=1, le=4)] = 1
     """Of LoRa: 4 / (4 + this)."""
+    gateway: bool = False
+    """Of LoRa: the receiver is a gateway's, which hears weaker signals than a device's."""
     duty_cycle: Annotated[float, Quantity(units.PROBABILITY, "0.001 %", "100 %")] = default("100 %")
     duty_window_ns: Annotated[int, Quantity(units.TIME, "1 s", "24 h")] = default("1 h", "duty_window")
     speed_m_s: Annotated[float, Quantity(units.SPEED, "1 m/s", "299792458 m/s")] = default("299792458 m/s", "speed")

@@ -42,7 +42,7 @@ class Finding:
 def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found as they are asked for."""
     view = View(data)
-    between = (_names, _hosts, _robots, _nodes, _players, _hears, _on, _rates, _clients, _deadlines)
+    between = (_names, _hosts, _robots, _nodes, _players, _hears, _on, _rates, _capture, _clients, _deadlines)
     for check in (_world, *between, _lines, _shapes, _hall, _scenery):
         yield from check(view)
 
@@ -306,6 +306,14 @@ def _rate(view: View, place: Location, tick_ns: int) -> Iterator[Finding]:
             yield Finding(place, bad.problem, text, bad.nearest)
 
 
+def _capture(view: View) -> Iterator[Finding]:
+    """What keeps only the last lets whole files go."""
+    last = view.get("capture", "last")
+    if last is not None and all(view.get("capture", key) is None for key in ("split_size", "split_time")):
+        what = "whole files are let go: needs split_size or split_time"
+        yield Finding(("capture", "last"), what, last)
+
+
 def _clients(view: View) -> Iterator[Finding]:
     """A client in lockstep has a rate."""
     for name in view.clients:
@@ -379,6 +387,8 @@ def _hall(view: View) -> Iterator[Finding]:
 def _scenery(view: View) -> Iterator[Finding]:
     """The pure engine has no meshes, a hall no ball that feels surfaces; waves cross a material, or have a loss."""
     for name in view.mapping("scenery"):
+        if name in view.robots:
+            yield Finding(("scenery", name), "a name that is also a robot's", name, at="key")
         if view.get("table") is None:
             surface = view.get("scenery", name, "surface")
             if surface is not None:

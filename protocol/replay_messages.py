@@ -13,8 +13,8 @@ from msgspec import Meta
 from foosim.protocol import limits
 from foosim.protocol.message_types import Counter, Item, Message, Name, Numbers, Payload, Text, Vector
 
-PACKETS, POSES, ROWS, CLOCK = "packets", "poses", "rows", "clock"
-STREAMS: Final = (PACKETS, POSES, ROWS, CLOCK)
+PACKETS, POSES, SCENE, LOG, ROWS, CLOCK = "packets", "poses", "scene", "log", "rows", "clock"
+STREAMS: Final = (PACKETS, POSES, SCENE, LOG, ROWS, CLOCK)
 """What a played message is: the last part of its key."""
 LinkName = Annotated[str, Meta(min_length=1, max_length=2 * limits.NAME_LENGTH_MAX + 1)]
 """A body and its link, as `red.goal/slide`."""
@@ -49,6 +49,24 @@ class PlayedPoses(Message, frozen=True):
     poses: Annotated[list[PlayedPose], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
 
 
+class PlayedScene(Message, frozen=True):
+    """What there is to see and where it hangs: a Foxglove SceneUpdate, as Protobuf has it.
+
+    It stands where it was captured; at a time from which is played it is the one that holds there.
+    """
+
+    time_ns: Counter
+    update: Numbers
+
+
+class PlayedLine(Message, frozen=True):
+    """A line of the run's log."""
+
+    time_ns: Counter
+    level: Name
+    text: Text
+
+
 class PlayedRow(Message, frozen=True):
     """A row of any other kind, as the capture has it: JSON."""
 
@@ -69,4 +87,4 @@ class ReplayClock(Message, frozen=True):
     jumps: Counter
 
 
-Played = PlayedPacket | PlayedPoses | PlayedRow | ReplayClock
+Played = PlayedPacket | PlayedPoses | PlayedScene | PlayedLine | PlayedRow | ReplayClock

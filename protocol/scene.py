@@ -161,11 +161,32 @@ def forward_kinematics(body: Body, entity: Entity, numbers: Sequence[float]) -> 
     return poses
 
 
-def antenna_position(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
-    """Return where a body's antenna is, from the frame's numbers."""
-    _, position, orientation = forward_kinematics(body, entity, numbers)[-1]
-    dx, dy, dz = rotate(orientation, body.antenna)
-    return position[0] + dx, position[1] + dy, position[2] + dz
+def velocity(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
+    """Return the velocity (m/s, world frame) of the origin of a body's last link, from the frame's numbers.
+
+    A rover's is that of its wheels, which slip where it is kept from where it goes.
+    """
+    orientation, sliding = UPRIGHT, ORIGIN
+    joint = entity.offsets.get("joint_positions", 0)
+    for link in body.links:
+        if link.joint == "free":
+            turned = entity.offsets["orientation"]
+            orientation = (numbers[turned], numbers[turned + 1], numbers[turned + 2], numbers[turned + 3])
+            if "wheel_speeds" in entity.offsets:
+                wheels = entity.offsets["wheel_speeds"]
+                sliding = rotate(orientation, (0.5 * (numbers[wheels] + numbers[wheels + 1]), 0.0, 0.0))
+            else:
+                start = entity.offsets["linear_velocity"]
+                sliding = numbers[start], numbers[start + 1], numbers[start + 2]
+        elif link.joint == "prismatic":
+            speed = numbers[joint - entity.offsets["joint_positions"] + entity.offsets["joint_velocities"]]
+            step = rotate(orientation, (speed * link.axis[0], speed * link.axis[1], speed * link.axis[2]))
+            sliding = _moved(sliding, step, 1.0)
+            joint += 1
+        elif link.joint == "revolute":
+            orientation = multiply(orientation, turn(link.axis, numbers[joint]))
+            joint += 1
+    return sliding
 
 
 def place(shape: Shape, position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:

@@ -194,8 +194,8 @@ class Session:
     def receive(self, key_expr: str, channel: str, read_key: KeyReader, inbox: Inbox) -> None:
         """Let the inbox's reader wait for these keys itself: the short way, for what every tick brings.
 
-        Once for a channel, before the inbox's first take. When the reader leaves more than the inbox's limit waiting,
-        the link waits, too.
+        Once for a channel, by the reader itself or before the inbox's first take. When the reader leaves more than the
+        inbox's limit waiting, the link waits, too.
         """
         self._check()
         stem = key_expr.removesuffix("/*")
@@ -203,7 +203,7 @@ class Session:
         key = f"{stem}/{BELL}"
         bell = self._session.declare_publisher(key, express=True, allowed_destination=zenoh.Locality.SESSION_LOCAL)
         self._declared += [subscriber, bell]
-        source = _Source(subscriber.handler, read_key, key, bell)
+        source = _Source(subscriber.handler, read_key, key, bell, inbox.limit)
         self._receivers.append(source)
         self._inboxes.append(inbox)
         inbox.attach(source, channel)
@@ -334,18 +334,20 @@ class _Drain(_Receiver):
 class _Source(_Receiver):
     """A subscriber's queue as an inbox's source. Its bell is a message on a key of it that stays in this session."""
 
-    def __init__(self, handler: Any, read_key: KeyReader, bell_key: str, bell: zenoh.Publisher) -> None:
+    def __init__(self, handler: Any, read_key: KeyReader, bell_key: str, bell: zenoh.Publisher, limit: int) -> None:
+        """`limit` is how many messages are taken at a time: a flood would keep the reader from all else."""
         super().__init__(handler)
+        self._limit = limit
         self._read_key = read_key
         self._bell_key = bell_key
         self._bell = bell
         self._keys: dict[str, tuple[str, str]] = {}
 
     def poll(self) -> list[Item]:
-        """Return all that is there, without waiting."""
+        """Return what is there, without waiting."""
         items: list[Item] = []
         try:
-            while (sample := self._handler.try_recv()) is not None:
+            while len(items) < self._limit and (sample := self._handler.try_recv()) is not None:
                 self._read(sample, items)
         except zenoh.ZError:  # the subscriber was undeclared
             pass

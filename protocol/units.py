@@ -117,12 +117,6 @@ def parse_ns(text: object) -> int:
     return int(value)
 
 
-def parse_si(text: object, dimension: Dimension) -> float:
-    """A quantity as a float in SI units; raises BadValue."""
-    assert dimension.kind == "float", dimension.name
-    return float(parse(text, dimension))
-
-
 def format_ns(time_ns: int) -> str:
     """A time in the largest unit that keeps it a whole number: `2 ms`, `500 us`, `20 s`."""
     for unit, size in (("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1_000)):

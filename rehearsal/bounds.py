@@ -20,6 +20,7 @@ from foosim.protocol.layout import Layout
 from foosim.protocol.network import EVENTS_MAX
 from foosim.supervisor.requests import ANSWERS_KEPT
 from foosim.vhub.geometry import PAIRS_KEPT, Sight
+from foosim.vhub.memory import AirState, LinkState, RadioState
 from foosim.vhub.propagation import PLACES_KEPT
 
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
@@ -39,6 +40,9 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Fabric.radios": limits.CLIENTS_MAX,
     "HubState._receivers": limits.ENTITIES_MAX,
     "HubState._flights": 1 << 14,  # by tick all that arrives then: each of many clients may hear all others
+    "Air._flights": 1 << 14,  # what is on air: of a broadcast one for each who hears it
+    "AirState.on_air": 1 << 14,
+    "RadioState.waiting": 1 << 14,  # as much as its queue takes
     "Process.report": limits.CLIENTS_MAX,  # a line a link
     "Fabric.asked": EVENTS_MAX,
     "Timeline._events": 2 * EVENTS_MAX,
@@ -50,6 +54,8 @@ BOUNDS: Final[Mapping[str, int]] = {
 """By class and attribute: containers of something else than ticks."""
 CONSTANT: Final = (Deployment, Layout, Frame, msgspec.Struct, Sight)
 """What does not grow, or is of one frame."""
+REMEMBERED: Final = (LinkState, RadioState, AirState)
+"""Messages do not grow; these are structs that do."""
 
 
 def too_large(core: object) -> list[str]:
@@ -67,7 +73,7 @@ def sizes(core: object) -> Iterator[tuple[str, int]]:
     todo: list[tuple[str, Any]] = [("", core)]
     while todo:
         where, value = todo.pop()
-        if id(value) in seen or isinstance(value, CONSTANT):
+        if id(value) in seen or (isinstance(value, CONSTANT) and not isinstance(value, REMEMBERED)):
             continue
         seen.add(id(value))
         if isinstance(value, dict | list | set | deque):
@@ -80,6 +86,8 @@ def sizes(core: object) -> Iterator[tuple[str, int]]:
 
 def _attributes(value: object) -> Iterator[tuple[str, Any]]:
     yield from getattr(value, "__dict__", {}).items()
+    for name in getattr(value, "__struct_fields__", ()):
+        yield name, getattr(value, name)
     for kind in type(value).__mro__:
         for name in getattr(kind, "__slots__", ()):
             if hasattr(value, name):

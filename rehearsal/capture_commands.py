@@ -72,8 +72,8 @@ def cut(
     """Write a part of a capture as a capture of its own.
 
     It begins with the newest captured frame at or before --from and has all that was recorded up to --to, times being
-    the capture's own. A run can begin with its frames (`up --from`); `verify` refuses it, since a run is verified from
-    where it began.
+    the capture's own. A run can begin with its frames (`up --from`); `verify` takes it with
+    --from-first-frame, since a run is verified from where it began.
     """
     from_ns, to_ns = time_of("--from", begin), time_of("--to", end)
     with reading():

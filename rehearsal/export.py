@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any, Final, Literal, Protocol, TextIO
 
 from foosim.protocol.errors import BadValue, Failed, Refused
-from foosim.rehearsal.tables import Column, Kind, Table, table_of
+from foosim.rehearsal.tables import COMMANDS_TABLE, Column, Kind, Table, table_of
 from foosim.vhub.capture_reader import Scan, deployment_of
+from foosim.vhub.payload_hash import check_payloads
 
 Format = Literal["csv", "parquet"]
 FORMATS: Final[tuple[Format, ...]] = ("csv", "parquet")
@@ -67,7 +68,10 @@ def export_capture(path: Path, what: str, out: Path, form: Format | None = None)
     scan = Scan(path)
     messages = scan.messages()
     first = next(messages, None)
-    table = table_of(what, deployment_of(scan.about))
+    deployment = deployment_of(scan.about)
+    if what == COMMANDS_TABLE:
+        check_payloads(str(path), deployment, f"the table {what}")
+    table = table_of(what, deployment)
     rows = 0
     with _sink(table, out, form) as sink:
         batch: list[tuple[Any, ...]] = []

@@ -37,6 +37,7 @@ from foosim.rehearsal.play_requests import KEYS_TEXT, Requests
 from foosim.rehearsal.play_terminal import Keys, Lines
 from foosim.rehearsal.playing import Playback
 from foosim.vhub.capture_reader import About, deployment_of
+from foosim.vhub.payload_hash import keeps_hashes
 
 REALTIME: Final = Pace("realtime")
 READ_AHEAD: Final = 10_000
@@ -135,6 +136,8 @@ def play_capture(path: Path, options: PlayOptions, lines: Lines, stopper: Stoppe
         lines.say(f"{path}: {span.first_ns / 1e9:g} s to {span.last_ns / 1e9:g} s, listening at {session.locator}")
         if not about.finished:
             lines.say("the capture is not finished: it is played up to its last whole chunk")
+        if keeps_hashes(deployment):
+            lines.say("its payloads are hashed: packets are not played")
         if keys.are_read:
             lines.say(KEYS_TEXT)
         return _Play(path, session, inbox, playback, reader, requests, lines, stopper, options.clock_ns).run()

@@ -56,10 +56,10 @@ def play(  # noqa: PLR0913, PLR0917  # a command's options
     pki: PkiOption = None,
     json: Json = False,
 ) -> None:
-    """Publish captured packets, poses and rows again, at the times at which they were released.
+    """Publish captured packets, poses, scenes, log and rows again, at the times at which they were released.
 
     Listeners are programs with `foosim.client.replay.hear_replay`; a replay has a plane of its own. Names are
-    /packets/SOURCE/DESTINATION/CHANNEL, /tf for poses, and the other topics of the capture; /tick and /frame are played
+    /packets/SOURCE/DESTINATION/CHANNEL, /tf for poses, and all topics of the capture; /tick and /frame are played
     when they are named. On a terminal: space pauses and goes on, s steps a tick, up and down double and halve the rate,
     left and right go 5 s back and on, q ends it. `foosim-replay control` does the same from elsewhere. A capture whose
     writer was killed is played up to its last whole chunk. Ctrl-C ends it in order. Exit codes: 0 played or stopped, 1

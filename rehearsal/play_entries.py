@@ -2,8 +2,8 @@
 
 A packet is played when it reached its receiver: a robot, or a client in lockstep, at its tick; a free-running client at
 the packet's due time. Rows of packets stand where their fates became final, at most a tick away from that, so entries
-are put in order over two ticks. Poses and all other rows are played at the times at which they stand. Pure: the reader
-of the file is `play_reader`, the clock is in `playing`.
+are put in order over two ticks. Poses, scenes, log and all other rows are played at the times at which they stand.
+Pure: the reader of the file is `play_reader`, the clock is in `playing`.
 """
 
 from __future__ import annotations
@@ -23,22 +23,30 @@ from foosim.protocol.errors import BadValue, show
 from foosim.protocol.layout import BALL
 from foosim.protocol.names import is_name, is_robot_name, nearest_name
 from foosim.protocol.replay_messages import (
+    LOG,
     PACKETS,
     POSES,
     ROWS,
+    SCENE,
+    PlayedLine,
     PlayedPacket,
     PlayedPose,
     PlayedPoses,
     PlayedRow,
+    PlayedScene,
 )
 from foosim.vhub import rows as capture_rows
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.packet import DELIVERED
+from foosim.vhub.payload_hash import keeps_hashes
 from foosim.vhub.rows import CLIENTS, FRAME, ROW_TYPES, TICK, ClientRow, PacketRow
-from foosim.vhub.transforms import read_poses
+from foosim.vhub.transforms import read_log, read_poses, renamed_scene
+from foosim.vhub.viewing import LOG as LOG_TOPIC
 from foosim.vhub.viewing import POSES as TF
+from foosim.vhub.viewing import SCENE as SCENE_TOPIC
+from foosim.vhub.viewing import VIEW_TYPES
 
-TOPICS: Final = (*ROW_TYPES, TF)
+TOPICS: Final = (*ROW_TYPES, *VIEW_TYPES)
 """What can be played."""
 BIG: Final = frozenset({TICK, FRAME})
 """What only a re-simulation is fed with; it is played when it is asked for."""
@@ -94,13 +102,16 @@ def make_selection(
 ) -> Selection:
     """Return a selection as people write it. Raises BadValue, which names the option.
 
-    A remap is `OLD:=NEW` for an endpoint or a body, `/OLD:=/NEW` for a channel.
+    A remap is `OLD:=NEW` for an endpoint or a body, `/OLD:=/NEW` for a channel. Packets whose payloads are hashed are
+    not played.
     """
     for topic in topics:
         if not any(topic == known or topic.startswith(f"{known}/") for known in TOPICS):
             nearest = nearest_name(topic, TOPICS)
             what = f"--topic: not one of {', '.join(TOPICS)}, nor below one"
             raise BadValue(what, topic, None if nearest is None else show(nearest))
+        if topic.startswith(capture_rows.PACKETS) and keeps_hashes(deployment):
+            raise BadValue("--topic: payloads of this capture are hashed, its packets cannot be played", topic)
     names, channels = _renamed(deployment, remaps)
     return Selection(tuple(topics), _compile("--regex", regexes), _compile("--exclude", excluded), names, channels)
 
@@ -159,9 +170,12 @@ class Entries:
         self._lockstep |= {name: client.lockstep for name, client in deployment.clients.items()}
         """As declared, until a row of /clients says how it took part."""
         self._decoders = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
-        self._poses = selection.has(TF)
+        self._views = {topic for topic in VIEW_TYPES if selection.has(topic)}
+        self.has_scene: Final = SCENE_TOPIC in self._views
+        """Whether a listener is to know what holds where a replay begins."""
         named = [topic for topic in selection.topics if topic.startswith(capture_rows.PACKETS)]
-        self._packets = bool(named or selection.regexes or not selection.topics)
+        asked = bool(named or selection.regexes or not selection.topics)
+        self._packets = asked and not keeps_hashes(deployment)
         self._topics = {topic for topic in ROW_TYPES if topic != capture_rows.PACKETS and selection.has(topic)}
         self._links: dict[str, str] = {}
 
@@ -186,19 +200,22 @@ class Entries:
         topic = message.topic
         if topic == capture_rows.PACKETS:
             return self._packet(decode(self._decoders[topic], message)) if self._packets else None
-        if topic == TF:
-            return self._pose(message) if self._poses else None
+        if topic in VIEW_TYPES:
+            return self.view(message) if topic in self._views else None
         if topic == CLIENTS:
             row: ClientRow = decode(self._decoders[topic], message)
             self._lockstep[row.client] = row.period > 0
         if topic not in self._topics:
             return None
         decode(self._decoders[topic], message)  # what is damaged is refused here, not by who hears it
-        payload = encode(PlayedRow(message.log_ns, topic.removeprefix("/"), message.data))
-        if len(payload) > limits.MESSAGE_BYTES_MAX:
-            self.too_large += 1
-            return None
-        return Entry(message.log_ns, ROWS, topic, payload)
+        row_played = PlayedRow(message.log_ns, topic.removeprefix("/"), message.data)
+        return self._unless_too_large(Entry(message.log_ns, ROWS, topic, encode(row_played)))
+
+    def _unless_too_large(self, entry: Entry) -> Entry | None:
+        if len(entry.payload) <= limits.MESSAGE_BYTES_MAX:
+            return entry
+        self.too_large += 1
+        return None
 
     def _packet(self, row: PacketRow) -> Entry | None:
         if row.fate != DELIVERED:
@@ -220,6 +237,18 @@ class Entries:
         if at_tick or arrival_ns - row.due_ns >= self._tick_ns:
             return arrival_ns
         return row.due_ns
+
+    def view(self, message: Message, at_ns: int | None = None) -> Entry | None:
+        """Return the entry of poses, a line of the log or a scene; a scene may hold at a later time than its own."""
+        time_ns = message.log_ns if at_ns is None else at_ns
+        if message.topic == TF:
+            return self._pose(message)
+        if message.topic == LOG_TOPIC:
+            level, text = read_log(message.data)
+            line = PlayedLine(time_ns, level, text[: limits.TEXT_LENGTH_MAX])
+            return Entry(time_ns, LOG, LOG_TOPIC, encode(line))
+        update = renamed_scene(message.data, self._link) if self._selection.names else message.data
+        return self._unless_too_large(Entry(time_ns, SCENE, SCENE_TOPIC, encode(PlayedScene(time_ns, update))))
 
     def _pose(self, message: Message) -> Entry:
         poses = [

@@ -20,7 +20,9 @@ from foosim.protocol.units import format_ns
 from foosim.rehearsal.play_entries import Entries, Entry, Selection
 from foosim.rehearsal.playing import Reading, Span
 from foosim.vhub.capture_reader import About, Scan
+from foosim.vhub.capture_standing import Standing
 from foosim.vhub.rows import CaptureError
+from foosim.vhub.viewing import SCENE
 
 AHEAD_BYTES: Final = 64 * 1024 * 1024
 TOGETHER_MAX: Final = 512
@@ -76,6 +78,7 @@ class ReadAhead:
         self._span = span
         self._entries_max = entries_max
         self._wake = wake
+        self._scenes: Standing | None = None
         self._changed = threading.Condition()
         """Guards what follows; notified at each change that is waited for."""
         self._asked: Reading | None = None
@@ -132,6 +135,9 @@ class ReadAhead:
         """Read one part; return what is wrong with the file, empty when nothing is."""
         scan = Scan(self._path, max(0, reading.from_ns - 2 * self._tick_ns))
         try:
+            scene = self._scene_at(reading.from_ns)
+            if scene is not None and not self._put(reading, scene):
+                return ""
             for entry in self.entries.of(scan.messages(), scan.decode):
                 if entry.time_ns > self._span.last_ns:
                     break
@@ -140,6 +146,15 @@ class ReadAhead:
         except CaptureError as error:
             return str(error)
         return ""
+
+    def _scene_at(self, time_ns: int) -> Entry | None:
+        """Return the scene that holds where one begins in the midst, None where none is to be said."""
+        if not self.entries.has_scene or not time_ns:
+            return None
+        if self._scenes is None:
+            self._scenes = Standing(self._path, {SCENE})
+        message = self._scenes.before(time_ns)
+        return None if message is None else self.entries.view(message, time_ns)
 
     def _put(self, reading: Reading, entry: Entry) -> bool:
         """Queue an entry, as soon as there is room; False when it is not wanted any more."""

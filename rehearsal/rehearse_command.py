@@ -19,7 +19,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.swarm import fly
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.display import score_text
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.plan import RunOptions, check_models_here, make_plan
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 
@@ -65,6 +65,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     settings = (*(sets or []), *([f"engine={engine}"] if engine is not None else []))
     plan = make_plan(RunOptions(file, "fast", duration, seed, settings, LOOPBACK, branch=branch))
+    check_models_here(plan)
     free = sorted(name for name, player in plan.deployment.players.items() if not player.lockstep)
     if free:
         raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))

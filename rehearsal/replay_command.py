@@ -22,7 +22,9 @@ from foosim.rehearsal import capture_commands, play_command, report_command, wha
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_info import CaptureInfo, capture_info
+from foosim.vhub.capture_parts import NEXT
 from foosim.vhub.capture_recovery import recover_capture
+from foosim.vhub.payload_hash import HASHED
 from foosim.vhub.rows import CaptureError
 
 app = new_app()
@@ -46,12 +48,23 @@ def info(capture: Capture, json: Json = False) -> None:
     typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
 
 
+HASHED_TEXT: Final = (
+    "  PAYLOADS ARE HASHED: in their place stands BLAKE2b of 16 bytes; it cannot be simulated again, nor its packets "
+    "played"
+)
+
+
 def _describe(found: CaptureInfo) -> str:
-    state = (
-        "finished" if found.finished else f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
-    )
+    if NEXT in found.end:
+        state = f"it goes on in {found.end[NEXT]}, which is not here"
+    elif found.finished:
+        state = "finished"
+    else:
+        state = f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
     lines = [
         f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
+        *([HASHED_TEXT] if found.payloads == HASHED else []),
+        *([f"  {len(found.parts)} files: {found.parts[0]} to {found.parts[-1]}"] if len(found.parts) > 1 else []),
         *(f"  {key}: {value}" for key, value in sorted({**found.metadata, **found.end}.items())),
         f"  {_span(found)} of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
         f"  digest of the last frame {found.digest}",
@@ -62,7 +75,7 @@ def _describe(found: CaptureInfo) -> str:
         f"  packets {_counted(found.packets)}",
         *([f"  dropped by {_counted(found.causes)}"] if found.causes else []),
         *([f"  on channels {_counted(found.channels)}"] if found.channels else []),
-        f"  payloads {found.payload_bytes / 1e6:.1f} MB",
+        f"  payloads {found.payload_bytes / 1e6:.1f} MB, {found.payloads}",
         f"  recoveries {found.recoveries}",
         "  topics",
         *(f"    {topic}: {count}" for topic, count in found.topics.items()),
@@ -86,9 +99,15 @@ def _span(found: CaptureInfo) -> str:
 def verify(
     capture: Capture,
     nodes: Annotated[int, typer.Option(help="Number of nodes to simulate on.")] = 1,
+    from_first_frame: Annotated[
+        bool, typer.Option("--from-first-frame", help="Verify a cut: what follows on the first frame that it has.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Simulate a capture again from its orders and deliveries, and compare the digest of every tick.
+
+    A cut, and a later file of a run, is refused: how its first frame came is not in it. With --from-first-frame that
+    frame is taken as it is, and all behind it is verified.
 
     Names the first tick and the entities that differ. The number of nodes need not be the capture's. Where ticks differ
     and the capture comes from nodes with another arithmetic than this machine's, standard error says so.
@@ -96,7 +115,7 @@ def verify(
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     with reading():
-        found = verify_capture(capture, nodes)
+        found = verify_capture(capture, nodes, from_first_frame=from_first_frame)
     typer.echo(encode_json(_as_json(found)).decode() if json else _verdict(found))
     if found.tick >= 0 and found.other_arithmetic:
         typer.echo(
@@ -124,7 +143,8 @@ def _verdict(found: Verified) -> str:
     on = f"on {found.nodes} node{'s' if found.nodes > 1 else ''}"
     if found.equal:
         count = found.ticks - found.first_tick
-        return f"equal: {count} ticks simulated again {on}, digest of all ticks {found.chain.hex()}"
+        since = f" behind frame {found.first_tick}" if found.first_tick else ""
+        return f"equal: {count} ticks{since} simulated again {on}, digest of all ticks {found.chain.hex()}"
     if found.missing_tick >= 0:
         return f"tick {found.missing_tick} is missing; {found.ticks - found.first_tick} ticks before it are equal {on}"
     return f"differs at tick {found.tick} in {', '.join(found.entities)}; the ticks before it are equal {on}"

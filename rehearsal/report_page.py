@@ -42,6 +42,8 @@ th { text-align: left; border-bottom: 1px solid #adb5bd; } td.n, th.n { text-ali
 code { font-size: 12px; overflow-wrap: anywhere; } p { margin: 4px 0; } .note { color: #495057; }
 svg { max-width: 100%; height: auto; display: block; } svg text { font-size: 11px; fill: #495057; }
 .scroll { overflow-x: auto; } .scroll svg { max-width: none; }
+.rows { overflow: auto; max-height: 480px; } .rows th { position: sticky; top: 0; background: #fff; }
+@media print { .rows { max-height: none; } }
 .grid { stroke: #dee2e6; } .mark { stroke: #212529; stroke-dasharray: 3 2; stroke-width: 1.5; }
 .track { fill: none; stroke: #495057; stroke-width: 1.2; stroke-opacity: 0.7; }
 .two { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 4px 20px; }
@@ -77,7 +79,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]], texts: int = 1
     lines = ["".join(f"<th{kind}>{escape(name)}</th>" for kind, name in zip(kinds, head, strict=True))]
     for row in rows:
         lines.append("".join(f"<td{kind}>{escape(str(cell))}</td>" for kind, cell in zip(kinds, row, strict=True)))
-    return f'<div class="scroll"><table>{"".join(f"<tr>{line}</tr>" for line in lines)}</table></div>'
+    return f'<div class="rows"><table>{"".join(f"<tr>{line}</tr>" for line in lines)}</table></div>'
 
 
 def _note(text: str) -> str:

@@ -6,16 +6,16 @@ Neighbours: `report` compares this with what was measured; the vHub's stages dec
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any, Final
 
-from foosim.protocol.impairments import Burst, Impairments, Markov4, TableJitter
+from foosim.protocol.codec import encode_json
+from foosim.protocol.impairments import Burst, Impairments, LinkSettings, Markov4, TableJitter
 from foosim.protocol.network import Event, LinkRule
 from foosim.protocol.radios import Radio
 from foosim.protocol.table import Part
 from foosim.protocol.traces import read_table
 from foosim.protocol.units import format_ns
-from foosim.vhub.jitter import CELLS, quantiles_ns
+from foosim.vhub.jitter import moments_ns, quantiles_ns
 
 _UNITS: Final = (
     ("_bps", "bit/s"),
@@ -57,9 +57,9 @@ def _differing(content: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str,
 
 def impairments_text(settings: Impairments) -> str:
     """Return what a rule, or an event that changes one, writes beside its ends."""
-    written = settings.model_fields_set & set(Impairments.model_fields)
+    written = settings.model_fields_set & set(LinkSettings.model_fields)
     values = {name: getattr(settings, name) for name in written}
-    return settings_text(Impairments.model_construct(_fields_set=written, **values))
+    return settings_text(LinkSettings.model_construct(_fields_set=written, **values))
 
 
 def event_text(event: Event) -> str:
@@ -85,6 +85,9 @@ def _entries(content: Mapping[str, Any]) -> list[str]:
 
 
 def _entry(name: str, value: Any) -> str:
+    if name == "model":  # whose parameters are what its package takes
+        parameters = encode_json(value["parameters"]).decode() if value.get("parameters") else ""
+        return f"link model {value['name']} {parameters}".rstrip()
     if isinstance(value, dict):
         return f"{name.rstrip('_')} ({', '.join(_entries(value))})"
     if isinstance(value, list):
@@ -168,11 +171,7 @@ def mean_own_delay_ns(settings: Impairments, files: Mapping[str, bytes]) -> floa
     if jitter is None:
         return mean
     table = read_table(files[jitter.file].decode("ascii", "replace")) if isinstance(jitter, TableJitter) else ()
-    quantiles = quantiles_ns(jitter, table)
-    cells = [(low + high) / 2.0 for low, high in pairwise(quantiles[:CELLS])]
-    tail = [quantiles[CELLS - 1], *(quantiles[CELLS + 1 :] or quantiles[CELLS:])]
-    last = [(low + high) / 2.0 for low, high in pairwise(tail)]
-    return mean + (sum(cells) + sum(last) / len(last)) / CELLS
+    return mean + moments_ns(quantiles_ns(jitter, table))[0]
 
 
 def _bad_share(burst: Burst) -> float:

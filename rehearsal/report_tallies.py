@@ -161,6 +161,7 @@ class RuleTally:
             delay_ns = row.due_ns - row.sent_ns
             self.delay.add(delay_ns)
             spent_ns = row.phase_ns + row.queue_ns + row.access_ns + row.airtime_ns + row.propagation_ns + row.held_ns
+            spent_ns += row.model_ns
             self.own.add(delay_ns - spent_ns)
 
 

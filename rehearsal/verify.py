@@ -1,7 +1,8 @@
 """Verify a capture: simulate it again from orders and deliveries, compare the digest of every tick.
 
 The typed function behind `foosim-replay verify`. It starts with the frame that the run began with, which is frame 0 but
-for a branch, never with a later one, on any number of nodes, and names the first tick and the entities that differ.
+for a branch, on any number of nodes, and names the first tick and the entities that differ. With a later one it starts
+only where that is asked for, of a cut.
 Neighbours: `replica` computes, `vhub.capture_reader` reads.
 """
 
@@ -17,7 +18,15 @@ from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.start import Start, added_to, first_chain, start_with
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
-from foosim.vhub.capture_reader import CaptureData, CapturedTick, check_whole, open_capture, origin_of, read_about
+from foosim.vhub.capture_reader import (
+    CaptureData,
+    CapturedTick,
+    beginning_of,
+    check_whole,
+    open_capture,
+    read_about,
+)
+from foosim.vhub.payload_hash import check_payloads
 from foosim.vhub.rows import CaptureError
 
 
@@ -46,10 +55,16 @@ class Verified:
         return self.tick < 0 and self.missing_tick < 0
 
 
-def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
-    """Verify a capture file. Raises CaptureError for one that cannot be read, or was cut out of another."""
-    check_whole(read_about(Path(path)))
+def verify_capture(path: Path | str, nodes: int = 1, *, from_first_frame: bool = False) -> Verified:
+    """Verify a capture file. With `from_first_frame` it may be a cut: what follows on its first frame is verified, not
+    how that frame came.
+
+    Raises CaptureError for one that cannot be read, has no payloads, or, without that, is a cut.
+    """
+    if not from_first_frame:
+        check_whole(read_about(Path(path)))
     capture = open_capture(path)
+    check_payloads(str(capture.path), capture.deployment, "a verification")
     about = capture.about
     start = start_of(capture)
     text, name = about.deployment_text, about.deployment_name
@@ -59,13 +74,13 @@ def verify_capture(path: Path | str, nodes: int = 1) -> Verified:
 
 
 def start_of(capture: CaptureData) -> Start | None:
-    """Return the frame that a captured run began with, None where that was frame 0. Raises CaptureError."""
-    origin = origin_of(capture.about)
+    """Return the frame that a captured run, or a cut, begins with, None where that is frame 0. Raises CaptureError."""
+    origin = beginning_of(capture.about)
     if origin is None:
         return None
     first = capture.first_frame()
     if first is None or first.digest != origin.digest:
-        raise CaptureError(f"{capture.path}: it does not have frame {origin.tick}, with which its run began")
+        raise CaptureError(f"{capture.path}: it does not have frame {origin.tick}, with which it begins")
     return start_with(first, origin.source, origin.chain, added_to(capture.deployment, first.layout))
 
 

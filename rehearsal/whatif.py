@@ -3,29 +3,30 @@
 The ticks of the capture are closed again by the vHub's own state, with the frames, clients and orders that the capture
 has, and with the network that is asked about. It is an open loop: robots and clients send what they sent, whatever
 reaches them. Without another network every fate is the captured one. Where fates depend on places and the capture does
-not have the frame of every tick, the world is simulated again from its orders and deliveries.
-Neighbours: `verify` and `replica` (the world again), `whatif_picture` (draws it), `foosim.vhub.state` (judges).
+not have the frame of every tick, the world is simulated again from its orders and deliveries. What is held of a packet
+beyond its fates are two times on its link.
+Neighbours: `whatif_reading` (tick by tick), `whatif_picture` (draws it), `foosim.vhub.state` (judges).
 """
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
+import msgspec
 import numpy as np
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Edit, Freeze, RobotPacket, Sent
-from foosim.rehearsal.replica import Replica
-from foosim.rehearsal.verify import start_of
-from foosim.vhub.capture_reader import CaptureData, Scan, captured_tick
+from foosim.protocol.messages import Sent
+from foosim.rehearsal.whatif_reading import Offers, frames_for, world_of
+from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.profiles import Profiles
-from foosim.vhub.rows import CLIENTS, PACKETS, TICK, CaptureError, ClientRow, PacketRow, TickRow, edit_of, packet_row
-from foosim.vhub.state import OUTBOX_SHIFT, HubState, Joining
+from foosim.vhub.rows import CaptureError, ClientRow, PacketRow, edit_of, packet_row
+from foosim.vhub.state import HubState, Joining
 
 CHANGED_KEPT: Final = 10_000
 """How many changed packets a result names."""
@@ -95,13 +96,13 @@ class WhatIf:
 class _Series:
     """The packets of one link that were delivered, as captured or judged again: sent and due times."""
 
-    sent_ns: list[int] = field(default_factory=list)
-    due_ns: list[int] = field(default_factory=list)
+    sent_ns: array[int] = field(default_factory=lambda: array("q"))
+    due_ns: array[int] = field(default_factory=lambda: array("q"))
 
     def side(self) -> Side:
         if not self.due_ns:
             return Side(0, 0.0, 0.0, 0.0)
-        sent, due = np.array(self.sent_ns), np.array(self.due_ns)
+        sent, due = np.frombuffer(self.sent_ns, np.int64), np.frombuffer(self.due_ns, np.int64)
         delays_ms = (due - sent) / 1e6
         return Side(
             len(due),
@@ -109,6 +110,15 @@ class _Series:
             round(float(np.quantile(delays_ms, 0.95)), 4),
             round(_age_ms(sent, due), 4),
         )
+
+
+@dataclass(slots=True)
+class _Link:
+    """One link: how much was offered, what was delivered before and after."""
+
+    offered: int = 0
+    before: _Series = field(default_factory=_Series)
+    after: _Series = field(default_factory=_Series)
 
 
 def _age_ms(sent: np.ndarray, due: np.ndarray) -> float:
@@ -130,57 +140,61 @@ def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatI
 
     Raises CaptureError for what the capture lacks.
     """
-    if deployment is None:
-        deployment = capture.deployment
-    rows, came, ticks = _read(capture)
-    compared = _Compared(rows)
-    for flight in _judged(capture, deployment, _by_tick(rows.values(), deployment), came, ticks):
+    compared = _Compared(capture)
+    for flight in _judged(capture, deployment or capture.deployment, compared.keep):
         compared.take(flight)
     return compared.result()
-
-
-def _read(capture: CaptureData) -> tuple[dict[Key, PacketRow], dict[int, list[ClientRow]], list[TickRow]]:
-    """Return, in one pass over the file, its packets, who came and went by tick, and the ticks that were closed."""
-    rows: dict[Key, PacketRow] = {}
-    came: defaultdict[int, list[ClientRow]] = defaultdict(list)
-    ticks: list[TickRow] = []
-    for _, row in Scan(capture.path).rows(frozenset({PACKETS, CLIENTS, TICK})):
-        if isinstance(row, PacketRow):
-            rows[row.source, row.sequence, row.destination, row.copy] = row
-        elif isinstance(row, ClientRow):
-            came[row.tick].append(row)
-        elif isinstance(row, TickRow):
-            ticks.append(row)
-    return rows, came, ticks[:-1] if capture.finished else ticks
 
 
 class _Compared:
     """Captured rows beside what becomes of the same packets."""
 
-    def __init__(self, rows: dict[Key, PacketRow]) -> None:
-        self._rows = rows
-        self._left = dict.fromkeys(rows)
-        self._changed = self._inputs_changed = 0
+    def __init__(self, capture: CaptureData) -> None:
+        self._path = capture.path
+        self._rows: dict[Key, PacketRow] = {}
+        """Those whose packets have no other fate yet."""
+        self._packets = self._changed = self._inputs_changed = 0
         self._changes: list[PacketChange] = []
+        self._causes: Counter[str] = Counter()
         self._new_causes: Counter[str] = Counter()
-        self._after: defaultdict[tuple[str, str], _Series] = defaultdict(_Series)
+        self._links: dict[tuple[str, str], _Link] = {}
+
+    def keep(self, row: PacketRow) -> None:
+        """Take a row of the capture, until its packet is judged again."""
+        key = row.source, row.sequence, row.destination, row.copy
+        if self._rows.setdefault(key, row) is not row:
+            what = f"packet {row.sequence} of {row.source} to {row.destination}"
+            raise CaptureError(f"{self._path}: {what} has two fates")
+        self._packets += 1
+        link = self._links.get((row.source, row.destination))
+        if link is None:
+            link = self._links[row.source, row.destination] = _Link()
+        link.offered += row.copy == 0
+        if row.fate == "delivered":
+            link.before.sent_ns.append(row.sent_ns)
+            link.before.due_ns.append(row.due_ns)
+        elif row.fate == "dropped":
+            self._causes[row.cause] += 1
 
     def take(self, flight: Flight) -> None:
         """Take a packet whose fate is final, or that is in flight at the end."""
         key = flight.source, flight.sequence, flight.destination, flight.copy
-        before = self._rows.get(key)
-        self._left.pop(key, None)
+        before = self._rows.pop(key, None)
         flight.released_wall_ns = 0 if before is None else before.wall_released_ns
         after = packet_row(flight)
-        if before is None or _verdict(after) != _verdict(before):
-            self._note(key, before, after)
-        else:
-            self._inputs_changed += after != before
-        self._new_causes[after.cause] += after.fate == "dropped"
+        if before is not None and before.payload_hash:
+            after = msgspec.structs.replace(after, payload=before.payload, payload_hash=before.payload_hash)
+        if after != before:
+            if before is None or _verdict(after) != _verdict(before):
+                self._note(key, before, after)
+            else:
+                self._inputs_changed += 1
         if after.fate == "delivered":
-            series = self._after[after.source, after.destination]
-            series.sent_ns.append(after.sent_ns)
-            series.due_ns.append(after.due_ns)
+            delivered = self._links[after.source, after.destination].after
+            delivered.sent_ns.append(after.sent_ns)
+            delivered.due_ns.append(after.due_ns)
+        elif after.fate == "dropped":
+            self._new_causes[after.cause] += 1
 
     def _note(self, key: Key, before: PacketRow | None, after: PacketRow | None) -> None:
         self._changed += 1
@@ -193,83 +207,42 @@ class _Compared:
         self._changes.append(PacketChange(*key, known.channel, known.sent_ns, *old, *new))
 
     def result(self) -> WhatIf:
-        for key in self._left:  # copies that the other network does not make
-            self._note(key, self._rows[key], None)
-        before: defaultdict[tuple[str, str], _Series] = defaultdict(_Series)
-        offered: Counter[tuple[str, str]] = Counter()
-        causes: Counter[str] = Counter()
-        for row in self._rows.values():
-            link = row.source, row.destination
-            offered[link] += row.copy == 0
-            causes[row.cause] += row.fate == "dropped"
-            if row.fate == "delivered":
-                before[link].sent_ns.append(row.sent_ns)
-                before[link].due_ns.append(row.due_ns)
+        for key, row in self._rows.items():  # copies that the other network does not make
+            self._note(key, row, None)
         links = tuple(
-            LinkChange(*link, count, before[link].side(), self._after[link].side())
-            for link, count in sorted(offered.items())
+            LinkChange(*ends, link.offered, link.before.side(), link.after.side())
+            for ends, link in sorted(self._links.items())
         )
-        counted = [
-            {cause: count for cause, count in sorted(found.items()) if count} for found in (causes, self._new_causes)
-        ]
+        causes, new_causes = dict(sorted(self._causes.items())), dict(sorted(self._new_causes.items()))
         changes = tuple(sorted(self._changes, key=lambda change: (change.sent_ns, change.source, change.sequence)))
-        return WhatIf(len(self._rows), self._changed, self._inputs_changed, links, counted[0], counted[1], changes)
+        return WhatIf(self._packets, self._changed, self._inputs_changed, links, causes, new_causes, changes)
 
 
 def _verdict(row: PacketRow) -> tuple[str, str, int, int, bytes]:
     return row.fate, row.cause, row.due_ns, row.arrival_tick, row.payload
 
 
-# --- what was offered -------------------------------------------------------------------------------------------------
+def _judged(capture: CaptureData, deployment: Deployment, take: Callable[[PacketRow], None]) -> Iterator[Flight]:
+    """Close the ticks of a capture again; yield the packets as their fates become final, the rest at the end.
 
-
-@dataclass(slots=True)
-class _Offered:
-    """What was offered at one tick: by robots, in (robot, index) order, and by clients."""
-
-    robots: dict[tuple[str, int], RobotPacket] = field(default_factory=dict)
-    clients: dict[tuple[str, int], Sent] = field(default_factory=dict)
-
-
-_NOTHING: Final = _Offered()
-
-
-def _by_tick(rows: Iterable[PacketRow], deployment: Deployment) -> dict[int, _Offered]:
-    """Return what was offered at each tick: a published packet once, whatever number of receivers it had."""
-    offered: defaultdict[int, _Offered] = defaultdict(_Offered)
-    mask = (1 << OUTBOX_SHIFT) - 1
-    for row in rows:
-        if row.copy:
-            continue
-        at, key = offered[row.sent_ns // deployment.tick_ns], (row.source, row.sequence)
-        to = "" if row.published else row.destination
-        if row.source in deployment.robots:
-            at.robots[key] = RobotPacket(row.source, row.sequence & mask, to, row.channel, row.payload)
-        else:
-            at.clients[key] = Sent(row.sequence, to, row.channel, row.stamp_ns, row.payload)
-    return offered
-
-
-def _judged(
-    capture: CaptureData,
-    deployment: Deployment,
-    offered: dict[int, _Offered],
-    came: dict[int, list[ClientRow]],
-    ticks: Sequence[TickRow],
-) -> Iterator[Flight]:
-    """Close the ticks of a capture again; yield the packets as their fates become final, the rest at the end."""
-    state = HubState(deployment, ticks[0].tick if ticks else 0)
-    for frame, edits in _worlds(capture, ticks, Profiles(deployment, deployment.network).on_radio):
-        for row in came.get(frame.tick, ()):
-            _come_and_go(state, row)
-        at = offered.get(frame.tick, _NOTHING)
-        fates: list[Flight] = []
-        state.close_world(frame, [at.robots[key] for key in sorted(at.robots)], fates, edits)
-        admitted: dict[str, list[Sent]] = {}
-        for (source, _), sent in sorted(at.clients.items()):
-            admitted.setdefault(source, []).append(sent)
-        state.close_clients(frame, admitted, fates)
-        yield from fates
+    `take` is given the captured rows, each before its packet is yielded.
+    """
+    frames = frames_for(capture, on_radio=Profiles(deployment, deployment.network).on_radio)
+    offers = Offers(capture, frames, take)
+    state = HubState(deployment, offers.first)
+    with world_of(capture, frames) as frame_of:
+        for offered in offers.ticks():
+            frame = frame_of(offered)
+            for row in offered.came:
+                _come_and_go(state, row)
+            edits = [edit_of(edit) for edit in offered.edits]
+            fates: list[Flight] = []
+            state.close_world(frame, [offered.robots[key] for key in sorted(offered.robots)], fates, edits)
+            admitted: dict[str, list[Sent]] = {}
+            for (source, _), sent in sorted(offered.clients.items()):
+                admitted.setdefault(source, []).append(sent)
+            state.close_clients(frame, admitted, fates)
+            yield from fates
     for flight in state.in_flight():
         flight.cause = IN_FLIGHT
         yield flight
@@ -281,39 +254,3 @@ def _come_and_go(state: HubState, row: ClientRow) -> None:
     else:
         heard = [(heard.source, heard.channel) for heard in row.subscriptions]
         state.join(Joining(row.client, row.period, heard), row.tick)
-
-
-def _worlds(
-    capture: CaptureData, ticks: Sequence[TickRow], depends_on_places: bool
-) -> Iterator[tuple[Frame, Sequence[Edit]]]:
-    """Yield the frame of each tick with the edits that led to it.
-
-    Where fates do not depend on places and nobody is taken out of service the first frame stands for all. Else they
-    are the captured ones, or, where some are not there, all are computed again.
-    """
-    edited = [[edit_of(edit) for edit in row.edits] for row in ticks]
-    if not depends_on_places and not any(isinstance(edit, Freeze) for edits in edited for edit in edits):
-        first = capture.first_frame()
-        if first is None:
-            raise CaptureError(f"{capture.path}: it does not have the frame with which it begins")
-        for row, edits in zip(ticks, edited, strict=True):
-            yield Frame(row.tick, first.layout, first.values), edits
-        return
-    captured = {int(tick): (block, index) for block in capture.frame_blocks for index, tick in enumerate(block.ticks)}
-    if all(row.tick in captured for row in ticks):
-        for row, edits in zip(ticks, edited, strict=True):
-            block, index = captured[row.tick]
-            yield block.frame(index), edits
-        return
-    text, name = capture.about.deployment_text, capture.about.deployment_name
-    replica = Replica(text, name, capture.deployment, start=start_of(capture))
-    try:
-        for number, row in enumerate(ticks):
-            tick = captured_tick(row)
-            frame = replica.frame if number == 0 else replica.step(tick.edits, tick.delivered)
-            if frame.tick != tick.tick or frame.digest != tick.digest:
-                what = f"frame {tick.tick} is not there, and comes out otherwise here: verify it"
-                raise CaptureError(f"{capture.path}: {what}")
-            yield frame, tick.edits
-    finally:
-        replica.close()

@@ -19,6 +19,7 @@ from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.whatif import CHANGED_KEPT, LinkChange, PacketChange, WhatIf, what_if
 from foosim.rehearsal.whatif_picture import picture
 from foosim.vhub.capture_reader import CaptureData, open_capture
+from foosim.vhub.link_models import differing_models
 
 LINKS_SHOWN = 40
 
@@ -46,7 +47,10 @@ def whatif(
     """
     with reading():
         opened = open_capture(capture)
-        found = what_if(opened, _deployment(opened, network, settings or []))
+        deployment = _deployment(opened, network, settings or [])
+        for line in differing_models(deployment.network, opened.about.versions):
+            typer.echo(f"warning: {line}", err=True)
+        found = what_if(opened, deployment)
     if drawing is not None:
         _draw(drawing, found, capture.name)
     if json:

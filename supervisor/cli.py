@@ -23,7 +23,7 @@ from foosim.supervisor.install import install, is_root_there, write_units
 from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
 from foosim.supervisor.pki_hosts import files_for, send_files
-from foosim.supervisor.plan import RunOptions, check_certificates, make_plan, plan_again
+from foosim.supervisor.plan import RunOptions, check_certificates, check_models_here, make_plan, plan_again
 from foosim.supervisor.remote import Remote, unit_name
 from foosim.supervisor.run_folder import create_run, open_run, run_exists
 from foosim.supervisor.units import units_of
@@ -113,7 +113,9 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
         raise BadValue("a deployment FILE is needed, or --resume RUN", "")
     else:
         plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
-        path = None if no_capture else check_capture(capture or default_capture(plan.deployment.world))
+        check_models_here(plan)
+        found = capture or default_capture(plan.deployment.world)
+        path = None if no_capture else check_capture(found, is_split=plan.deployment.capture.is_split)
     warnings = check_certificates(plan)
     display = Display(sys.stderr if json else sys.stdout)
     for warning in warnings:

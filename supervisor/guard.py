@@ -20,7 +20,7 @@ from contextlib import suppress
 from hashlib import blake2b
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Final
+from typing import IO, Annotated, Final
 
 import platformdirs
 import typer
@@ -146,22 +146,33 @@ class Guard:
 
 
 def send(run: str, file: str) -> None:
-    """Write a file of the run to standard output: a line with its size, its bytes, a line with their digest."""
-    path = run_folder(run) / file
-    digest = blake2b(digest_size=32)
+    """Write a capture of the run, with the files that it goes on in, to standard output.
+
+    For each a line with its number and size, its bytes, a line with their digest; at the end a line that says so.
+    """
+    from foosim.vhub.capture_parts import parts_at  # a guard of a process starts quickly
+
+    whole = run_folder(run) / file
     out = sys.stdout.buffer
-    try:
-        with path.open("rb") as content:
-            left = os.fstat(content.fileno()).st_size
-            out.write(f"{left}\n".encode())
-            while left > 0 and (block := content.read(min(left, BLOCK_BYTES))):
-                left -= len(block)
-                digest.update(block)
-                out.write(block)
-    except OSError as error:
-        raise Failed(f"{path}: {error.strerror}") from None
-    out.write(f"{digest.hexdigest()}\n".encode())
+    for number, path in (parts_at(whole) or {0: whole}).items():
+        try:
+            _send_file(number, path, out)
+        except OSError as error:
+            raise Failed(f"{path}: {error.strerror}") from None
+    out.write(b"end\n")
     out.flush()
+
+
+def _send_file(number: int, path: Path, out: IO[bytes]) -> None:
+    digest = blake2b(digest_size=32)
+    with path.open("rb") as content:
+        left = os.fstat(content.fileno()).st_size
+        out.write(f"{number} {left}\n".encode())
+        while left > 0 and (block := content.read(min(left, BLOCK_BYTES))):
+            left -= len(block)
+            digest.update(block)
+            out.write(block)
+    out.write(f"{digest.hexdigest()}\n".encode())
 
 
 def _check_version(version_of_launcher: str) -> None:
@@ -204,7 +215,7 @@ def examine_command(version_of_launcher: VersionOfLauncher = "") -> None:
 
 @app.command("send")
 def send_command(run: Run, file: File) -> None:
-    """Write a file of a run's folder to standard output, with its size and its digest."""
+    """Write a capture in a run's folder to standard output, with the files that it goes on in and their digests."""
     send(run, file)
     raise typer.Exit(DONE)
 

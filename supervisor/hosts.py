@@ -17,9 +17,10 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Failed, Refused
 from foosim.supervisor.children import GUARD
 from foosim.supervisor.remote import CAPTURE, Remote
+from foosim.vhub.capture_parts import part_path
 
 BLOCK_BYTES: Final = 1 << 20
-SIZE_LINE_MAX: Final = 32
+SIZE_LINE_MAX: Final = 64
 FORGET_S: Final = 15.0
 
 
@@ -54,26 +55,31 @@ def check_hosts(deployment: Deployment, address: Address, remotes: Mapping[str, 
 
 
 def fetch_capture(remote: Remote, run: str, path: Path) -> None:
-    """Bring the capture of a run home to `path`, and remove the run's folder there. Raises Failed; it stays there."""
+    """Bring the capture of a run home to `path`, with the files that it goes on in; remove the run's folder there.
+
+    Raises Failed; it stays there then.
+    """
     command = remote.ssh([remote.path(GUARD), "send", run, CAPTURE])
-    part = path.with_name(path.name + ".part")
+    came: dict[Path, Path] = {}
     with subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
     ) as process:
         assert process.stdout is not None and process.stderr is not None
         try:
-            problem = _receive(process.stdout, part)
+            problem = _receive(process.stdout, path, came)
         except OSError as error:
-            problem = f"{part}: {error.strerror}"
+            problem = f"{path}: {error.strerror}"
         process.stdout.close()
         lines = process.stderr.read().decode("utf-8", "replace").splitlines()
     if process.returncode or problem:
-        part.unlink(missing_ok=True)
+        for part in came:
+            part.unlink(missing_ok=True)
         code = process.returncode
         why = "; ".join(lines[-1:]) if code == 1 else remote.why(code, lines) if code else problem
         where = f"host {remote.name}, in foosim's state folder as hosts/{run}/{CAPTURE}"
         raise Failed(f"the capture stays on {where}: {why or problem}")
-    part.replace(path)
+    for part, home in came.items():
+        part.replace(home)
     forget = remote.ssh([remote.path(GUARD), "forget", run])
     try:
         subprocess.run(forget, stdin=subprocess.DEVNULL, capture_output=True, timeout=FORGET_S, check=False)
@@ -81,17 +87,29 @@ def fetch_capture(remote: Remote, run: str, path: Path) -> None:
         return  # it is home; what is left there is only in the way
 
 
-def _receive(stream: IO[bytes], part: Path) -> str:
-    """Write what a guard sends to `part`; return what is wrong with it, or an empty text."""
-    size = stream.readline(SIZE_LINE_MAX).strip()
-    if not size.isdigit():
-        return "nothing was sent"
-    left, digest = int(size), blake2b(digest_size=32)
+def _receive(stream: IO[bytes], path: Path, came: dict[Path, Path]) -> str:
+    """Write what a guard sends, under names that are not theirs yet; return what is wrong with it, or an empty text.
+
+    `came` gets those names, with what they are to be.
+    """
+    while (line := stream.readline(SIZE_LINE_MAX)) != b"end\n":
+        number, _, size = line.strip().partition(b" ")
+        if not (number.isdigit() and size.isdigit()):
+            return "it came damaged" if came else "nothing was sent"
+        home = part_path(path, int(number))
+        part = home.with_name(home.name + ".part")
+        came[part] = home
+        if not _receive_file(stream, part, int(size)):
+            return "it came damaged"
+    return "" if came else "nothing was sent"
+
+
+def _receive_file(stream: IO[bytes], part: Path, left: int) -> bool:
+    """Write so many bytes to `part`; return whether they have the digest that follows."""
+    digest = blake2b(digest_size=32)
     with part.open("wb") as file:
         while left > 0 and (block := stream.read(min(left, BLOCK_BYTES))):
             left -= len(block)
             digest.update(block)
             file.write(block)
-    if left or stream.readline().strip() != digest.hexdigest().encode():
-        return "it came damaged"
-    return ""
+    return not left and stream.readline().strip() == digest.hexdigest().encode()

@@ -14,6 +14,7 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.journal import JournalError, journal_files, read_records, remove_journal
 from foosim.supervisor.run_folder import RunFolder, left_runs
+from foosim.vhub.capture_parts import parts_at
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.records import HeadRecord, HubRecord
 
@@ -25,7 +26,7 @@ def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> Non
     """
     for folder in left_runs():
         path = captured_at(folder)
-        if path is None or folder.name == but or not path.is_file():
+        if path is None or folder.name == but or not parts_at(path):
             continue
         try:
             recovered = recover_capture(path, folder.journals)

@@ -17,10 +17,12 @@ from rich.console import Console
 from rich.live import Live
 
 from foosim.protocol.assets import pin_assets, read_files
+from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import apply_sets, load_deployment, load_network, read_deployment_text
 from foosim.protocol.errors import BadValue
+from foosim.protocol.hosts import places
 from foosim.protocol.messages import Answer
 from foosim.protocol.names import nearest_name
 from foosim.protocol.presets import PRESETS, provenance
@@ -32,6 +34,7 @@ from foosim.supervisor.links_shown import links_shown
 from foosim.supervisor.net_text import RANGE_NOTE, link_line, link_table, meaning_tables
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.explain import explain_packet, parse_packet
+from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import Meaning, meaning_of, meanings, uses_alone
 from foosim.vhub.lint_text import meaning_lines
 
@@ -73,7 +76,8 @@ def lint(
     """Print what a network means, per rule and radio, and warn of what looks wrong.
 
     Mean loss beside geometry, mean bursts, delay, airtime, greatest throughput of one station and of ten, range,
-    duty cycle, and how long a full queue is. All problems of a file are shown at once, as by validate.
+    duty cycle, and how long a full queue is. All problems of a file are shown at once, as by validate; a link model has
+    to be installed here, unless the deployment places the vHub on another machine.
     """
     found, is_alone = linted(file, sets or [])
     if json:
@@ -101,9 +105,13 @@ def linted(file: Path, sets: list[str]) -> tuple[list[Meaning], bool]:
     network = load_network(text, name, sets)
     if network is None:
         pinned, files = pin_assets(apply_sets(text, name, sets), name, file.parent)
-        return meanings(load_deployment(pinned, name).with_assets(files)), False
+        deployment = load_deployment(pinned, name).with_assets(files)
+        if VHUB not in places(deployment):  # else its machine has them, and looks
+            check_link_models(deployment.network, text, name, sets)
+        return meanings(deployment), False
     files = read_files(file.parent, ".", network_files(network))
     check_files(network, files)
+    check_link_models(network, text, name, sets)
     return [meaning_of(use, files) for use in uses_alone(network)], True
 
 

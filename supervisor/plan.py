@@ -26,6 +26,7 @@ from foosim.protocol.start import Start
 from foosim.protocol.units import Pace, parse_ns, parse_pace
 from foosim.supervisor.run_folder import RESULT_FILE, Launch, RunFolder
 from foosim.vhub.branching import Branch, read_branch
+from foosim.vhub.link_models import check_link_models
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +138,13 @@ def check_certificates(plan: Plan) -> list[str]:
     found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]
     warnings = [credentials.ends_soon(wall.now_utc()) for credentials in found if credentials is not None]
     return [warning for warning in warnings if warning]
+
+
+def check_models_here(plan: Plan) -> None:
+    """Raise DeploymentError for a link model that cannot be had, unless the vHub, which looks again, runs elsewhere."""
+    if VHUB not in places(plan.deployment):
+        file, network = plan.options.file, plan.deployment.network
+        check_link_models(network, read_deployment_text(file), str(file), plan.options.all_sets)
 
 
 def check_starts(deployment: Deployment) -> None:

@@ -32,6 +32,7 @@ from foosim.supervisor.remote import CAPTURE
 from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
+from foosim.vhub.capture_parts import parts_at
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 
@@ -72,14 +73,17 @@ def default_capture(world: str) -> Path:
     """Return where a run is captured when nobody says where."""
     stem = f"{world}-{wall.now_stamp()}"
     names = (stem if number == 1 else f"{stem}-{number}" for number in range(1, 1000))
-    return next(path for path in (Path("captures") / f"{name}.mcap" for name in names) if not path.exists())
+    return next(path for path in (Path("captures") / f"{name}.mcap" for name in names) if not parts_at(path))
 
 
-def check_capture(path: Path) -> Path:
-    """Return the path when nothing is there yet and its folder, made where missing, takes files; raises Refused."""
+def check_capture(path: Path, *, is_split: bool = False) -> Path:
+    """Return the path when nothing is there yet and its folder, made where missing, takes files; raises Refused.
+
+    Nor may there be, for one that is split, what is called as the files that it goes on in.
+    """
     try:
-        if path.exists():
-            raise CaptureExists(f"{path} exists, and a capture is never overwritten")
+        for found in parts_at(path).values() if is_split or path.exists() else ():
+            raise CaptureExists(f"{found} exists, and a capture is never overwritten")
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path.parent):
             return path
@@ -413,7 +417,7 @@ class Up:
             reason = f"lost {self._lost.name}: it {self._lost.ending}"  # the supervisor never knew it
             result = {**result, "reason": reason, "failed": True}
         if result is not None and VHUB in self._launcher.remotes and self.capture is not None:
-            result = {**result, "capture": str(self.capture) if self.capture.exists() else None}
+            result = {**result, "capture": str(self.capture) if parts_at(self.capture) else None}
         reason = "the run did not end in order" if result is None else f"the run has ended: {result['reason']}"
         recoveries = [] if result is None else result["recoveries"][self._told :]
         lines = [*map(recovery_text, recoveries), reason, *self._lost_lines(), *self._capture_lines()]
@@ -428,13 +432,15 @@ class Up:
 
     def _capture_lines(self) -> list[str]:
         """Say where the capture is; who was killed did not finish it."""
-        if self.capture is None or not self.capture.exists():
+        files = {} if self.capture is None else parts_at(self.capture)
+        if not files:
             return [self._not_home] if self._not_home else []
         hub = self._launcher.children.get(VHUB)
         finished = hub is not None and hub.exit_code in (DONE, FAILED)
         result = self.folder.result()
         wrong = "" if result is None else recording_text(result)
-        lines = [f"capture {self.capture}" if finished else f"capture {self.capture} (unfinished)"]
+        count = f", {len(files)} files" if len(files) > 1 else ""
+        lines = [f"capture {self.capture}{count}" if finished else f"capture {self.capture}{count} (unfinished)"]
         return [*lines, wrong] if wrong else lines
 
     @contextmanager

@@ -105,8 +105,12 @@ SHELLS = {
     "vhub/capture_cut.py",
     "vhub/capture_file.py",
     "vhub/capture_info.py",
+    "vhub/capture_left.py",
+    "vhub/capture_parts.py",
     "vhub/capture_reader.py",
     "vhub/capture_recovery.py",
+    "vhub/capture_split.py",
+    "vhub/capture_standing.py",
     "vhub/capture_writer.py",
     "vhub/main.py",
     "vhub/room_watch.py",
@@ -232,6 +236,19 @@ def test_functions_and_files_are_short() -> None:
 def test_every_module_says_what_it_is() -> None:
     silent = [name_of(path) for path in ALL_FILES if not ast.get_docstring(tree_of(path))]
     assert not silent, "\n".join(silent)
+
+
+def test_the_neighbours_that_a_module_names_exist() -> None:
+    """A module, a package, or what the module itself defines: `air`, `stages.medium`, `node/main.py`."""
+    known = {path.stem for path in ALL_FILES} | {path.parent.name for path in ALL_FILES}
+    strangers = []
+    for path in ALL_FILES:
+        named = (ast.get_docstring(tree_of(path)) or "").partition("Neighbours:")[2]
+        for name in re.findall(r"`([a-z_][\w./:]*)`", named):
+            module = re.split(r"[./]", name.partition(":")[0].removesuffix(".py"))[-1]
+            if module not in known and not re.search(rf"\b{module}\b", path.read_text().split('"""', 2)[2]):
+                strangers.append(f"{name_of(path)}: {name}")
+    assert not strangers, "\n".join(strangers)
 
 
 def test_nothing_is_left_for_later() -> None:

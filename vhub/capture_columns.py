@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.scene import Body, forward_kinematics
-from foosim.vhub.rows import FrameRow, PacketRow
+from foosim.vhub.rows import CaptureError, FrameRow, PacketRow
 
 Integers = NDArray[np.int64]
 Numbers = NDArray[np.float64]
@@ -26,7 +27,8 @@ class Packets:
     """All packets of a capture as columns, in the order in which their fates became final.
 
     Texts and payloads are object arrays (`packets.source == "camera"` gives a mask), the rest int64. `due_ns` and
-    `arrival_tick` are -1 for what was dropped at sending; a word is the 64-bit draw that was used, or None.
+    `arrival_tick` are -1 for what was dropped at sending; a word is the 64-bit draw that was used, or None. Where
+    payloads are hashed `payload` is empty, else `payload_hash` is.
     """
 
     source: Objects
@@ -46,6 +48,7 @@ class Packets:
     size: Integers
     payload: Objects
     wall_released_ns: Integers
+    payload_hash: Objects
 
     def __len__(self) -> int:
         return len(self.sequence)
@@ -53,6 +56,18 @@ class Packets:
     def where(self, mask: NDArray[np.bool_]) -> Packets:
         """Return the packets for which the mask is true."""
         return Packets(*(getattr(self, field.name)[mask] for field in fields(self)))
+
+
+_WORD: Final = re.compile("[0-9a-f]{16}")
+
+
+def word_of(text: str) -> int | None:
+    """Return the draw that a row tells in hex, None where there is none."""
+    if not text:
+        return None
+    if not _WORD.fullmatch(text):
+        raise CaptureError(f"a draw of {text!r}, it has 16 hex digits")
+    return int(text, 16)
 
 
 _WORDS: Final = frozenset({"loss_word", "jitter_word"})
@@ -76,7 +91,7 @@ def packet_columns(rows: Iterable[PacketRow]) -> Packets:
             if name in _TEXTS:
                 value = intern(value)
             elif name in _WORDS:
-                value = int(value, 16) if value else None
+                value = word_of(value)
             values.append(value)
     columns: list[Any] = [
         np.frombuffer(integers[field.name], dtype=np.int64) if field.name in integers else _objects(objects[field.name])
@@ -93,7 +108,10 @@ def _objects(values: Sequence[Any]) -> Objects:
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Captured frames of one layout: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index."""
+    """Captured frames of one layout: `ticks` (n,) and `values` (n, layout.size), outboxes by entity index.
+
+    Outboxes whose payloads are hashed are not there.
+    """
 
     layout: Layout
     ticks: Integers
@@ -117,7 +135,7 @@ def frames_of(layout: Layout, rows: Sequence[FrameRow]) -> Frames:
     """Return the rows of one layout's frames as arrays; their sizes are the layout's."""
     ticks = np.array([row.tick for row in rows], dtype=np.int64)
     values = np.frombuffer(b"".join(row.values for row in rows), dtype=np.float64).reshape(len(rows), layout.size)
-    outboxes = tuple({outbox.index: outbox.packets for outbox in row.outboxes} for row in rows)
+    outboxes = tuple({box.index: box.packets for box in row.outboxes if not box.packets_hash} for row in rows)
     return Frames(layout, ticks, values, outboxes)
 
 

@@ -2,14 +2,13 @@
 
 What was in force at that frame is repeated at the start, as it was written: the layout, the epoch, the clients that
 take part, the scene. Deployment, files and metadata are those of the whole, and the metadata say where the cut begins.
-A run can begin with any of its frames; a verification cannot, since it starts where the run began.
+A run can begin with any of its frames; a verification starts where the run began, unless asked to take its first one.
 Neighbours: `capture_reader` (reads both), `capture_file` (the form of what is written).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO, Final
 
@@ -18,21 +17,13 @@ from mcap import records
 from foosim.protocol.errors import BadValue
 from foosim.protocol.frame import chain_next
 from foosim.protocol.units import format_ns
-from foosim.vhub.capture_file import (
-    CHUNK_BYTES,
-    CUT,
-    CUT_CHAIN,
-    CUT_DIGEST,
-    CUT_TICK,
-    END_METADATA,
-    METADATA,
-    check_new,
-    declare_topics,
-)
+from foosim.vhub.capture_file import CHUNK_BYTES, check_new, declare_topics
+from foosim.vhub.capture_parts import END_METADATA, METADATA, Joined
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
-from foosim.vhub.mcap_file import McapFile, McapWriter, Message
+from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK, OWN
+from foosim.vhub.in_force import InForce
+from foosim.vhub.mcap_file import McapWriter, Message
 from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK, CaptureError
-from foosim.vhub.viewing import SCENE
 
 _BEFORE_TICK: Final = frozenset({EPOCHS, LAYOUT, CLIENTS, RECOVERIES})
 """Rows of a closing that stand before its row of /tick."""
@@ -54,36 +45,20 @@ class Cut:
 class _Start:
     """What is in force at the last tick that was read."""
 
+    in_force: InForce
     tick: int = -1
     digest: bytes = b""
     chain: bytes = b""
-    layout: Message | None = None
-    epoch: Message | None = None
-    scene: Message | None = None
-    clients: dict[str, Message] = field(default_factory=dict)
 
     def take(self, scan: Scan, message: Message) -> None:
         """Take one more message; what it brings holds from here on."""
-        topic = message.topic
-        if topic == TICK:
+        if message.topic == TICK:
             row = scan.decode(DECODERS[TICK], message)
             self.digest = bytes.fromhex(row.digest)
             self.chain = chain_next(self.chain, self.digest) if self.tick >= 0 else chain_at_start(scan.about)
             self.tick = row.tick
-        elif topic == CLIENTS:
-            row = scan.decode(DECODERS[CLIENTS], message)
-            self.clients.pop(row.client, None)
-            if row.event == "joins":
-                self.clients[row.client] = message
-        elif topic in (LAYOUT, EPOCHS, SCENE):
-            name = {LAYOUT: "layout", EPOCHS: "epoch", SCENE: "scene"}[topic]
-            setattr(self, name, message)
-
-    def carried(self) -> Iterator[Message]:
-        """Yield what is repeated at the start of a cut."""
-        for message in (self.epoch, self.layout, *self.clients.values(), self.scene):
-            if message is not None:
-                yield message
+        else:
+            self.in_force.take(message)
 
 
 def cut_capture(path: Path, out: Path, from_ns: int | None = None, to_ns: int | None = None) -> Cut:
@@ -120,12 +95,12 @@ def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_St
     """Return the frame to begin with and what is in force there, the tick in ns, and the last tick."""
     tick_ns = deployment_of(read_about(path)).tick_ns
     scan = Scan(path)
-    start, held = _Start(), _Start()
+    start, held = (_Start(InForce(str(path))) for _ in range(2))
     for message in scan.messages():
         if message.topic != FRAME:
             held.take(scan, message)
         elif start.tick < 0 or (from_ns is not None and held.tick * tick_ns <= from_ns):
-            start = replace(held, clients=dict(held.clients))
+            start = replace(held, in_force=held.in_force.copy())
     if start.tick < 0:
         raise CaptureError(f"{path}: no frame to begin with")
     if from_ns is not None and from_ns > held.tick * tick_ns:
@@ -151,16 +126,14 @@ class _Copy:
         """Rows of a closing whose row of /tick has not come yet."""
 
     def run(self) -> None:
-        with self._path.open("rb") as stream:
-            file = McapFile(stream, self._path.stat().st_size, str(self._path))
-            scan = Scan(self._path)
-            for content in file.contents():
-                if isinstance(content, records.Attachment):
-                    self._mcap.add_attachment(content.name, content.media_type, content.data)
-                elif isinstance(content, records.Metadata):
-                    self._describe(content)
-                elif not self._take(scan, content):
-                    break
+        scan = Scan(self._path)
+        for content in Joined(self._path).contents():
+            if isinstance(content, records.Attachment):
+                self._mcap.add_attachment(content.name, content.media_type, content.data)
+            elif isinstance(content, records.Metadata):
+                self._describe(content)
+            elif not self._take(scan, content):
+                break
         self._mcap.end_chunk()
         self._mcap.add_metadata(END_METADATA, {"reason": "cut", "last_tick": str(self._stop_tick)})
 
@@ -171,7 +144,8 @@ class _Copy:
         if content.name == METADATA:
             start = self._start
             cut = {CUT: self._path.name, CUT_TICK: str(start.tick), CUT_DIGEST: start.digest.hex()}
-            metadata = {**metadata, **cut, CUT_CHAIN: start.chain.hex()}
+            metadata = {key: value for key, value in metadata.items() if key not in OWN}
+            metadata |= {**cut, CUT_CHAIN: start.chain.hex()}
         self._mcap.add_metadata(content.name, metadata)
 
     def _take(self, scan: Scan, message: Message) -> bool:
@@ -197,7 +171,7 @@ class _Copy:
             self._begun = True
             at_ns = self._start.tick * self._tick_ns
             recoveries = [message for message in head if message.topic == RECOVERIES]
-            for message in (*self._start.carried(), *recoveries):
+            for message in (*self._start.in_force.messages(), *recoveries):
                 self._put(message, at_ns)
 
     def _put(self, message: Message, at_ns: int | None = None) -> None:

@@ -2,42 +2,46 @@
 
 A new file is never written over an old one. A file that its writer left unfinished is gone on with behind its last
 whole chunk: what it has already is not written again, so a whole journal may be fed to it. Neighbours: `rows` and
-`viewing` (what is written), `mcap_file` and `mcap_scan` (how), `capture_writer` (the thread), `capture_recovery`.
+`viewing` (what is written), `mcap_file` (how), `capture_split` (in which files), `capture_left` (files that were left),
+`capture_writer` (the thread), `capture_recovery`.
 """
 
 from __future__ import annotations
 
 import os
 import platform
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
-from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Final
 
 import msgspec
 
-from foosim.protocol.codec import decode_json, encode_json
+from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Room, megabytes, room_on_disk
-from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch, Origin
-from foosim.vhub.mcap_file import McapWriter
-from foosim.vhub.mcap_scan import NOTHING, UNSYNCED_BYTES, Scanned, Void, scan
-from foosim.vhub.packet import IN_FLIGHT
+from foosim.vhub.capture_left import Journalled, Left, Progress, look, run_of
+from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, part_path, parts_at
+from foosim.vhub.capture_split import OWN, Split
+from foosim.vhub.in_force import HOLDING
+from foosim.vhub.link_models import model_versions
+from foosim.vhub.mcap_file import Book, McapWriter, Message
+from foosim.vhub.mcap_scan import Scanned, read_messages
+from foosim.vhub.payload_hash import hashed_row, keeps_hashes
 from foosim.vhub.records import Closing
-from foosim.vhub.resume import Captured
 from foosim.vhub.rows import (
-    EPOCHS,
     FORMAT,
     FRAME,
+    LAYOUT,
     PACKETS,
     PROFILE,
     ROW_TYPES,
-    TICK,
     CaptureError,
+    Row,
     epoch_entry,
     frame_row,
     plan_of,
@@ -46,16 +50,12 @@ from foosim.vhub.rows import (
 )
 from foosim.vhub.viewing import LOG, POSES, SCENE, VIEW_TYPES, View
 
-METADATA: Final = "foosim"
-END_METADATA: Final = "foosim.end"
 DEPLOYMENT: Final = "deployment.yaml"
 ASSETS: Final = "assets/"
 """How the names of the files begin that the deployment refers to; their paths follow."""
 VERSIONS: Final = "versions.json"
 ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
 """Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
-CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cut_chain"
-"""Which capture a cut is of, the first frame that it has, its digest, and the chain up to it: entries there, too."""
 CHUNK_BYTES: Final = 4 * 1024 * 1024
 """A chunk is ended at this size, or when it is to be flushed; a reader holds one at a time."""
 _LIBRARIES: Final = (
@@ -83,18 +83,6 @@ class Described:
     name: str
     text: str
     metadata: Mapping[str, str]
-
-
-@dataclass(slots=True)
-class Progress:
-    """How far a file is. What is -1 has not been written."""
-
-    tick: int = -1
-    """The last tick with a row of its own."""
-    frame: int = -1
-    epoch: int = -1
-    in_flight: bool = False
-    """Whether what was in flight at the end of the run is written."""
 
 
 def origin_metadata(origin: Origin | None) -> dict[str, str]:
@@ -136,59 +124,57 @@ def write_all(file: int, content: bytes) -> None:
         written += os.write(file, content[written:])
 
 
-def check_new(path: Path) -> None:
-    """Raise CaptureError when there is something where a capture is to be."""
-    if os.path.lexists(path):
-        raise CaptureError(f"{path}: exists already; a capture is never overwritten")
+def check_new(path: Path, *, is_split: bool = False) -> None:
+    """Raise CaptureError when there is something where a capture is to be, or where one that is split goes on."""
+    there = parts_at(path) if is_split else {0: path} if os.path.lexists(path) else {}
+    for found in there.values():
+        raise CaptureError(f"{found}: exists already; a capture is never overwritten")
 
 
 class CaptureFile:
     """One capture on the disk. Raises CaptureError when it exists already, or cannot be written.
 
-    With `journal_tick`, a file that is there is one that this run left unfinished: it is gone on with, and `torn_bytes`
-    of it were cut off. A journal has all ticks from that one on: bytes that are damaged, not just cut, are only given
-    up when it does. With `journal_end` so is what is further than the journal, chunk by chunk. A file that ends before
-    its description is begun anew; one that has its end is refused. `at_once`: a run waits, and what was synced long ago
-    is not looked through.
+    With `journal`, a file that is there is one that this run left unfinished: it is gone on with, and `torn_bytes` of
+    it were cut off. A file that ends before its description is begun anew; one that has its end is refused. A capture
+    that is split (`capture.split_size`, `split_time`) goes on in another file where `begins_next` says so and `go_on`
+    is called; of its files that were left the last is gone on with.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        described: Described,
-        journal_tick: int | None = None,
-        journal_end: Captured | None = None,
-        *,
-        at_once: bool = False,
-    ) -> None:
+    def __init__(self, path: Path, described: Described, journal: Journalled | None = None) -> None:
+        capture = described.deployment.capture
         self.path = path
         self.done = Progress()
         self.torn_bytes = 0
+        self._described = described
         self._plan = plan_of(described.deployment)
         self._view = View(described.deployment)
         self._encode = msgspec.json.Encoder().encode
-        self._reserve = described.deployment.capture.reserve_bytes
-        self._bytes_max = described.deployment.capture.bytes_max
+        self._kept = hashed_row if keeps_hashes(described.deployment) else None
+        self._reserve = capture.reserve_bytes
+        self._bytes_max = capture.bytes_max
+        self._split = Split(path, capture, self._plan.tick_ns) if capture.is_split else None
+        self._swap = threading.Lock()
+        """Held while another file takes the place of the one that is written, or this one is brought to the disk."""
         self._known: Frame | None = None
         """The frame of the last closing, written or not."""
-        self._file = self._open(journal_tick is not None)
+        self._file = -1
         try:
-            run = described.metadata.get("run", "")
-            found = None if journal_tick is None else self._scanned(journal_tick, journal_end, run, at_once)
-            self.mcap = McapWriter(self._write_bytes, PROFILE, None if found is None else found.book)
+            found = None if journal is None else self._go_on_with_left(journal)
+            if journal is None:
+                self._file = self._open(path, os.O_WRONLY | os.O_EXCL)
+            self.mcap = self._writer(self._file, None if found is None else found.book)
             if found is None:
-                self._channels = declare_topics(self.mcap)
-                self._describe(described)
+                self._channels = self._describe(self.mcap, {} if self._split is None else self._split.entries())
             else:
                 self._channels = {channel.topic: channel.id for channel in found.book.channels}
                 if found.to_index:
                     self.mcap.index_last_chunk(found.to_index)
             self._saved = replace(self.done)
         except OSError as error:
-            os.close(self._file)
+            self._let_go()
             raise self.disk_error(error) from None
         except CaptureError:
-            os.close(self._file)
+            self._let_go()
             raise
 
     # --- writing -----------------------------------------------------------------------------------------------------
@@ -201,7 +187,7 @@ class CaptureFile:
             if item.epoch <= self.done.epoch:
                 return False
             topic, log_ns, publish_ns, sequence, row = epoch_entry(item, self._plan)
-            self.mcap.add_message(self._channels[topic], log_ns, publish_ns, sequence, self._encode(row))
+            self._add(Message(topic, log_ns, publish_ns, sequence, self._encode(row)))
             self.done.epoch = item.epoch
         elif item.frame.tick <= self.done.tick and (self._known is None or item.frame.tick > self._known.tick):
             self._pass(item.frame)
@@ -212,14 +198,27 @@ class CaptureFile:
 
     def _write_closing(self, closing: Closing) -> None:
         add, encode, channels, done = self.mcap.add_message, self._encode, self._channels, self.done
-        tick = closing.frame.tick
+        tick, kept = closing.frame.tick, self._kept
         for topic, log_ns, publish_ns, sequence, row in rows_of(closing, self._plan, self._known):
-            add(channels[topic], log_ns, publish_ns, sequence, encode(row))
+            data = encode(row if kept is None else kept(row))
+            if topic == PACKETS:
+                add(channels[topic], log_ns, publish_ns, sequence, data)
+            else:
+                self._add(Message(topic, log_ns, publish_ns, sequence, data))
             if topic == FRAME:
                 done.frame = tick
         self._write_views(closing.frame)
         self._known = closing.frame
         done.tick = tick
+        if self._split is not None:
+            self._split.wrote(tick)
+
+    def _add(self, message: Message) -> None:
+        """Add a message to the chunk; what it brings holds from here on, for files that come."""
+        stamps = message.log_ns, message.publish_ns, message.sequence
+        self.mcap.add_message(self._channels[message.topic], *stamps, message.data)
+        if self._split is not None:
+            self._split.in_force.take(message)
 
     def _pass(self, frame: Frame) -> None:
         """Take notice of a frame that the file has."""
@@ -240,7 +239,7 @@ class CaptureFile:
 
     def _write_view(self, topic: str, tick: int, data: bytes) -> None:
         at_ns = tick * self._plan.tick_ns
-        self.mcap.add_message(self._channels[topic], at_ns, at_ns, tick & 0xFFFF_FFFF, data)
+        self._add(Message(topic, at_ns, at_ns, tick & 0xFFFF_FFFF, data))
 
     def end_chunk(self) -> None:
         """Write what is collected; who is killed from now on does not lose it."""
@@ -253,7 +252,7 @@ class CaptureFile:
         on_disk = room_on_disk(self._file, self._reserve)
         rooms = [replace(on_disk, left=on_disk.left - last)]
         if self._bytes_max is not None:
-            left = self._bytes_max - self.mcap.offset - last
+            left = self._bytes_max - self.bytes - last
             where = f"of the {megabytes(self._bytes_max)} that it may have"
             rooms.append(Room(left, min(self._reserve, self._bytes_max // 8), where))
         return min(rooms, key=lambda room: room.left / room.reserve)
@@ -272,7 +271,11 @@ class CaptureFile:
         """
         frame = self._known
         if frame is not None and self.done.frame < frame.tick == self.done.tick:
-            self._write_view(FRAME, frame.tick, self._encode(frame_row(frame)))
+            row: Row = frame_row(frame)
+            self._write_view(FRAME, frame.tick, self._encode(row if self._kept is None else self._kept(row)))
+        self._end(metadata)
+
+    def _end(self, metadata: Mapping[str, str]) -> None:
         self.end_chunk()
         whole = self.mcap.mark()
         try:
@@ -286,34 +289,43 @@ class CaptureFile:
 
     def sync(self) -> None:
         """Bring to the disk what was written."""
-        os.fdatasync(self._file)
+        with self._swap:
+            os.fdatasync(self._file)
 
     def close(self) -> None:
         """Let go of the file, as it is."""
         os.close(self._file)
 
+    @property
+    def bytes(self) -> int:
+        """How many bytes the capture has, in all its files."""
+        return self.mcap.offset + (0 if self._split is None else self._split.earlier_bytes)
+
     def disk_error(self, error: OSError) -> CaptureError:
         """Return what to tell people of a disk that refuses."""
         return CaptureError(f"{self.path}: cannot be written, {error.strerror}")
 
-    def _write_bytes(self, content: bytes) -> None:
-        write_all(self._file, content)
-
     # --- a new file --------------------------------------------------------------------------------------------------
 
-    def _open(self, go_on: bool) -> int:
+    def _open(self, path: Path, flags: int) -> int:
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            if go_on:
-                return os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-            check_new(self.path)
-            return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if flags & os.O_EXCL:
+                check_new(path, is_split=self._split is not None)
+            return os.open(path, flags | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except OSError as error:
-            raise CaptureError(f"{self.path}: cannot be created, {error.strerror}") from None
+            raise CaptureError(f"{path}: cannot be created, {error.strerror}") from None
 
-    def _describe(self, described: Described) -> None:
-        """Write what a run depended on beside its inputs; the versions last."""
-        deployment = described.deployment
+    def _writer(self, file: int, book: Book | None = None) -> McapWriter:
+        return McapWriter(lambda content: write_all(file, content), PROFILE, book)
+
+    def _describe(self, mcap: McapWriter, own: Mapping[str, str]) -> dict[str, int]:
+        """Write what a run depended on beside its inputs, and what is this file's `own`; the versions last.
+
+        Return the channels of its topics.
+        """
+        described, deployment = self._described, self._described.deployment
+        channels = declare_topics(mcap)
         content = {
             **described.metadata,
             "format": str(FORMAT),
@@ -321,83 +333,133 @@ class CaptureFile:
             "seed": str(deployment.seed),
             "tick_ns": str(deployment.tick_ns),
             "deployment": described.name,
+            **own,
         }
-        self.mcap.add_metadata(METADATA, content)
-        self.mcap.add_attachment(DEPLOYMENT, "application/yaml", described.text.encode())
-        for path, file in described.deployment.asset_files.items():
-            self.mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
-        self.mcap.add_attachment(VERSIONS, "application/json", encode_json(library_versions()))
+        mcap.add_metadata(METADATA, content)
+        mcap.add_attachment(DEPLOYMENT, "application/yaml", described.text.encode())
+        for path, file in deployment.asset_files.items():
+            mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
+        versions = library_versions() | model_versions(deployment.network)
+        mcap.add_attachment(VERSIONS, "application/json", encode_json(versions))
+        return channels
 
-    # --- a file that was left unfinished -----------------------------------------------------------------------------
+    def _let_go(self) -> None:
+        if self._file >= 0:
+            os.close(self._file)
+        self._file = -1
 
-    def _scanned(self, journal_tick: int, journal_end: Captured | None, run: str, at_once: bool) -> Scanned | None:
-        """Return what the file has, cut at its last whole record; None when it has to be begun anew."""
-        void = None if journal_end is None else _behind(journal_end, self._plan.tick_ns)
-        with os.fdopen(os.dup(self._file), "rb") as stream:
-            size = os.fstat(self._file).st_size
-            if at_once and size > UNSYNCED_BYTES:
-                with mmap(self._file, size - UNSYNCED_BYTES, access=ACCESS_READ) as old, memoryview(old) as trusted:
-                    found = scan(stream, size, str(self.path), trusted, void)
-            else:
-                found = scan(stream, size, str(self.path), NOTHING, void)
-        if found.finished:
-            raise CaptureError(f"{self.path}: is finished; a capture is never overwritten")
-        if found.metadata.get(METADATA, {}).get("run", run) != run:
-            raise CaptureError(f"{self.path}: is that of run {found.metadata[METADATA]['run']}, not of run {run}")
-        is_described = VERSIONS in {attachment.name for attachment in found.book.attachments}
-        if found.book.chunks and not is_described:
-            raise CaptureError(f"{self.path}: no capture of foosim, it lacks {VERSIONS}")
-        self.done = _progress(found)
+    # --- the next file -----------------------------------------------------------------------------------------------
+
+    def begins_next(self, item: Item) -> bool:
+        """Whether the next file begins with an item: `go_on`, and write it then."""
+        if self._split is None or not isinstance(item, Closing) or item.frame.tick <= self.done.tick:
+            return False
+        return self._split.is_due(item.frame.tick, self.mcap.offset)
+
+    def go_on(self, closing: Closing) -> None:
+        """End this file, and begin the next one, which a closing is to be written to; old files may go.
+
+        Raises OSError, and all is as it was, when the disk refuses.
+        """
+        split = self._split
+        assert split is not None
+        self.end_chunk()
+        path = part_path(self.path, split.number + 1)
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        try:
+            mcap = self._writer(file)
+            self._describe(mcap, split.entries(closing))
+            self._repeat(mcap, closing.frame)
+            sync_folder(path.parent)
+            self._end({"reason": "goes on", "last_tick": str(self.done.tick), NEXT: path.name})
+        except OSError:
+            os.close(file)
+            path.unlink(missing_ok=True)
+            raise
+        with self._swap:
+            os.close(self._file)
+            self._file = file
+        gone = split.go_on(closing.frame.tick, self.mcap.offset, mcap.offset)
+        self.mcap = mcap
+        for old in gone:
+            old.unlink(missing_ok=True)
+
+    def _repeat(self, mcap: McapWriter, frame: Frame) -> None:
+        """Write the first chunk of a file that begins with a frame: what holds there, and a line of the log.
+
+        There is always something in it: who comes from the file before passes the first chunk by.
+        """
+        split, known = self._split, self._known
+        assert split is not None
+        at_ns = frame.tick * self._plan.tick_ns
+        is_new = known is None or known.layout.digest != frame.layout.digest
+        text = f"goes on from {split.path.name}"
+        line = Message(LOG, at_ns, at_ns, 0, self._view.log_line("info", text, frame.tick))
+        for message in (*split.in_force.messages(), line):
+            if not is_new or message.topic not in (LAYOUT, SCENE):
+                mcap.add_message(self._channels[message.topic], at_ns, at_ns, message.sequence, message.data)
+        mcap.end_chunk()
+
+    # --- files that were left unfinished -----------------------------------------------------------------------------
+
+    def _go_on_with_left(self, journal: Journalled) -> Scanned | None:
+        """Open the last file that was left, and cut it behind what is whole; None when it has to be begun anew.
+
+        A file without a tick, which is not the only one, is dropped: it comes again behind the one before.
+        """
+        there = {0: self.path} if self._split is None else parts_at(self.path) or {0: self.path}
+        dropped: list[Left] = []
+        for number, path in sorted(there.items(), reverse=True):
+            self._let_go()
+            self._file = self._open(path, os.O_RDWR)
+            left = look(self._file, path, self._plan.tick_ns, journal)
+            if left.done.tick >= 0 or number == min(there):
+                break
+            dropped.append(left)
+        self.done = left.done
+        for found in (left, *dropped):
+            self._check_left(found, journal.tick)
+        for found in dropped:
+            found.path.unlink()
+        return self._cut(number, left)
+
+    def _check_left(self, left: Left, journal_tick: int) -> None:
+        run = self._described.metadata.get("run", "")
+        if (run_of(left) or run) != run:
+            raise CaptureError(f"{left.path}: is that of run {run_of(left)}, not of run {run}")
+        if left.found.book.chunks and not _is_described(left.found):
+            raise CaptureError(f"{left.path}: no capture of foosim, it lacks {VERSIONS}")
+        if left.problem and journal_tick > self.done.tick + 1:
+            raise CaptureError(f"{left.problem}, no journal has tick {self.done.tick + 1}")
+
+    def _cut(self, number: int, left: Left) -> Scanned | None:
+        found, split = left.found, self._split
+        is_described = _is_described(found)
+        if number and not is_described:
+            raise CaptureError(f"{left.path}: ends before its description, and no file before it is there")
+        self.torn_bytes = left.torn_bytes
+        if split is not None and is_described:
+            first = found.book.chunks[0].chunk_start_offset if found.book.chunks else found.book.offset
+            split.take_over(number, first)
+            own = {key: value for key, value in found.metadata[METADATA].items() if key not in OWN}
+            self._described = replace(self._described, metadata=own)
+            with os.fdopen(os.dup(self._file), "rb") as stream:
+                for message in read_messages(stream, found.book, HOLDING):
+                    split.in_force.take(message)
         end = found.book.offset if is_described else 0
-        if not found.is_cut and journal_tick > self.done.tick + 1:
-            why = "damaged" if not found.is_void else "further than its journal, whose end is lost"
-            raise CaptureError(
-                f"{self.path}: byte {end}: {why}; {found.torn_bytes} bytes from there on would be lost, "
-                f"no journal has tick {self.done.tick + 1}"
-            )
-        self.torn_bytes = found.torn_bytes
         os.ftruncate(self._file, end)
         os.lseek(self._file, end, os.SEEK_SET)
         return found if is_described else None
 
 
-def _behind(end: Captured, tick_ns: int) -> Void:
-    """Return what a capture has behind the end of a journal."""
-    fields = {TICK: ("tick", end.tick), EPOCHS: ("epoch", end.epoch)}
-
-    def is_void(topic: str, data: bytes) -> bool:
-        name, last = fields[topic]
-        return _number(data, name) > last
-
-    return Void(tuple(fields), max(0, end.tick) * tick_ns, is_void)
+def _is_described(found: Scanned) -> bool:
+    return VERSIONS in {attachment.name for attachment in found.book.attachments}
 
 
-def _progress(found: Scanned) -> Progress:
-    """Return how far a file is, by the last rows of its topics."""
-    return Progress(
-        _last_number(found, TICK, "tick"),
-        _last_number(found, FRAME, "tick"),
-        _last_number(found, EPOCHS, "epoch"),
-        _last_row(found, PACKETS).get("fate") == IN_FLIGHT,
-    )
-
-
-def _last_row(found: Scanned, topic: str) -> dict[str, object]:
-    return _row(found.last.get(topic, b"{}"))
-
-
-def _row(data: bytes) -> dict[str, object]:
+def sync_folder(folder: Path) -> None:
+    """Bring the names of a folder's files to the disk; raises OSError."""
+    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        row = decode_json(data)
-    except Malformed:
-        return {}
-    return row if isinstance(row, dict) else {}
-
-
-def _last_number(found: Scanned, topic: str, field: str) -> int:
-    return _number(found.last.get(topic, b"{}"), field)
-
-
-def _number(data: bytes, field: str) -> int:
-    number = _row(data).get(field, -1)
-    return number if isinstance(number, int) else -1
+        os.fsync(opened)
+    finally:
+        os.close(opened)

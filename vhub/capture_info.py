@@ -9,10 +9,16 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
+import msgspec
+
+from foosim.protocol import message_types
 from foosim.protocol.frame import CHAIN_START, chain_next
-from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of
-from foosim.vhub.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK
+from foosim.vhub.capture_parts import files_from
+from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, Scan, TickMark, chain_at_start, deployment_of
+from foosim.vhub.mcap_file import Message
+from foosim.vhub.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, Fate
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +31,8 @@ class CaptureInfo:
     """
 
     path: str
+    parts: tuple[str, ...]
+    """The files that it was read from, in their order."""
     bytes: int
     finished: bool
     unfinished_bytes: int
@@ -45,50 +53,40 @@ class CaptureInfo:
     causes: Mapping[str, int]
     channels: Mapping[str, int]
     """Packets by channel."""
+    payloads: str
+    """`exact`, or `hashed`: then what needs them cannot be done."""
     payload_bytes: int
     recoveries: int
     files: Mapping[str, int]
     topics: Mapping[str, int]
 
 
+class PacketMark(msgspec.Struct, frozen=True, gc=False):
+    """What of a packet is counted here; the rest of its row is passed over."""
+
+    channel: str
+    fate: Fate
+    cause: str
+    size: message_types.Counter
+
+
+PACKET_MARKS: Final = msgspec.json.Decoder(PacketMark)
+
+
 def capture_info(path: Path | str) -> CaptureInfo:
     """Return a capture in short, by one pass over the file."""
     path = Path(path)
     scan = Scan(path)
-    topics: Counter[str] = Counter()
-    fates: Counter[str] = Counter()
-    causes: Counter[str] = Counter()
-    channels: Counter[str] = Counter()
-    payload_bytes = 0
-    first, tick, digest, chain = -1, 0, b"", CHAIN_START
-    nodes: set[str] = set()
-    arithmetic: set[str] = set()
-    clients: set[str] = set()
+    found = _Counts(scan)
     for message in scan.messages():
-        topics[message.topic] += 1
-        if message.topic == TICK:
-            row = scan.decode(DECODERS[TICK], message)
-            tick, digest = row.tick, bytes.fromhex(row.digest)
-            chain = chain_next(chain, digest) if first >= 0 else chain_at_start(scan.about)
-            first = tick if first < 0 else first
-        elif message.topic == PACKETS:
-            packet = scan.decode(DECODERS[PACKETS], message)
-            fates[packet.fate] += 1
-            channels[packet.channel] += 1
-            payload_bytes += packet.size
-            if packet.cause:
-                causes[packet.cause] += 1
-        elif message.topic == CLIENTS:
-            clients.add(scan.decode(DECODERS[CLIENTS], message).client)
-        elif message.topic == EPOCHS:
-            epoch = scan.decode(DECODERS[EPOCHS], message)
-            nodes.update(epoch.roster)
-            arithmetic.add(epoch.arithmetic)
-    about, first = scan.about, max(0, first)
-    tick_ns = deployment_of(about).tick_ns
+        found.take(message)
+    about, first, files = scan.about, max(0, found.first), files_from(path)
+    deployment = deployment_of(about)
+    tick_ns = deployment.tick_ns
     return CaptureInfo(
         str(path),
-        path.stat().st_size,
+        tuple(file.name for file in files),
+        sum(file.stat().st_size for file in files),
         about.finished,
         about.unfinished_bytes,
         about.library,
@@ -96,19 +94,62 @@ def capture_info(path: Path | str) -> CaptureInfo:
         about.end,
         about.versions,
         first,
-        tick,
+        found.tick,
         tick_ns,
-        (tick - first) * tick_ns,
-        digest.hex(),
-        chain.hex(),
-        tuple(sorted(nodes)),
-        tuple(sorted(arithmetic - {""})),
-        tuple(sorted(clients)),
-        {"offered": fates.total(), **{fate: fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
-        dict(sorted(causes.items())),
-        dict(sorted(channels.items())),
-        payload_bytes,
-        topics[RECOVERIES],
+        (found.tick - first) * tick_ns,
+        found.digest.hex(),
+        found.chain.hex(),
+        tuple(sorted(found.nodes)),
+        tuple(sorted(found.arithmetic - {""})),
+        tuple(sorted(found.clients)),
+        {"offered": found.fates.total(), **{fate: found.fates[fate] for fate in ("delivered", "dropped", "in_flight")}},
+        dict(sorted(found.causes.items())),
+        dict(sorted(found.channels.items())),
+        deployment.capture.payloads,
+        found.payload_bytes,
+        found.topics[RECOVERIES],
         {name: len(content) for name, content in sorted(about.files.items())},
-        dict(sorted(topics.items())),
+        dict(sorted(found.topics.items())),
     )
+
+
+class _Counts:
+    """What is kept of the messages that went by."""
+
+    def __init__(self, scan: Scan) -> None:
+        self.topics: Counter[str] = Counter()
+        self.fates: Counter[str] = Counter()
+        self.causes: Counter[str] = Counter()
+        self.channels: Counter[str] = Counter()
+        self.payload_bytes = 0
+        self.first, self.tick, self.digest, self.chain = -1, 0, b"", CHAIN_START
+        self.nodes: set[str] = set()
+        self.arithmetic: set[str] = set()
+        self.clients: set[str] = set()
+        self._scan = scan
+
+    def take(self, message: Message) -> None:
+        topic, decode = message.topic, self._scan.decode
+        self.topics[topic] += 1
+        if topic == PACKETS:
+            packet = decode(PACKET_MARKS, message)
+            self.fates[packet.fate] += 1
+            self.channels[packet.channel] += 1
+            self.payload_bytes += packet.size
+            if packet.cause:
+                self.causes[packet.cause] += 1
+        elif topic == TICK:
+            self._take_tick(decode(TICK_MARKS, message))
+        elif topic == CLIENTS:
+            self.clients.add(decode(DECODERS[CLIENTS], message).client)
+        elif topic == EPOCHS:
+            epoch = decode(DECODERS[EPOCHS], message)
+            self.nodes.update(epoch.roster)
+            self.arithmetic.add(epoch.arithmetic)
+
+    def _take_tick(self, mark: TickMark) -> None:
+        self.tick, self.digest = mark.tick, bytes.fromhex(mark.digest)
+        if self.first < 0:
+            self.first, self.chain = mark.tick, chain_at_start(self._scan.about)
+        else:
+            self.chain = chain_next(self.chain, self.digest)

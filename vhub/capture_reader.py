@@ -9,7 +9,7 @@ Neighbours: `rows`, `capture_columns`, `mcap_file`, `capture_writer`, `capture_i
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +26,7 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.message_types import Counter
 from foosim.protocol.messages import Delivered, Edit, Origin
 from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
@@ -34,19 +35,16 @@ from foosim.protocol.start import first_chain
 from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
     ASSETS,
-    CUT,
-    CUT_CHAIN,
-    CUT_TICK,
     DEPLOYMENT,
-    END_METADATA,
-    METADATA,
     ORIGIN,
     ORIGIN_CHAIN,
     ORIGIN_DIGEST,
     ORIGIN_TICK,
     VERSIONS,
 )
-from foosim.vhub.mcap_file import MAGIC, McapFile, Message
+from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, Joined, end_of, files_from
+from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
+from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import (
     CLIENTS,
     EPOCHS,
@@ -60,6 +58,8 @@ from foosim.vhub.rows import (
     TICK,
     CaptureError,
     ClientRow,
+    DigestHex,
+    EditRow,
     EpochRow,
     FrameRow,
     LayoutRow,
@@ -73,6 +73,24 @@ from foosim.vhub.rows import (
 
 DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
 """Decodes and checks a row of each topic."""
+
+
+class TickMark(msgspec.Struct, frozen=True, gc=False):
+    """What of a row of /tick is read where the world is not simulated again; the rest is passed over."""
+
+    tick: Counter
+    digest: DigestHex
+    edits: list[EditRow]
+
+
+class FrameMark(msgspec.Struct, frozen=True, gc=False):
+    """The tick of a row of /frame."""
+
+    tick: Counter
+
+
+TICK_MARKS: Final = msgspec.json.Decoder(TickMark)
+FRAME_MARKS: Final = msgspec.json.Decoder(FrameMark)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +122,8 @@ class About:
     start_ns: int = 0
     end_ns: int = 0
     """Simulated times of the first and the last message, once the file was read to its end."""
+    chunk_starts: Sequence[int] = ()
+    """That of the first message in each chunk, up to the one that is being read."""
 
     @property
     def deployment_name(self) -> str:
@@ -119,32 +139,29 @@ class Scan:
         self._path = path
         self._since_ns = since_ns
 
-    def messages(self) -> Iterator[Message]:
-        """Yield all messages, from the first on behind the checked metadata."""
-        try:
-            with self._path.open("rb") as stream:
-                file = McapFile(stream, self._path.stat().st_size, str(self._path), self._since_ns)
-                checked = False
-                for content in file.contents():
-                    if isinstance(content, Message):
-                        if not checked:
-                            self._check(file.profile)
-                            checked = True
-                        yield content
-                    else:
-                        self._take(content)
-        except OSError as error:
-            raise CaptureError(f"{self._path}: cannot be read, {error.strerror}") from None
+    def messages(self, topics: frozenset[str] | None = None) -> Iterator[Message]:
+        """Yield the messages of some topics (None: all), from the first on behind the checked metadata."""
+        file = Joined(self._path, self._since_ns, topics)
+        self.about.chunk_starts = file.chunk_starts
+        checked = False
+        for content in file.contents():
+            if isinstance(content, Message):
+                if not checked:
+                    self._check(file.profile)
+                    checked = True
+                yield content
+            else:
+                self._take(content)
         self._check(file.profile)
         self.about.library = file.library
-        self.about.finished, self.about.unfinished_bytes = file.finished, file.unfinished_bytes
-        self.about.start_ns, self.about.end_ns = min(file.start_ns, file.end_ns), file.end_ns
+        self.about.finished = file.finished and NEXT not in self.about.end
+        self.about.unfinished_bytes = file.unfinished_bytes
+        self.about.start_ns, self.about.end_ns = min((file.end_ns, *file.chunk_starts)), file.end_ns
 
     def rows(self, topics: frozenset[str]) -> Iterator[tuple[str, Row]]:
         """Yield the rows of some topics."""
-        for message in self.messages():
-            if message.topic in topics:
-                yield message.topic, self.decode(DECODERS[message.topic], message)
+        for message in self.messages(topics):
+            yield message.topic, self.decode(DECODERS[message.topic], message)
 
     def decode(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
         """Return the row that a message holds."""
@@ -192,6 +209,10 @@ class CaptureData:
     """Ticks of the frames whose digests are there, ascending; all from 0 on in a whole capture."""
     digests: NDArray[np.uint8]
     """D(tick) of each, (n, 32)."""
+    frame_ticks: Integers
+    """Ticks of the frames that are there themselves."""
+    edit_kinds: frozenset[str]
+    """Kinds of the edits that the run had."""
     clients: tuple[ClientRow, ...]
     epochs: tuple[EpochRow, ...]
     recoveries: tuple[RecoveryRow, ...]
@@ -207,18 +228,29 @@ class CaptureData:
     @cached_property
     def frame_blocks(self) -> tuple[Frames, ...]:
         """Captured frames, a block for each layout."""
+        scan = Scan(self.path)
+        reader = FrameReader(scan, self.deployment)
         blocks: list[tuple[Layout, list[FrameRow]]] = []
-        for layout, row in _frames(Scan(self.path), self.deployment):
+        for message in scan.messages(FrameReader.TOPICS):
+            layout, row = reader.row(message)
             if row is None:
                 blocks.append((layout, []))
             else:
                 blocks[-1][1].append(row)
         return tuple(frames_of(layout, rows) for layout, rows in blocks)
 
+    def each_frame(self) -> Iterator[Frame]:
+        """Yield the captured frames one by one."""
+        scan = Scan(self.path)
+        reader = FrameReader(scan, self.deployment)
+        for message in scan.messages(FrameReader.TOPICS):
+            frame = reader.frame(message)
+            if frame is not None:
+                yield frame
+
     def first_frame(self) -> Frame | None:
         """Return the first captured frame, None when there is none."""
-        found = next(((layout, row) for layout, row in _frames(Scan(self.path), self.deployment) if row), None)
-        return None if found is None else frames_of(found[0], [found[1]]).frame(0)
+        return next(self.each_frame(), None)
 
     @property
     def frames(self) -> Frames:
@@ -281,12 +313,8 @@ def read_about(path: Path) -> About:
     scan = Scan(path)
     for _ in scan.messages():
         break
-    try:
-        with path.open("rb") as stream:
-            stream.seek(max(0, path.stat().st_size - len(MAGIC)))
-            scan.about.finished = stream.tell() > 0 and stream.read() == MAGIC
-    except OSError as error:
-        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+    end = end_of(files_from(path)[-1])
+    scan.about.finished = end is not None and NEXT not in end
     return scan.about
 
 
@@ -302,48 +330,56 @@ def open_capture(path: Path | str) -> CaptureData:
     """Open a capture, also an unfinished one. Raises CaptureError when it is none, or damaged."""
     scan = Scan(Path(path))
     ticks: array[int] = array("q")
+    frame_ticks: array[int] = array("q")
     digests = bytearray()
+    edit_kinds: set[str] = set()
     others: dict[str, list[Any]] = {CLIENTS: [], EPOCHS: [], RECOVERIES: []}
-    layouts = _Layouts(scan)
-    for message in scan.messages():
+    for message in scan.messages(frozenset({TICK, FRAME, *others})):
         if message.topic == TICK:
-            tick_row = scan.decode(DECODERS[TICK], message)
-            if ticks and tick_row.tick <= ticks[-1]:
-                raise CaptureError(f"{path}: tick {tick_row.tick} comes behind tick {ticks[-1]}")
-            ticks.append(tick_row.tick)
-            digests += bytes.fromhex(tick_row.digest)
-        elif message.topic in (LAYOUT, FRAME):
-            layouts.take(message)
-        elif message.topic in others:
+            mark = scan.decode(TICK_MARKS, message)
+            if ticks and mark.tick <= ticks[-1]:
+                raise CaptureError(f"{path}: tick {mark.tick} comes behind tick {ticks[-1]}")
+            ticks.append(mark.tick)
+            digests += bytes.fromhex(mark.digest)
+            edit_kinds.update(edit.kind for edit in mark.edits)
+        elif message.topic == FRAME:
+            frame_ticks.append(scan.decode(FRAME_MARKS, message).tick)
+        else:
             others[message.topic].append(scan.decode(DECODERS[message.topic], message))
     return CaptureData(
         scan.about,
-        layouts.deployment or deployment_of(scan.about),
+        deployment_of(scan.about),
         np.array(ticks, dtype=np.int64),
         np.frombuffer(bytes(digests), dtype=np.uint8).reshape(len(ticks), 32),
+        np.array(frame_ticks, dtype=np.int64),
+        frozenset(edit_kinds),
         tuple(others[CLIENTS]),
         tuple(others[EPOCHS]),
         tuple(others[RECOVERIES]),
     )
 
 
-class _Layouts:
+class FrameReader:
     """Reads the frames of a pass over a file, each checked against the layout before it."""
 
-    def __init__(self, scan: Scan, deployment: Deployment | None = None) -> None:
-        self.deployment = deployment
+    TOPICS: Final = frozenset({LAYOUT, FRAME})
+
+    def __init__(self, scan: Scan, deployment: Deployment) -> None:
         self._scan = scan
+        self._deployment = deployment
         self._layout: Layout | None = None
 
-    def take(self, message: Message) -> tuple[Layout, FrameRow | None]:
-        """Return the layout that a message brings, or a frame with its layout. Raises CaptureError."""
-        scan = self._scan
-        row = scan.decode(DECODERS[message.topic], message)
-        if self.deployment is None:
-            self.deployment = deployment_of(scan.about)
-        path = scan.about.path
+    def frame(self, message: Message) -> Frame | None:
+        """Return the frame that a message of `TOPICS` brings; None where that is a layout. Raises CaptureError."""
+        layout, row = self.row(message)
+        return None if row is None else frames_of(layout, [row]).frame(0)
+
+    def row(self, message: Message) -> tuple[Layout, FrameRow | None]:
+        """Return the layout that a message brings, or the row of a frame with its layout. Raises CaptureError."""
+        row = self._scan.decode(DECODERS[message.topic], message)
+        path = self._scan.about.path
         if isinstance(row, LayoutRow):
-            self._layout = layout_of(path, self.deployment, row)
+            self._layout = layout_of(path, self._deployment, row)
             return self._layout, None
         layout = self._layout
         if layout is None:
@@ -351,14 +387,6 @@ class _Layouts:
         if len(row.values) != 8 * layout.size or any(o.index >= len(layout.entities) for o in row.outboxes):
             raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
         return layout, row
-
-
-def _frames(scan: Scan, deployment: Deployment) -> Iterator[tuple[Layout, FrameRow | None]]:
-    """Yield each layout, and each frame with its layout."""
-    layouts = _Layouts(scan, deployment)
-    for message in scan.messages():
-        if message.topic in (LAYOUT, FRAME):
-            yield layouts.take(message)
 
 
 def origin_of(about: About) -> Origin | None:
@@ -373,15 +401,21 @@ def origin_of(about: About) -> Origin | None:
         raise CaptureError(f"{about.path}: it does not say in full where its run began: {error}") from None
 
 
-def chain_at_start(about: About) -> bytes:
-    """Return the chain over all frames up to the first one that a capture has. Raises CaptureError."""
-    if CUT not in about.metadata:
-        return first_chain(origin_of(about))
+def beginning_of(about: About) -> Origin | None:
+    """Return where a capture begins, a cut or its run, None: at frame 0. Raises CaptureError."""
+    told = about.metadata
+    if CUT not in told:
+        return origin_of(about)
     try:
-        chain = bytes.fromhex(about.metadata[CUT_CHAIN])
+        digest, chain = bytes.fromhex(told[CUT_DIGEST]), bytes.fromhex(told[CUT_CHAIN])
+        return Origin(int(told[CUT_TICK]), told[CUT], digest, chain)
     except (KeyError, ValueError) as error:
         raise CaptureError(f"{about.path}: it does not say in full where it was cut: {error}") from None
-    return chain
+
+
+def chain_at_start(about: About) -> bytes:
+    """Return the chain over all frames up to the first one that a capture has. Raises CaptureError."""
+    return first_chain(beginning_of(about))
 
 
 def check_whole(about: About) -> None:
@@ -390,7 +424,7 @@ def check_whole(about: About) -> None:
         source, tick = about.metadata[CUT], about.metadata.get(CUT_TICK)
         raise CaptureError(
             f"{about.path}: a cut of {source} from tick {tick} on; a run is verified from where it began: "
-            f"verify {source}, or begin a run with a frame of the cut"
+            f"verify {source}, or this from its first frame on (--from-first-frame)"
         )
 
 

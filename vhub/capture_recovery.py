@@ -26,6 +26,8 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.journal import JournalError, journal_files, lock_journal, read_journal
 from foosim.protocol.messages import Epoch
 from foosim.vhub.capture_file import CHUNK_BYTES, CaptureFile, Described, Line
+from foosim.vhub.capture_left import Journalled
+from foosim.vhub.capture_parts import whole_path
 from foosim.vhub.capture_reader import About, deployment_of, read_about
 from foosim.vhub.packet import IN_FLIGHT
 from foosim.vhub.records import Closing, HeadRecord, HubRecord, fold
@@ -62,11 +64,12 @@ class Recovered:
 def recover_capture(path: Path, journals: Path | None = None) -> Recovered | None:
     """Make an unfinished capture a valid one, in place; None when it has its end already.
 
-    `journals` is the folder of the vHub's journal, which stays. Raises CaptureError when the file is no capture, when
+    Of a capture that is split that is done to its last file, whichever is named. `journals` is the folder of the vHub's
+    journal, which stays. Raises CaptureError when the file is no capture, when
     it is damaged before its end and no journal tells what would be cut off, or when the disk refuses; JournalError when
     a vHub still writes the journal.
     """
-    about = read_about(path)
+    about = read_about(whole_path(path))
     if about.finished:
         return None
     if journals is None or not journal_files(journals, VHUB):
@@ -82,7 +85,7 @@ def _recover(about: About, records: Iterable[bytes]) -> Recovered:
     deployment = deployment_of(about)
     described = Described(deployment, about.deployment_name, about.deployment_text, about.metadata)
     completion = _Completion(deployment, about.metadata.get("run", ""), records)
-    file = CaptureFile(about.path, described, completion.first_tick)
+    file = CaptureFile(about.path, described, Journalled(completion.first_tick))
     try:
         had = file.done.tick
         completion.write(file)
@@ -125,6 +128,8 @@ class _Completion:
         last: tuple[HubState, Closing] | None = None
         try:
             for last in fold(self._deployment, self._told_of(file)):
+                if file.begins_next(last[1]):
+                    file.go_on(last[1])
                 file.write(last[1])
                 if file.mcap.chunk_bytes > CHUNK_BYTES:
                     file.end_chunk()

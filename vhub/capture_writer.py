@@ -25,6 +25,7 @@ from foosim.protocol.disk import Level
 from foosim.protocol.messages import Epoch
 from foosim.vhub import capture_file
 from foosim.vhub.capture_file import CaptureFile, Described, Item, Line
+from foosim.vhub.capture_left import Journalled
 from foosim.vhub.records import Closing
 from foosim.vhub.resume import Captured
 
@@ -100,7 +101,8 @@ class CaptureWriter:
         self._changed = threading.Condition()
         """Guards the queue, the error and the ends; notified when any of them changes in a way that is waited for."""
         described = Described(deployment, deployment_name, deployment_text, metadata)
-        self._file = CaptureFile(path, described, journal_tick, journal_end, at_once=True)
+        journal = None if journal_tick is None else Journalled(journal_tick, journal_end, at_once=True)
+        self._file = CaptureFile(path, described, journal)
         self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
         """How far the file was that is gone on with."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
@@ -134,7 +136,7 @@ class CaptureWriter:
     def statistics(self) -> CaptureStatistics:
         mcap = self._file.mcap
         counts = self._offered - self._passed, self._written, self._refused, self._queued_rows, self._waits
-        return CaptureStatistics(mcap.messages, mcap.offset, *counts, self._file.done.tick, self.synced_tick)
+        return CaptureStatistics(mcap.messages, self._file.bytes, *counts, self._file.done.tick, self.synced_tick)
 
     def _put(self, item: Item) -> None:
         rows = _rows_in(item)
@@ -272,13 +274,24 @@ class CaptureWriter:
             return items, self._ending is not None and not self._queue
 
     def _write_item(self, item: Item) -> None:
+        if isinstance(item, Closing) and self._file.begins_next(item):
+            self._go_on(item)
         if self.state.level is Level.OUT:
             self._refused += _rows_in(item)
-            return
-        if self._file.write(item):
+        elif self._file.write(item):
             self._pending += _rows_in(item)
         else:
             self._passed += _rows_in(item)
+
+    def _go_on(self, closing: Closing) -> None:
+        """Begin the next file with a closing, when all before it is written."""
+        self._flush()
+        try:
+            if self.state.level is not Level.OUT:
+                self._file.go_on(closing)
+                self._syncer.tick = self._file.done.tick
+        except OSError as error:
+            self._give_up(str(self._file.disk_error(error)))
 
 
 class _Syncer:

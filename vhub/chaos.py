@@ -23,7 +23,7 @@ _RANGES, _CLOGS, _CUTS = 0, 1, 2
 
 
 def chaos_settings(key: bytes) -> Impairments:
-    """Return delay, loss, copies and queue of every link."""
+    """Return delay, loss, copies and capacity of every link."""
     words = draw_words(key, _RANGES)
     least_ms, mean_ms = 30.0 * unit_interval(words[0]), 30.0 + 70.0 * unit_interval(words[1])
     return Impairments.model_validate(
@@ -31,7 +31,7 @@ def chaos_settings(key: bytes) -> Impairments:
             "jitter": {"shape": "shifted_exp", "min": f"{least_ms:.3f} ms", "mean": f"{mean_ms:.3f} ms"},
             "loss": f"{30.0 * unit_interval(words[2]):.4f} %",
             "duplicate": f"{50.0 * unit_interval(words[3]):.4f} %",
-            "queue": {"packets": 2 + int(19.0 * unit_interval(words[4]))},
+            "capacity": 2 + int(19.0 * unit_interval(words[4])),
             "order": "free",
         }
     )

@@ -53,13 +53,13 @@ from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
 from foosim.vhub.footing import Footing
 from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closings
-from foosim.vhub.packet import Flight
+from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
 from foosim.vhub.report import HubStatistics, report, statistics
 from foosim.vhub.resume import Past
 from foosim.vhub.sessions import Sessions
-from foosim.vhub.state import HubState, received
+from foosim.vhub.state import HubState
 from foosim.vhub.waits import Waits
 
 HubAction = Action | Keep | KeepEpoch
@@ -72,7 +72,6 @@ class _World:
     frame: Frame
     closing: Closing
     commit: bytes
-    waited: list[str]
     free: dict[str, list[Flight]]
 
 
@@ -93,6 +92,8 @@ class HubCore:
         self.finished = False
         self.lost = self.failure = self.capture = self.capture_file = self.radio_address = ""
         self.recording: dict[str, Any] = {}
+        self.speak: Callable[[int], int] = lambda now_ns: now_ns
+        """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
         self.epoch = self._epoch_tick = 0
         self._epoch_payload = b""
@@ -103,9 +104,9 @@ class HubCore:
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
+        self._waited: list[str] = []  # clients whose Dones that tick lacks
         self._patience = Patience(now_ns)
-        self._end_ns = 0
-        self._malformed = self.repeated = 0
+        self._end_ns = self._malformed = self.repeated = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Commit: self._on_commit,
             Samples: self._on_samples,
@@ -156,9 +157,9 @@ class HubCore:
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
         self.member.wake(now_ns, self._heartbeat)
-        if self._world is not None and self._world.waited and self.releases is not None:
-            self.sessions.repeat(self._world.waited, now_ns)
-            for late in self.sessions.overdue(self._world.waited, self.releases.paused, now_ns):
+        if self._waited and self.releases is not None:
+            self.sessions.repeat(self._waited, now_ns)
+            for late in self.sessions.overdue(self._waited, self.releases.paused, now_ns):
                 self.lose(late.name, f"no Done of tick {late.go_tick} within its deadline")
         self.door.wake(now_ns)
         if self.state is not None and self.epoch > 0:
@@ -176,8 +177,8 @@ class HubCore:
             deadline = min(deadline, self._patience.at_ns, limits.COUNTER_MAX if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
-        if self._world is not None and self._world.waited:
-            deadline = min(deadline, self.sessions.again_ns(self._world.waited))
+        if self._waited:
+            deadline = min(deadline, self.sessions.again_ns(self._waited))
         late_ns = self.sessions.late_ns
         return deadline if late_ns is None else min(deadline, late_ns)
 
@@ -190,12 +191,12 @@ class HubCore:
 
     @property
     def lacking(self) -> tuple[Channel, int]:
-        """The channel, and how many messages of it, without which no tick is closed (Dones come on the other plane).
-
-        Where deliveries are final nobody waits for a closing: those ticks are closed together.
-        """
+        """The channel, and how many messages of it, without which no tick is closed; free-running clients wake nobody.
+        Where deliveries are final nobody waits for a closing: those ticks are closed together."""
         if self.state is None:
             return channels.COMMIT, 1
+        if self.epoch == 0 or self._waited:
+            return channels.UP, max(1, len(self._waited))
         if self._world is None and self.state.closed + 1 in self.commits:
             return channels.SAMPLES, 1
         return channels.COMMIT, max(1, self.state.final - self.commits.next_tick)
@@ -211,7 +212,7 @@ class HubCore:
             missing = self.sessions.missing(self.state.deployment, self.state)
             return JOIN_OF + ", ".join(missing) if missing else "epoch"
         if self._world is not None:
-            return DONE_OF + ", ".join(self._world.waited) if self._world.waited else ""
+            return DONE_OF + ", ".join(self._waited) if self._waited else ""
         tick = self.state.closed + 1
         committed = self.commits.get(tick)
         if committed is None:
@@ -226,7 +227,7 @@ class HubCore:
 
     def waits_for(self, client: str) -> bool:
         """Whether a tick waits for this client's Done."""
-        return self._world is not None and client in self._world.waited
+        return client in self._waited
 
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
@@ -235,8 +236,7 @@ class HubCore:
         state = self.state
         assert state is not None
         tick = state.closed + 1
-        committed = self.commits.get(tick)
-        if committed is None:
+        if (committed := self.commits.get(tick)) is None:
             return False
         raw, commit, frame = committed
         self.waits.begin(now_ns)
@@ -249,25 +249,26 @@ class HubCore:
             state.leave(name)
         for joining in joins:
             state.join(joining, tick)
-        closing = closing_of(frame, commit, state, joins, leaves, now_ns)
+        closing = closing_of(frame, commit, self.commits.chain_at(tick), state, joins, leaves, now_ns)
         released = state.close_world(frame, packets, closing.fates, commit.edits)
         due = state.due_members(tick)
         for name in due:
             self.door.go(name, tick, released.pop(name, []), now_ns)
-        self._world = _World(frame, closing, raw, [name for name in due if name in self.sessions.by_name], released)
+        self._world = _World(frame, closing, raw, released)
+        self._waited = [name for name in due if name in self.sessions.by_name]
         return True
 
     def _close_clients(self, now_ns: int) -> bool:
-        """Phase two, when all Dones are there: judge what clients sent, write, speak."""
-        world, state = self._world, self.state
-        assert world is not None and state is not None
-        if world.waited:
+        """Phase two, when all Dones are there: judge what clients sent, write, speak; what robots get comes first."""
+        if self._waited:
             return False
+        world, state, releases = self._world, self.state, self.releases
+        assert world is not None and state is not None and releases is not None
         tick = world.frame.tick
         self._tell_of_waits(now_ns)
         admitted = self.sessions.take_sent() if state.hears_clients else {}
         samples = self._samples.pop(tick, [])
-        deliveries = state.close_clients(world.frame, admitted, world.closing.fates)
+        deliveries = state.close_robots(world.frame, admitted)
         payload = encode(deliveries)
         for name in world.free:
             state.members[name].downlink += 1
@@ -279,14 +280,19 @@ class HubCore:
             for following in range(tick + 2, state.final + 1):
                 self._sent[following] = encode(Deliveries(following, [], branch=state.branch))
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
+        now_ns = self.speak(now_ns)
+        for name, flights in world.free.items():
+            releases.add(name, state.members[name].downlink, tick, flights, now_ns)
+        self._release(now_ns)
+        self.speak(now_ns)
+        world.closing.fates += state.close_rest()
+        if state.fabric.faults:
+            self.lose("the network", state.fabric.faults[0])
         for flight in world.closing.fates:
             if not flight.cause and flight.destination not in state.members:
                 flight.released_wall_ns = now_ns
-        assert self.releases is not None
-        for name, flights in world.free.items():
-            self.releases.add(name, state.members[name].downlink, tick, flights, now_ns)
         self._keeping.add(world.closing)
-        self._release(now_ns)
+        self.actions += self._keeping.take(releases.waiting_tick)
         self._world = None
         if (tick + 1) % limits.CHECKPOINT_TICKS == 0:
             self.actions.append(Journal(self.head()))
@@ -434,8 +440,7 @@ class HubCore:
 
     def take_done(self, client: str) -> None:
         """A tick waits for this client no more."""
-        assert self._world is not None
-        self._world.waited.remove(client)
+        self._waited.remove(client)
         self.waits.client = client
 
     def _on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:

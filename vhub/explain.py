@@ -16,13 +16,16 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Disrupt
 from foosim.protocol.names import nearest_name
+from foosim.vhub.capture_columns import word_of
 from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.figures import EXACT, rate_text, time_text
-from foosim.vhub.propagation import crossing_db
+from foosim.vhub.link_models import VERSION_KEY
 from foosim.vhub.rows import PACKETS, TICK, PacketRow, TickRow, edit_of
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
+from foosim.vhub.stages.capacity import EVICTED
+from foosim.vhub.stages.own import MODEL, MODEL_FAILED
 from foosim.vhub.stages.residual import Residual
 from foosim.vhub.state import OUTBOX_SHIFT
 
@@ -77,7 +80,8 @@ class Explained:
 
 PASSED, DROPPED, ABSENT, UNREACHED = "passed", "dropped", "not on this link", "not reached"
 STAGE_NAMES: Final = (
-    *("admit", "policy", "duty", "queue", "medium", "channel", "residual", "mangle", "delay", "receiver"),
+    *("admit", "policy", "duty", "queue", "medium", "channel", "residual", "model", "mangle", "delay"),
+    *("capacity", "receiver"),
 )
 _AT_SENDING: Final = {
     **dict.fromkeys(("too_big", "node_down", "no_route"), "admit"),
@@ -87,11 +91,13 @@ _AT_SENDING: Final = {
     **dict.fromkeys(("collision",), "medium"),
     **dict.fromkeys(("out_of_range", "blocked", "snr"), "channel"),
     **dict.fromkeys(("random_loss", "burst_loss"), "residual"),
+    **dict.fromkeys((MODEL, MODEL_FAILED), "model"),
     **dict.fromkeys(("crc_fail",), "mangle"),
 }
 _AT_ARRIVAL: Final = {
     **dict.fromkeys(("partition", "expired"), "policy"),
     **dict.fromkeys(("collision", "snr", "out_of_range"), "channel"),
+    **dict.fromkeys((EVICTED,), "capacity"),
     **dict.fromkeys(("rx_down", "rx_full"), "receiver"),
 }
 """Which stage has dropped a packet, by cause."""
@@ -305,8 +311,8 @@ class _Story:
         text += f", received {row.received_cdbm / 100.0:g} dBm over {noise:g} dBm of noise: {row.snr_cdb / 100.0:g} dB"
         if row.interference_cdbm:
             text += f", others {row.interference_cdbm / 100.0:g} dBm"
-        if row.error_word:
-            word = int(row.error_word, 16)
+        word = word_of(row.error_word)
+        if word is not None:
             text += f", error rate {row.error_ppm / 1e6:.6g}, draw {_share(word)}"
             facts["error_draw"] = word / UNIT
         return text, facts
@@ -325,7 +331,7 @@ class _Story:
         ends = frozenset((world.body(row.source), world.body(row.destination)))
         a, b = sorted((of.antenna(row.source), of.antenna(row.destination)))
         crossings = world.crossings(a, b, ends)
-        known = [(crossing.name, crossing_db(crossing, self.settings.frequency_hz)) for crossing in crossings]
+        known = [(crossing.name, of.taken_db(crossing, a, b, ends)) for crossing in crossings]
         total = round(sum(loss_db for _, loss_db in known) * 100.0)
         if sorted(name for name, _ in known) != sorted(row.walls) or abs(total - row.walls_cdb) > 1:
             return dict.fromkeys(row.walls)
@@ -347,6 +353,14 @@ class _Story:
         below = "below" if draw < threshold else "not below"
         facts = {"state": state, "loss_rate": threshold / UNIT, "loss_draw": draw / UNIT}
         return f"{state} state, loss draw {_share(draw)} is {below} {_share(threshold)}", facts
+
+    def _model(self) -> tuple[str, dict[str, Any]]:
+        model, extra_ns = self.settings.model, self.row.model_ns
+        assert model is not None, "a link with a model of one's own"
+        facts = {"model": model.name, "parameters": dict(model.parameters), "extra_ns": extra_ns}
+        facts["package"] = self.capture.about.versions.get(VERSION_KEY + model.name, "")
+        failed = ", which failed" if self.row.cause == MODEL_FAILED else ""
+        return f"{model.name} of {facts['package']}{failed}, {_time(extra_ns)} more delay", facts
 
     def _mangle(self) -> tuple[str, dict[str, Any]]:
         row, settings = self.row, self.settings
@@ -380,12 +394,18 @@ class _Story:
             "airtime": row.airtime_ns,
             "way": row.propagation_ns,
             "constant": settings.delay_ns,
+            "link model": row.model_ns,
             "jitter": row.jitter_ns,
             "bad time": bad_ns,
             "reordered": reorder.extra_ns if reorder is not None and late else 0,
             "clog": row.held_ns,
         }
         return ((what, ns) for what, ns in spent.items() if ns)
+
+    def _capacity(self) -> tuple[str, dict[str, Any]]:
+        most, is_evicted = self.settings.capacity, self.row.cause == EVICTED
+        text = "another one took its place" if is_evicted else "it kept its place"
+        return f"at most {most} on their way at once, {text}", {"capacity": most, "evicted": is_evicted}
 
     def _receiver(self) -> tuple[str, dict[str, Any]]:
         row = self.row

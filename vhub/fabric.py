@@ -20,6 +20,7 @@ from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
 from foosim.vhub.events import Timeline
 from foosim.vhub.jitter import quantiles_ns
+from foosim.vhub.link_models import LinkModel, make_model
 from foosim.vhub.links import Link
 from foosim.vhub.memory import AirState, LinkState, RadioState
 from foosim.vhub.packet import Flight
@@ -53,6 +54,9 @@ class Fabric:
         self.airs: dict[str, Air] = {}
         self.asked: list[tuple[int, str]] = []
         """Events that were asked for while the run went on: the tick, and the event as JSON."""
+        self.faults: list[str] = []
+        """Why a link model of one's own has failed; nothing after it is what was asked for."""
+        self._models: dict[str, LinkModel] = {}
         self._links: dict[tuple[str, str, str], Link] = {}
         """By source, destination and what of the channel decides."""
         self._phases: dict[str, int] = {}
@@ -145,6 +149,8 @@ class Fabric:
             self.network.defaults.in_flight_on_partition == "drop",
             self._table(settings),
             self._opportunities(settings),
+            self._model(settings),
+            self.faults,
         )
 
     def queue_ns(self, key: LinkKey, now_ns: int) -> int:
@@ -168,6 +174,15 @@ class Fabric:
         if found is None:
             found = self.airs[name] = Air(AirState())
         return found
+
+    def _model(self, settings: Radio) -> LinkModel | None:
+        """Return the link model that settings name, one for equal parameters; raises ModelError."""
+        if settings.model is None:
+            return None
+        key = settings.model.model_dump_json()
+        if key not in self._models:
+            self._models[key] = make_model(settings.model)
+        return self._models[key]
 
     def _table(self, settings: Impairments) -> tuple[int, ...]:
         jitter = settings.jitter

@@ -1,5 +1,8 @@
 """Quantiles of jitter: a table of 4,096 per shape, built by a fixed routine and interpolated to whole nanoseconds.
 
+The upper sixteenth of a shape with a heavy tail is finer: each half of what is left above has 64 cells, so that a
+straight line over any of them hardly differs from the law, however rare what it is about.
+
 The routine uses only + - x / of IEEE doubles (its own exponential and logarithm), so that the table is the same on
 every machine, whatever its mathematical library. Source of the series: Abramowitz and Stegun, Handbook of Mathematical
 Functions, 6.5.29 (incomplete gamma). Neighbours: `numbers` (the functions), `stages.delay` draws from the tables.
@@ -8,12 +11,14 @@ Functions, 6.5.29 (incomplete gamma). Neighbours: `numbers` (the functions), `st
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
+from itertools import pairwise
 from typing import Final
 
 from pydantic import TypeAdapter
 
-from foosim.protocol.draws import gaussian
+from foosim.protocol.draws import UNIT, gaussian
 from foosim.protocol.impairments import (
     GammaJitter,
     Jitter,
@@ -27,6 +32,17 @@ from foosim.protocol.impairments import (
 from foosim.vhub.numbers import exp, ln, ln_gamma, power
 
 CELLS: Final = 4096
+TAIL_CELL: Final = CELLS - CELLS // 16
+"""From here on the cells of a heavy tail are finer."""
+HALF_CELLS: Final = 64
+"""Cells of each half of what is left above."""
+HALVES: Final = 48
+"""How often what is left above is halved: what is rarer than 2^-52 is as great as that."""
+GAMMA_HALVES: Final = 24
+"""The same of a gamma distribution: P(a, x) as a float tells no more from 1."""
+_TAIL_BITS: Final = 60
+_TAIL_WORD: Final = TAIL_CELL << 52
+_HALF_BITS: Final = HALF_CELLS.bit_length()
 
 
 class _Gamma:
@@ -86,11 +102,6 @@ ENDS: Final = (2.0**-20, 1.0 - 2.0**-20)
 """The probabilities of the first and last quantile: those at 0 and 1 would be 0 and infinite."""
 
 
-TAIL_END: Final = 2.0**-27
-"""The probability of more than the last quantile of a heavy tail: an eighth of its last cell, so that the straight line
-over that cell has nearly the mean and the spread that the law has there."""
-
-
 def _probabilities() -> tuple[float, ...]:
     return ENDS[0], *(cell / CELLS for cell in range(1, CELLS)), ENDS[1]
 
@@ -99,7 +110,7 @@ _ANY_JITTER: Final[TypeAdapter[Jitter]] = TypeAdapter(Jitter)
 
 
 def quantiles_ns(jitter: Jitter, table: tuple[int, ...] = ()) -> tuple[int, ...]:
-    """Return the quantiles, in ns, of any jitter: CELLS + 1, and CELLS more within the last cell of a heavy tail.
+    """Return the quantiles, in ns, of any jitter: CELLS + 1, or TAIL_CELL and those of a heavy tail.
 
     `table` is the content of the file of one that has a file.
     """
@@ -115,17 +126,16 @@ def _quantiles_of(text: bytes, table: tuple[int, ...]) -> tuple[int, ...]:
         return _mixture(jitter)
     if isinstance(jitter, TableJitter):
         return _from_table(jitter, table)
-    return tuple(round(_quantile(jitter, above)) for above in (*_aboves(), *_tail_aboves()))
+    return tuple(round(_quantile(jitter, above)) for above in _aboves(HALVES))
 
 
-def _aboves() -> tuple[float, ...]:
-    """Return the probabilities of more than each quantile, exact near 0."""
-    return 1.0 - ENDS[0], *((CELLS - cell) / CELLS for cell in range(1, CELLS)), 1.0 / CELLS
-
-
-def _tail_aboves() -> tuple[float, ...]:
-    """Return the same within the last cell."""
-    return *((CELLS - cell) / CELLS / CELLS for cell in range(1, CELLS)), TAIL_END
+def _aboves(halves: int) -> Iterator[float]:
+    """Yield the probability of more than each quantile of a heavy tail, all of them exact."""
+    yield 1.0 - ENDS[0]
+    yield from ((CELLS - cell) / CELLS for cell in range(1, TAIL_CELL))
+    for half in range(halves):
+        yield from (2.0 ** -(4 + half) * (1.0 - place / (2 * HALF_CELLS)) for place in range(HALF_CELLS))
+    yield 2.0 ** -(4 + halves)
 
 
 def _quantile(jitter: UniformJitter | LognormalJitter | ShiftedExponentialJitter | ParetoJitter, above: float) -> float:
@@ -201,7 +211,7 @@ def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
     """Return CELLS + 1 quantiles, in ns, of a gamma distribution; the ends are those at 2^-20 and at 1 - 2^-20.
 
     A first one at 0 would give narrow distributions a tail that they have not. Where the standard deviation is above
-    the mean the tail is heavy: CELLS more follow, within the last cell.
+    the mean the tail is heavy.
     """
     assert mean_ns > 0 and sd_ns > 0
     shape = (mean_ns / sd_ns) * (mean_ns / sd_ns)
@@ -209,26 +219,45 @@ def gamma_quantiles_ns(mean_ns: int, sd_ns: int) -> tuple[int, ...]:
     quantiles = []
     gamma = _Gamma(shape)
     x = p = 0.0
-    for above in _probabilities():
-        x = gamma.quantile(above, x, above - p)
-        p = above
+    for below in (1.0 - above for above in _aboves(GAMMA_HALVES)) if sd_ns > mean_ns else _probabilities():
+        x = gamma.quantile(below, x, below - p)
+        p = below
         quantiles.append(round(x * scale_ns))
-    if sd_ns > mean_ns:
-        x, p = quantiles[CELLS - 1] / scale_ns, 1.0 - 1.0 / CELLS
-        for more in _tail_aboves():
-            x = gamma.quantile(1.0 - more, x, 1.0 - more - p)
-            p = 1.0 - more
-            quantiles.append(round(x * scale_ns))
     return tuple(quantiles)
 
 
 def interpolate_ns(quantiles_ns: tuple[int, ...], word: int) -> int:
     """Return the quantile at word / 2^64, linear within its cell, in integer arithmetic."""
+    if word >= _TAIL_WORD and len(quantiles_ns) > CELLS + 1:
+        return _in_tail(quantiles_ns, UNIT - 1 - word)
     cell = word >> 52
     rest = word & 0xFFFFFFFFFFFFF
-    if cell == CELLS - 1 and len(quantiles_ns) > CELLS + 1:
-        inner = rest >> 40
-        low, high = quantiles_ns[cell if inner == 0 else CELLS + inner], quantiles_ns[CELLS + 1 + inner]
-        return low + (((high - low) * (rest & 0xFFFFFFFFFF)) >> 40)
     low = quantiles_ns[cell]
     return low + (((quantiles_ns[cell + 1] - low) * rest) >> 52)
+
+
+def _in_tail(quantiles_ns: tuple[int, ...], above: int) -> int:
+    """Return the quantile of which `above` / 2^64 is the probability of more, in a heavy tail."""
+    bits = above.bit_length()
+    first = TAIL_CELL + (_TAIL_BITS - bits) * HALF_CELLS
+    if first >= len(quantiles_ns) - 1:
+        return quantiles_ns[-1]
+    size = bits - _HALF_BITS
+    place, rest = divmod((1 << bits) - above, 1 << size)
+    low = quantiles_ns[first + place]
+    return low + ((quantiles_ns[first + place + 1] - low) * rest >> size) if rest else low
+
+
+def moments_ns(quantiles_ns: tuple[int, ...]) -> tuple[float, float]:
+    """Return mean and standard deviation, in ns, of what is drawn from quantiles."""
+    shares, left = [1.0 / CELLS] * CELLS, 0.0
+    if len(quantiles_ns) > CELLS + 1:
+        halves = (len(quantiles_ns) - 1 - TAIL_CELL) // HALF_CELLS
+        shares[TAIL_CELL:] = [2.0 ** -(5 + half) / HALF_CELLS for half in range(halves) for _ in range(HALF_CELLS)]
+        left = 2.0 ** -(4 + halves)
+    mean = square = 0.0
+    for share, (low, high) in zip(shares, pairwise(quantiles_ns), strict=True):
+        mean += share * (low + high) / 2.0
+        square += share * (low * low + low * high + high * high) / 3.0
+    mean, square = mean + left * quantiles_ns[-1], square + left * quantiles_ns[-1] * quantiles_ns[-1]
+    return mean, math.sqrt(max(0.0, square - mean * mean))

@@ -64,15 +64,15 @@ def last_closings(
         committed = commits.get(tick)
         if committed is None:
             break
-        closings.append(_unjudged(state, committed, now_ns))
+        closings.append(_unjudged(state, commits, committed, now_ns))
     closed = commits.get(state.closed)
     if not closings and closed is not None:
-        closings.append(_unjudged(state, closed, now_ns))
+        closings.append(_unjudged(state, commits, closed, now_ns))
     for closing in closings[-1:]:
         closing.fates += [replace(flight, cause=IN_FLIGHT) for flight in state.in_flight()]
     return closings
 
 
-def _unjudged(state: HubState, committed: Committed, now_ns: int) -> Closing:
+def _unjudged(state: HubState, commits: Commits, committed: Committed, now_ns: int) -> Closing:
     _, commit, frame = committed
-    return closing_of(frame, commit, state, [], [], now_ns)
+    return closing_of(frame, commit, commits.chain_at(frame.tick), state, [], [], now_ns)

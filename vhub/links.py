@@ -18,7 +18,10 @@ from foosim.vhub.packet import Flight
 from foosim.vhub.profiles import Profile, over
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
+from foosim.vhub.stages.capacity import leave
 from foosim.vhub.stages.delay import Delay
+from foosim.vhub.stages.own import Own
+from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.stage import Stage, arrival_hooks, sending_hooks
 
 if TYPE_CHECKING:
@@ -40,6 +43,7 @@ class Link:
         self._stages: list[Stage] = []
         self._at_sending: list[Callable[[Flight], str]] = []
         self._at_arrival: list[Callable[[Flight, str], str]] = []
+        self._is_apart = False
         self._slots = self._phase_ns = 0
 
     @property
@@ -77,6 +81,12 @@ class Link:
         self._at_sending, self._at_arrival = sending_hooks(self._stages), arrival_hooks(self._stages)
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
+        self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self._stages))
+
+    def is_apart(self, time_ns: int) -> bool:
+        """Whether what is sent at a time shares no radio, queue or air with other links, and no model of one's own."""
+        self._settle(time_ns)
+        return self._is_apart
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """Clogs have changed: give packets on their way, in the order of sending, new due times."""
@@ -124,10 +134,13 @@ class Link:
             cause = judge(flight, hindered)
             if cause:
                 self._drop(flight, cause)
-                return False
-        state.delivered += is_offered
-        state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
-        return True
+                break
+        else:
+            state.delivered += is_offered
+            state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
+        if state.under_way:
+            leave(state, flight)
+        return not flight.cause
 
 
 def slots_of(settings: Radio, *, is_radio: bool) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, inf, sqrt
+from math import exp, inf
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
@@ -17,7 +17,7 @@ from foosim.protocol.impairments import GilbertElliott, Impairments, Markov4, Ta
 from foosim.protocol.network import LinkRule, Network
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
-from foosim.vhub.jitter import CELLS, interpolate_ns, quantiles_ns
+from foosim.vhub.jitter import interpolate_ns, moments_ns, quantiles_ns
 from foosim.vhub.profiles import NO_RADIO, Profile, Profiles, over, preset_radio
 from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
@@ -33,7 +33,7 @@ from foosim.vhub.radio.airtime import (
 from foosim.vhub.radio.contention import saturation_rate_hz, sensing
 from foosim.vhub.radio.noise import noise_dbm as radio_noise_dbm
 from foosim.vhub.radio.path_loss import range_m
-from foosim.vhub.radio.timings import LRWPAN
+from foosim.vhub.radio.timings import LORA_DUTY_CYCLES, LRWPAN
 from foosim.vhub.stages.medium import BASE_STATION_DBM, OPPORTUNITY_BYTES, mode_of, wifi_modes, wifi_timing
 from foosim.vhub.stages.residual import chain_of_burst
 
@@ -98,11 +98,14 @@ class Meaning:
     """Packets of SMALL_BYTES in an hour that the duty cycle allows."""
     queue_ns: int | None
     """How long the last packet of a full queue waits."""
+    model: str | None
+    """The link model of one's own that decides beside all this; the figures are without it."""
     warnings: tuple[str, ...]
 
     @property
     def name(self) -> str:
-        return self.rule if self.radio in ("", self.rule) else f"{self.rule} via {self.radio}"
+        name = self.rule if self.radio in ("", self.rule) else f"{self.rule} via {self.radio}"
+        return name if self.model is None else f"{name} with link model {self.model}"
 
 
 # --- which settings there are ----------------------------------------------------------------------------------------
@@ -207,6 +210,7 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
         nlos_m,
         int(duty * HOUR_NS / carried[0].airtime_ns) if is_limited else None,
         _queue_ns(settings, carried),
+        None if settings.model is None else settings.model.name,
         (),
     )
     return replace(meaning, warnings=tuple(_warnings(use, meaning)))
@@ -281,14 +285,9 @@ def delay_of(settings: Impairments, files: Mapping[str, bytes]) -> tuple[int, in
         return base_ns, 0, base_ns
     table = read_table(files[jitter.file].decode("ascii")) if isinstance(jitter, TableJitter) else ()
     quantiles = quantiles_ns(jitter, table)
-    cells = [(quantiles[n], quantiles[n + 1], 1.0 / CELLS) for n in range(CELLS)]
-    tail = [quantiles[CELLS - 1], *quantiles[CELLS + 1 :]]
-    if len(tail) > 1:
-        cells[-1:] = [(tail[n], tail[n + 1], 1.0 / CELLS / (len(tail) - 1)) for n in range(len(tail) - 1)]
-    mean = sum((low + high) / 2.0 * share for low, high, share in cells)
-    square = sum((low * low + low * high + high * high) / 3.0 * share for low, high, share in cells)
+    mean_ns, sd_ns = moments_ns(quantiles)
     p99_ns = interpolate_ns(quantiles, int(0.99 * 2**64))
-    return base_ns + round(mean), round(sqrt(max(0.0, square - mean * mean))), base_ns + p99_ns
+    return base_ns + round(mean_ns), round(sd_ns), base_ns + p99_ns
 
 
 def _is_air(settings: Radio) -> bool:
@@ -373,7 +372,8 @@ def ranges_of(settings: Radio) -> tuple[float | None, float | None]:
 def _least_dbm(settings: Radio, noise_dbm: float) -> float:
     """Return the power that 90 % of single frames need."""
     if settings.medium == "lora":
-        return errors.LORA_SENSITIVITY_DBM[settings.spreading_factor - 7]
+        floors = errors.LORA_GATEWAY_SENSITIVITY_DBM if settings.gateway else errors.LORA_SENSITIVITY_DBM
+        return floors[settings.spreading_factor - 7]
     if settings.medium == "lte":
         return noise_dbm + errors.LTE_FLOOR_CENTI_DB / 100.0
     if settings.medium == "wifi":
@@ -406,6 +406,10 @@ def _warnings(use: Use, meaning: Meaning) -> Iterator[str]:
     longest = LORA_LONGEST[settings.spreading_factor - 7]
     if settings.medium == "lora" and (settings.payload_max is None or settings.payload_max > longest):
         yield f"mtu is above the {longest} B of LoRaWAN at spreading factor {settings.spreading_factor}"
+    for low_hz, high_hz, share in LORA_DUTY_CYCLES if settings.medium == "lora" else ():
+        at_hz = settings.frequency_hz
+        if low_hz <= at_hz <= high_hz and settings.duty_cycle > share:
+            yield f"duty_cycle is above the {100.0 * share:g} % that the EU allows at {at_hz / 1e6:g} MHz"
     if meaning.carried and settings.queue.bytes_max < meaning.carried[-1].size:
         yield f"a packet of {meaning.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
     if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and _has_queue(settings):

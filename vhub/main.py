@@ -8,6 +8,7 @@ core writes goes to the journal before it is spoken; the capture follows behind,
 from __future__ import annotations
 
 import logging
+import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -28,7 +29,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Level
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, DeploymentError
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
@@ -45,6 +46,7 @@ from foosim.vhub.capture_file import check_new, origin_metadata
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 from foosim.vhub.records import Closing, first_head
@@ -52,6 +54,8 @@ from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_capt
 from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
+SWITCH_S = 0.0005
+"""For how long the capture's thread may keep the interpreter from the loop; Python's own 5 ms would hold up ticks."""
 FORGET_EVERY_NS = 1_000_000_000
 LOOK_EVERY_NS = 50_000_000
 
@@ -107,6 +111,7 @@ class HubProcess:
         self._loop.took = self.core.waits.took
         self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
+        self.core.speak = self._speak
         self._loop.on_alive = self._on_alive
         self._loop.on_say = self._on_say
         self._loop.on_unwritten = self._on_unwritten
@@ -115,6 +120,7 @@ class HubProcess:
 
     def run(self) -> int:
         """Take part until the end, close the capture, say farewell; return the exit code."""
+        sys.setswitchinterval(SWITCH_S)
         try:
             self._loop.run(self._is_over)
             self._loop.perform()
@@ -170,6 +176,11 @@ class HubProcess:
                 self._loop.journal = None
                 self._on_unwritten(error)
 
+    def _speak(self, now_ns: int) -> int:
+        """Perform what the core has to say amid a closing; return the time."""
+        self._loop.perform()
+        return time.monotonic_ns()
+
     def _look_at_room(self, room: RoomWatch, now_ns: int) -> None:
         """Say what gets little, and end the run while what is left to be written still fits."""
         core = self.core
@@ -195,6 +206,12 @@ class HubProcess:
         self._wire.declare_alive()
         core, deployment = self.core, self.core.deployment
         assert deployment is not None
+        try:
+            check_link_models(deployment.network, build.deployment, build.deployment_name)
+        except DeploymentError as error:
+            core.failure = "cannot judge packets without its link models"
+            core.lose("the network", error.problems[0])
+            return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
         self._journal = self._loop.journal = Journal(folder, VHUB)
         records = list(read_journal(folder, VHUB))
@@ -218,7 +235,7 @@ class HubProcess:
         path = path or Path("captures") / f"{deployment.world}-{wall.now_stamp()}.mcap"
         self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         if before is None:  # who is killed before the capture is there finds here that what is found is its own
-            check_new(path)
+            check_new(path, is_split=deployment.capture.is_split)
             assert self._journal is not None
             self._journal.append(first_head(build, deployment, self.core.capture_file))
         metadata = {
@@ -239,7 +256,7 @@ class HubProcess:
         self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         radio = Wire(session, Plane.RADIO, self._inbox, VHUB)
         self._loop.connect(radio)
-        radio.read(channels.VHUB_READS)
+        radio.read(channels.VHUB_READS, channels.VHUB_WAITS)
         radio.watch_alive()
         radio.declare_alive()
 

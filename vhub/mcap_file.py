@@ -19,6 +19,7 @@ from io import BytesIO
 from typing import BinaryIO, Final, Protocol
 from zlib import crc32
 
+import msgspec
 import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream, RecordBuilder
@@ -28,6 +29,7 @@ from mcap.opcode import Opcode
 from foosim.vhub.rows import CaptureError
 
 MAGIC: Final = b"\x89MCAP0\r\n"
+MESSAGE: Final = int(Opcode.MESSAGE)
 CHUNK_BYTES_MAX: Final = 64 * 1024 * 1024
 """A reader refuses a larger chunk, or any larger record: its memory is bounded by one of them."""
 COMPRESSION: Final = "zstd"
@@ -303,8 +305,7 @@ def _serialised(record: Record) -> bytes:
 # --- reading ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
+class Message(msgspec.Struct, frozen=True, gc=False):
     """One message of a topic."""
 
     topic: str
@@ -320,26 +321,30 @@ Content = Message | records.Metadata | records.Attachment
 class McapFile:
     """Reads an MCAP file from start to end. What is read of a file without an end stands in `unfinished_bytes`."""
 
-    def __init__(self, stream: BinaryIO, size: int, name: str, since_ns: int = 0) -> None:
-        """`since_ns`: chunks whose last message is before that are passed by, if the file declares its channels first.
+    def __init__(
+        self, stream: BinaryIO, size: int, name: str, since_ns: int = 0, topics: frozenset[str] | None = None
+    ) -> None:
+        """`topics`: messages of others are passed by; None: all are read.
 
+
+        `since_ns`: chunks whose last message is before that are passed by, if the file declares its channels first.
         A hub's chunks are in the order of their last messages; what is wanted of them may still be before that time.
         """
-        self._stream = stream
-        self._size = size
-        self._name = name
-        self._since_ns = since_ns
+        self._stream, self._size, self._name = stream, size, name
+        self._since_ns, self._wanted = since_ns, topics
+        self.repeats = False
+        """Whether the first chunk only says again what was said in another file: then it is passed by."""
         self._at = 0
-        self._topics: dict[int, str] = {}
-        self.profile = ""
-        self.library = ""
-        self._ended = False
-        self.finished = False
+        self._topics: dict[int, str | None] = {}
+        """By channel; None where its messages are passed by."""
+        self.profile = self.library = ""
+        self._ended = self.finished = False
         """Whether the file's end was reached, and was an end."""
         self.unfinished_bytes = 0
         """Bytes behind the last whole record of an unfinished file."""
-        self.start_ns, self.end_ns = sys.maxsize, 0
-        """Times of the first and the last message in the chunks so far, also in those that were passed by."""
+        self.chunk_starts: array[int] = array("Q")
+        self.end_ns = 0
+        """Times of the first message of each chunk so far, and of the last of all, passed by or not."""
 
     def contents(self) -> Iterator[Content]:
         """Yield messages, metadata and attachments in the order of the file."""
@@ -403,15 +408,19 @@ class McapFile:
         """Take the times of a chunk, and return whether it is passed by."""
         if len(head) < CHUNK_FIELDS.size:  # the file became shorter while it was read
             return False
+        if self.repeats and self._topics:
+            self.repeats = False
+            return True
         start_ns, end_ns, *_ = CHUNK_FIELDS.unpack(head)
-        self.start_ns, self.end_ns = min(self.start_ns, start_ns), max(self.end_ns, end_ns)
+        self.chunk_starts.append(start_ns)
+        self.end_ns = max(self.end_ns, end_ns)
         return bool(self._topics) and end_ns < self._since_ns
 
     def _read(self, opcode: int, content: bytes) -> Iterator[Content]:
         if opcode == Opcode.CHUNK:
             yield from self._messages(unpack_chunk(content, f"{self._name}: byte {self._at}"))
         elif opcode == Opcode.MESSAGE:
-            yield self._message(content, 0, len(content))
+            yield from self._messages(RECORD.pack(opcode, len(content)) + content)
         elif opcode == Opcode.CHANNEL:
             self._declare(content)
         elif opcode == Opcode.METADATA:
@@ -426,21 +435,28 @@ class McapFile:
 
     def _declare(self, content: bytes) -> None:
         channel = records.Channel.read(_stream(content))
-        self._topics[channel.id] = channel.topic
+        is_wanted = self._wanted is None or channel.topic in self._wanted
+        self._topics[channel.id] = channel.topic if is_wanted else None
 
     def _messages(self, chunk: bytes) -> Iterator[Message]:
-        for opcode, start, stop in chunk_records(chunk):
-            if opcode == Opcode.MESSAGE:
-                yield self._message(chunk, start, stop)
+        """Yield the messages of a chunk. The hot path of all readers: see the bench before changing it."""
+        topics, head, fields, size = self._topics, RECORD.unpack_from, MESSAGE_FIELDS.unpack_from, MESSAGE_FIELDS.size
+        at, end = 0, len(chunk)
+        while at < end:
+            opcode, length = head(chunk, at)
+            start = at + RECORD.size
+            at = start + length
+            if at > end:
+                raise ValueError(f"a record of {length} bytes in a chunk with {end - start} left")
+            if opcode == MESSAGE:
+                channel, sequence, log_ns, publish_ns = fields(chunk, start)
+                if channel not in topics:
+                    raise ValueError(f"a message of channel {channel}, which is not declared")
+                topic = topics[channel]
+                if topic is not None:
+                    yield Message(topic, log_ns, publish_ns, sequence, chunk[start + size : at])
             elif opcode == Opcode.CHANNEL:
-                self._declare(chunk[start:stop])
-
-    def _message(self, content: bytes, start: int, stop: int) -> Message:
-        channel, sequence, log_ns, publish_ns = MESSAGE_FIELDS.unpack_from(content, start)
-        topic = self._topics.get(channel)
-        if topic is None:
-            raise ValueError(f"a message of channel {channel}, which is not declared")
-        return Message(topic, log_ns, publish_ns, sequence, content[start + MESSAGE_FIELDS.size : stop])
+                self._declare(chunk[start:at])
 
 
 def unpack_chunk(content: bytes, place: str) -> bytes:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -32,6 +32,7 @@ from foosim.vhub.mcap_file import (
     PLACE,
     RECORD,
     Book,
+    Message,
     chunk_records,
     unpack_chunk,
 )
@@ -295,6 +296,28 @@ class _Scan:
         last.message_index_offsets, last.message_index_length = {}, 0
         book.offset = last.chunk_start_offset + last.chunk_length
         self._found.to_index = entries
+
+
+def read_messages(stream: BinaryIO, book: Book, topics: Collection[str]) -> Iterator[Message]:
+    """Yield the messages of some topics, chunk by chunk, by the indexes; a last chunk without any is looked through.
+
+    Raises CaptureError for a chunk that is damaged: those that `scan` trusted may be.
+    """
+    named = {channel.id: channel.topic for channel in book.channels if channel.topic in topics}
+    for index in book.chunks:
+        if index.message_index_offsets and not named.keys() & index.message_index_offsets.keys():
+            continue
+        stream.seek(index.chunk_start_offset + RECORD.size)
+        place = f"byte {index.chunk_start_offset}"
+        try:
+            chunk = unpack_chunk(stream.read(index.chunk_length - RECORD.size), place)
+            for opcode, start, stop in chunk_records(chunk):
+                channel, sequence, log_ns, publish_ns = MESSAGE_FIELDS.unpack_from(chunk, start)
+                if opcode == Opcode.MESSAGE and channel in named:
+                    data = chunk[start + MESSAGE_FIELDS.size : stop]
+                    yield Message(named[channel], log_ns, publish_ns, sequence, data)
+        except _DAMAGED as error:
+            raise CaptureError(f"{place}: a damaged chunk, {error}") from None
 
 
 def _stream(content: bytes) -> ReadDataStream:

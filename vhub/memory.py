@@ -24,6 +24,10 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Copies that the link made; they are in none of the other counts."""
     causes: dict[str, int] = {}
     """How many were dropped by each cause."""
+    model: bytes = b""
+    """What a link model of one's own remembers, as msgpack."""
+    under_way: list[tuple[int, int, bool]] = []
+    """(sequence, copy, whether it was evicted) of what is on its way, where the link has a capacity."""
 
 
 class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):

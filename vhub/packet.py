@@ -7,11 +7,15 @@ one file each.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
+from operator import attrgetter
 from typing import Final
 
 import msgspec
 
 from foosim.protocol.limits import PACKET_HEAD_BYTES_MAX
+from foosim.protocol.messages import Received
 from foosim.vhub.radio.noise import centi, level_of
 
 DELIVERED: Final = "delivered"
@@ -91,6 +95,8 @@ class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Of LoRa: the interference by spreading factor, from 7 on."""
     held_ns: int = 0
     """For how long clogs put off its due time."""
+    model_ns: int = 0
+    """What a link model of one's own adds to its delay."""
     outcome: str = ""
     """What the medium found out and the channel says, at sending; empty when it came through."""
 
@@ -108,3 +114,28 @@ def size_of(flight: Flight) -> int:
 def level_cdbm(power: int) -> int:
     """Return a power in units of 1e-21 W as a level in 0.01 dBm; 0 for no power."""
     return centi(level_of(power)) if power else 0
+
+
+def received(flights: Iterable[Flight]) -> list[Received]:
+    """Return flights as a client gets them."""
+    return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, content_of(f)) for f in flights]
+
+
+order_of: Final = attrgetter("due_ns", "source", "sequence", "copy", "destination")
+"""Where a packet stands among what arrives at one tick; the receiver tells copies of a broadcast apart."""
+
+
+@dataclass(slots=True)
+class Packets:
+    """The account over all links: offered = delivered + dropped + in flight, at every tick."""
+
+    offered: int = 0
+    delivered: int = 0
+    dropped: int = 0
+    refused: int = 0
+    copies: int = 0
+    """Made by links, on purpose; they are in none of the other counts."""
+
+    @property
+    def in_flight(self) -> int:
+        return self.offered - self.delivered - self.dropped

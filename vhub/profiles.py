@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.impairments import BURSTS, Impairments
+from foosim.protocol.impairments import BURSTS, Impairments, LinkSettings
 from foosim.protocol.network import LinkRule, Network
 from foosim.protocol.radios import Radio
 
@@ -45,8 +45,9 @@ class Profiles:
         self._network = network
         self._carriers = deployment.carriers()
         self._by_channel = any(rule.channels is not None for rule in network.links)
-        self.on_radio = any(radio.medium not in ("none", "wired") for radio in network.radios.values())
-        """Whether the fate of packets may depend on where endpoints are."""
+        modelled = any(of.model is not None for of in (*network.radios.values(), *network.links))
+        self.on_radio = modelled or any(radio.medium not in ("none", "wired") for radio in network.radios.values())
+        """Whether the fate of packets may depend on where endpoints are: on air, or by a model of one's own."""
 
     def kind(self, channel: str) -> str:
         """Return what of a channel decides a link's profile: nothing, where no rule names channels."""
@@ -88,7 +89,7 @@ class Profiles:
 
 def over(base: Radio, changes: LinkRule | Impairments) -> Radio:
     """Return a radio's settings with those that a rule writes; a model of bursts replaces another one."""
-    written = {key: getattr(changes, key) for key in changes.model_fields_set if key in Impairments.model_fields}
+    written = {key: getattr(changes, key) for key in changes.model_fields_set if key in LinkSettings.model_fields}
     if any(key in written for key in BURSTS):
         written = dict.fromkeys(BURSTS) | written
     return base.model_copy(update=written)

@@ -10,13 +10,22 @@ from dataclasses import replace
 from math import inf, sqrt
 from typing import Final, NamedTuple
 
+from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.radio_materials import RadioMaterial
 from foosim.protocol.radios import Radio
 from foosim.protocol.scene import Vector
 from foosim.vhub.geometry import Crossing
 from foosim.vhub.radio.materials import slab_loss_db
 from foosim.vhub.radio.noise import centi, noise_dbm
-from foosim.vhub.radio.path_loss import ENVIRONMENTS, Environment, Itu1238, LogDistance, path_loss_db, range_m
+from foosim.vhub.radio.path_loss import (
+    ENVIRONMENTS,
+    Environment,
+    Itu1238,
+    LogDistance,
+    path_loss_db,
+    range_m,
+    vehicle_blockage_db,
+)
 from foosim.vhub.radio.shadowing import shadowing_db, shadowing_max_db
 from foosim.vhub.world import World
 
@@ -146,7 +155,7 @@ class Propagation:
                 return Path(round(_distance_m(a, b) * 1000.0), (), 0, 0, 0, OUT_OF_RANGE)
             crossings = self.world.crossings(a, b, way.ends)
             if has_moved or crossings != way.crossings:
-                way.a, way.b, way.crossings, way.path = a, b, crossings, self._find(a, b, crossings)
+                way.a, way.b, way.crossings, way.path = a, b, crossings, self._find(a, b, crossings, way.ends)
             way.turns = turns
         return way.path
 
@@ -169,6 +178,19 @@ class Propagation:
             return True
         path = self.path(a, b, source, destination)
         return not path.cause and path.loss_cdb <= sensed_cdb
+
+    def taken_db(self, crossing: Crossing, a: Vector, b: Vector, ends: frozenset[str]) -> float:
+        """Return what a thing takes from a signal between two places, the antennas of two bodies.
+
+        Among vehicles one in the way blocks as vehicles do: by one draw for the three, whenever they meet like that.
+        """
+        if self._environment.has_vehicles:
+            height_m = self.world.vehicle_height_m(crossing.name)
+            if height_m is not None:
+                seed = int.from_bytes(self._key[:8], "little")
+                word = draw_words(draw_key(seed, "vehicle", *sorted(ends), crossing.name), 0)[0]
+                return vehicle_blockage_db(_distance_m(a, b), a[2], b[2], height_m, word)
+        return crossing_db(crossing, self.settings.frequency_hz)
 
     def _is_near(self, a: Vector, b: Vector, loss_cdb: int) -> bool:
         """Whether it is sure, by a bound that costs little, that no more is lost between two places than that."""
@@ -205,13 +227,13 @@ class Propagation:
         least_cdb = min(least_cdb, behind_cdb)
         return least_cdb, max(centi(nlos_db + shadow_db), behind_cdb)
 
-    def _find(self, a: Vector, b: Vector, crossings: tuple[Crossing, ...]) -> Path:
+    def _find(self, a: Vector, b: Vector, crossings: tuple[Crossing, ...], ends: frozenset[str]) -> Path:
         distance_m, frequency_hz = _distance_m(a, b), self.settings.frequency_hz
         distance_mm = round(distance_m * 1000.0)
         walls = tuple([crossing.name for crossing in crossings])
         walls_db = 0.0
         for crossing in crossings:
-            walls_db += crossing_db(crossing, frequency_hz)
+            walls_db += self.taken_db(crossing, a, b, ends)
         if crossings and self._strict:
             return Path(distance_mm, walls, centi(walls_db), 0, 0, BLOCKED)
         heights = a[2], b[2]

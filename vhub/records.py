@@ -94,15 +94,23 @@ class Closing:
     wall_ns: int = 0
     recovered: Sequence[Recovered] = ()
     """Losses and returns that were over with this frame."""
+    chain: bytes = b""
+    """Over the frames up to this one, without the one that the run began with."""
 
 
 def closing_of(
-    frame: Frame, commit: Commit, state: HubState, joins: list[Joining], leaves: list[str], wall_ns: int = 0
+    frame: Frame,
+    commit: Commit,
+    chain: bytes,
+    state: HubState,
+    joins: list[Joining],
+    leaves: list[str],
+    wall_ns: int = 0,
 ) -> Closing:
     """Return the closing of a committed frame's tick, without its fates; `state` is that before it."""
     delivered = state.deliveries.get(frame.tick - 1, [])
-    came = joins, leaves
-    return Closing(frame, commit.digest, commit.edits, delivered, *came, wall_ns=wall_ns, recovered=commit.recovered)
+    told = wall_ns, commit.recovered, chain
+    return Closing(frame, commit.digest, commit.edits, delivered, joins, leaves, [], *told)
 
 
 def tick_record(
@@ -200,7 +208,9 @@ class Fold:
         packets = world_packets(samples, commit.digest, frame, state.sampling)
         if packets is None or frame.tick != state.closed + 1 or record.tick != frame.tick:
             raise Malformed(f"record {record.tick} of the vHub's journal does not follow on tick {state.closed}")
-        closing = closing_of(frame, commit, state, record.joins, record.leaves)
+        if self.commit:  # the frame that a run begins with is not in its chain, or is already
+            self.chain = chain_next(self.chain, commit.digest)
+        closing = closing_of(frame, commit, self.chain, state, record.joins, record.leaves)
         for name in record.leaves:
             state.leave(name)
         for joining in record.joins:
@@ -211,8 +221,6 @@ class Fold:
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
-        if self.commit:  # the frame that a run begins with is not in its chain, or is already
-            self.chain = chain_next(self.chain, commit.digest)
         self.commit, self.inputs = record.commit, None
         return Folded(state, closing, record, released)
 

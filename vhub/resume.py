@@ -21,8 +21,9 @@ from foosim.protocol.messages import Commit, Deliveries, Down, Epoch
 from foosim.vhub.commits import Committed
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.naming import in_branch
+from foosim.vhub.packet import received
 from foosim.vhub.records import Fold, Folded, HeadRecord, HubRecord, InputsRecord, TickRecord
-from foosim.vhub.state import HubState, received
+from foosim.vhub.state import HubState
 
 
 @dataclass(frozen=True, slots=True)

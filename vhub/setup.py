@@ -5,12 +5,13 @@ Neighbours: `links` makes it, `stages` read it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from foosim.protocol.draws import draw_words
 from foosim.protocol.radios import Radio
 from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
+from foosim.vhub.link_models import LinkModel
 from foosim.vhub.memory import LinkState, RadioState
 from foosim.vhub.packet import Flight
 from foosim.vhub.world import World
@@ -48,6 +49,10 @@ class LinkSetup:
     """The content of the file of a jitter that has one."""
     opportunities_ms: tuple[int, ...] = ()
     """The times of a trace of capacity."""
+    model: LinkModel | None = None
+    """A link model of one's own."""
+    faults: list[str] = field(default_factory=list)
+    """Takes why such a model has failed: the run ends for it."""
 
     def words(self, flight: Flight, block: int) -> tuple[int, ...]:
         """Return a further block of eight draws of a packet; block 0 are those of the named slots."""

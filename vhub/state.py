@@ -3,13 +3,14 @@
 Closing tick k has two phases. *World*: what robots sent at k is judged; the clients due get what has reached them.
 *Clients*: what clients sent is judged; the deliveries of tick k+1 are final. Fates know frames, times and draws, never
 nodes. The journal holds the inputs of every closing, so a fold of it through this same class gives the state again,
-byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `journal_records`.
+byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `records`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import msgspec
 
@@ -18,13 +19,14 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Delivered, Deliveries, Disrupt, Edit, Epoch, Received, RobotPacket, Sent
+from foosim.protocol.messages import Delivered, Deliveries, Disrupt, Edit, Epoch, RobotPacket, Sent
 from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.links import Link
 from foosim.vhub.memory import AirState, LinkState, RadioState
-from foosim.vhub.packet import Flight, content_of
+from foosim.vhub.packet import Flight, Packets, content_of, order_of
 from foosim.vhub.room import Room
+from foosim.vhub.sendings import Sendings
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
 
 OUTBOX_SHIFT = 16
@@ -79,22 +81,6 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     flights: list[Flight]
 
 
-@dataclass(slots=True)
-class Packets:
-    """The account over all links: offered = delivered + dropped + in flight, at every tick."""
-
-    offered: int = 0
-    delivered: int = 0
-    dropped: int = 0
-    refused: int = 0
-    copies: int = 0
-    """Made by links, on purpose; they are in none of the other counts."""
-
-    @property
-    def in_flight(self) -> int:
-        return self.offered - self.delivered - self.dropped
-
-
 class HubState:
     """Links, members, what is in flight. All of it plain values; nothing here knows time but as ticks."""
 
@@ -122,6 +108,8 @@ class HubState:
         """Those that the last closing counted: an input of it, which the journal keeps."""
         self._flights: dict[int, list[Flight]] = {}
         """What is in flight, by the tick at which it arrives."""
+        self._sendings = Sendings(lambda flights, dropped: None)
+        """What clients have sent at the last closed tick."""
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
@@ -204,14 +192,22 @@ class HubState:
 
         Return the deliveries of the next tick.
         """
+        deliveries = self.close_robots(frame, admitted)
+        fates += self.close_rest()
+        return deliveries
+
+    def close_robots(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]]) -> Deliveries:
+        """Phase two as far as robots are concerned: return the deliveries of the next tick; `close_rest` follows."""
         tick = frame.tick
-        sent_ns = tick * self.tick_ns
         self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
         for cause, count in self.refused_at_door:
             self.refuse(cause, count)
+        sendings = self._sendings = Sendings(lambda flights, dropped: self._send(flights, tick, dropped))
+        has_radios = self.fabric.profiles.on_radio
+        shares = has_radios and any(not self._is_apart(flight) for flight in self._flights.get(tick + 1, ()))
         for source in sorted(admitted, key=lambda name: (self.fabric.phase_ns(name), name)):
             copies = 0
-            for sent in sorted(admitted[source], key=lambda packet: packet.sequence):
+            for sent in sorted(admitted[source], key=attrgetter("sequence")):
                 if not self._admit(source, sent):
                     continue
                 receivers = self._addressed(source, sent.destination, sent.channel)
@@ -219,10 +215,16 @@ class HubState:
                 if copies > limits.PACKETS_PER_MESSAGE_MAX:
                     self.refuse("broadcast_full")
                     continue
-                what = sent.sequence, sent_ns, sent.stamp_ns, sent.payload, not sent.destination
-                self._send([Flight(source, receiver, sent.channel, *what) for receiver in receivers], tick, fates)
+                what = sent.sequence, tick * self.tick_ns, sent.stamp_ns, sent.payload, not sent.destination
+                flights = [Flight(source, receiver, sent.channel, *what) for receiver in receivers]
+                to_robot = has_radios and sent.destination in self._robots
+                is_apart = to_robot and self._is_apart(flights[0])
+                shares = shares or (to_robot and not is_apart)
+                sendings.send(flights, now=is_apart or not has_radios)
+        if shares:
+            sendings.judge_rest()
         self.closed = tick
-        deliveries = self._arrive_at_robots(tick + 1, frame, fates)
+        deliveries = self._arrive_at_robots(tick + 1, frame, sendings.arrived)
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
         self.was_final = tick < self.final
         if self.was_final:
@@ -231,6 +233,18 @@ class HubState:
         following = self._following(tick)
         self.final = tick + 1 + following
         return Deliveries(tick + 1, deliveries, following, self.branch)
+
+    def close_rest(self) -> list[Flight]:
+        """Judge what `close_robots` has left; return the packets whose fate is final by phase two."""
+        self._sendings.judge_rest()
+        return self._sendings.fates()
+
+    def _is_apart(self, flight: Flight) -> bool:
+        """Whether a packet's fate has to do with that of no packet on another link; what goes to clients counts so."""
+        if flight.destination not in self._robots:
+            return True
+        link = self.fabric.link(flight.source, flight.destination, flight.channel)
+        return link.is_apart(flight.sent_ns)
 
     @property
     def hears_clients(self) -> bool:
@@ -384,12 +398,14 @@ class HubState:
         rest = [flight for flight in flights if (flight.destination in robots) is not to_robots]
         if rest:
             self._flights[tick] = rest
-        taken.sort(key=_order)
+        taken.sort(key=order_of)
         return taken
 
     def _arrive_at_clients(self, tick: int, fates: list[Flight]) -> dict[str, list[Flight]]:
         released: dict[str, list[Flight]] = {}
         arriving = self._take_arrivals(tick, to_robots=False)
+        if not arriving:
+            return released
         room = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False)
         for flight in arriving:
             member = self.members.get(flight.destination)
@@ -405,31 +421,25 @@ class HubState:
         return released
 
     def _arrive_at_robots(self, tick: int, frame: Frame, fates: list[Flight]) -> list[Delivered]:
-        deliveries = []
+        deliveries: list[Delivered] = []
         arriving = self._take_arrivals(tick, to_robots=True)
+        if not arriving:
+            return deliveries
         room = Room(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True)
+        down = {robot.name for robot in frame.layout.robots if frame.numbers[robot.offsets["down"]] != 0.0}
         for flight in arriving:
-            down = flight.destination in frame.layout and frame.at(flight.destination, "down") != 0.0
             fates.append(flight)
-            hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
-            if not self._arrive(flight, hindered):
-                continue
-            deliveries.append(
-                Delivered(
-                    flight.due_ns,
-                    flight.source,
-                    flight.sequence,
-                    flight.copy,
-                    flight.destination,
-                    flight.channel,
-                    content_of(flight),
-                )
-            )
+            to = flight.destination
+            hindered = RECEIVER_DOWN if to in down else "" if room.takes(flight) else RECEIVER_FULL
+            if self._arrive(flight, hindered):
+                numbers = flight.sequence, flight.copy
+                content = content_of(flight)
+                deliveries.append(Delivered(flight.due_ns, flight.source, *numbers, to, flight.channel, content))
         return deliveries
 
     def in_flight(self) -> list[Flight]:
         """Return what is on its way, in order of arrival."""
-        return [flight for tick in sorted(self._flights) for flight in sorted(self._flights[tick], key=_order)]
+        return [flight for tick in sorted(self._flights) for flight in sorted(self._flights[tick], key=order_of)]
 
     # --- the state as bytes ------------------------------------------------------------------------------------------
 
@@ -479,16 +489,6 @@ class HubState:
             state.fabric.restore_flight(flight)
             state._flights.setdefault(flight.arrival_tick, []).append(flight)
         return state
-
-
-def received(flights: Iterable[Flight]) -> list[Received]:
-    """Return flights as a client gets them."""
-    return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, content_of(f)) for f in flights]
-
-
-def _order(flight: Flight) -> tuple[int, str, int, int, str]:
-    """Where a packet stands among what arrives at one tick; the receiver tells copies of a broadcast apart."""
-    return flight.due_ns, flight.source, flight.sequence, flight.copy, flight.destination
 
 
 assert limits.ROBOT_PACKETS_PER_TICK_MAX == 1 << OUTBOX_SHIFT

@@ -1,14 +1,14 @@
-"""Poses read back from a capture: the links of a FrameTransforms message, as `viewing` writes them.
+"""What viewers look at, read back from a capture: poses, lines of the log, and scenes with other names.
 
-The library that writes such messages reads none, and four nested messages do not justify a protobuf package: this reads
-the wire format (https://protobuf.dev/programming-guides/encoding) as far as FrameTransforms needs it, and passes by
-fields that it does not know. Neighbours: `viewing` writes, exports and replays read.
+The library that writes such messages reads none, and a few nested messages do not justify a protobuf package: this
+reads the wire format (https://protobuf.dev/programming-guides/encoding) as far as FrameTransforms, Log and SceneUpdate
+need it, and passes by fields that it does not know. Neighbours: `viewing` writes, exports and replays read.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,6 +19,10 @@ _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _TRANSFORMS: Final = 1
 _CHILD, _TRANSLATION, _ROTATION = 3, 4, 5
 """Fields of a FrameTransform; those of its vectors are x, y, z (and w) from 1 on."""
+_LOG_LEVEL, _LOG_TEXT = 2, 3
+_LEVELS: Final = {1: "debug", 2: "info", 3: "warning", 4: "error", 5: "fatal"}
+_NAMES_IN_SCENE: Final = {1: (3,), 2: (2, 3)}
+"""By the field of a SceneUpdate, deletions and entities: those fields of it that name a link."""
 _DOUBLE: Final = struct.Struct("<d")
 
 Content = bytes | int
@@ -39,6 +43,59 @@ def read_poses(data: bytes) -> list[LinkPose]:
         return [_link_pose(content) for number, content in _fields(data) if number == _TRANSFORMS]
     except (ValueError, IndexError, struct.error) as error:  # a text that is no UTF-8 is a ValueError
         raise CaptureError(f"poses that cannot be read: {error}") from None
+
+
+def read_log(data: bytes) -> tuple[str, str]:
+    """Return level and text of a Log message. Raises CaptureError for what is none."""
+    level, text = "info", ""
+    try:
+        for number, content in _fields(data):
+            if number == _LOG_LEVEL and isinstance(content, int):
+                level = _LEVELS.get(content, level)
+            elif number == _LOG_TEXT:
+                text = _bytes(content).decode()
+    except (ValueError, IndexError) as error:
+        raise CaptureError(f"a line of the log that cannot be read: {error}") from None
+    return level, text
+
+
+def renamed_scene(data: bytes, rename: Callable[[str], str]) -> bytes:
+    """Return a SceneUpdate message with other names of links. Raises CaptureError for what is none."""
+
+    def named(content: bytes) -> bytes:
+        return rename(content.decode()).encode()
+
+    def in_fields(numbers: tuple[int, ...]) -> Callable[[bytes], bytes]:
+        return lambda content: _rewritten(content, dict.fromkeys(numbers, named))
+
+    try:
+        return _rewritten(data, {number: in_fields(names) for number, names in _NAMES_IN_SCENE.items()})
+    except (ValueError, IndexError) as error:
+        raise CaptureError(f"a scene that cannot be read: {error}") from None
+
+
+def _rewritten(data: bytes, changes: Mapping[int, Callable[[bytes], bytes]]) -> bytes:
+    """Return a message with some of its fields of bytes changed, and all others as they are."""
+    parts: list[bytes] = []
+    at = 0
+    for number, kind, start, stop in _places(data):
+        change = changes.get(number)
+        if change is not None and kind == _BYTES:
+            content = change(data[start:stop])
+            parts.append(_varint_bytes(number << 3 | _BYTES) + _varint_bytes(len(content)) + content)
+        else:
+            parts.append(data[at:stop])
+        at = stop
+    return b"".join(parts)
+
+
+def _varint_bytes(value: int) -> bytes:
+    content = bytearray()
+    while value > 0x7F:
+        content.append(value & 0x7F | 0x80)
+        value >>= 7
+    content.append(value)
+    return bytes(content)
 
 
 def _link_pose(content: Content) -> LinkPose:
@@ -70,24 +127,29 @@ def _bytes(content: Content) -> bytes:
 
 def _fields(data: bytes) -> Iterator[tuple[int, Content]]:
     """Yield number and content of each field of a message: bytes, or an integer for a varint."""
+    for number, kind, start, stop in _places(data):
+        yield number, _varint(data, start)[0] if kind == _VARINT else data[start:stop]
+
+
+def _places(data: bytes) -> Iterator[tuple[int, int, int, int]]:
+    """Yield number and kind of each field of a message, and where its content starts and stops."""
     at = 0
     while at < len(data):
         key, at = _varint(data, at)
         number, kind = key >> 3, key & 7
         if kind == _VARINT:
-            value, at = _varint(data, at)
-            yield number, value
-            continue
-        if kind == _BYTES:
+            stop = _varint(data, at)[1]
+        elif kind == _BYTES:
             length, at = _varint(data, at)
+            stop = at + length
         elif kind in (_FIXED64, _FIXED32):
-            length = 8 if kind == _FIXED64 else 4
+            stop = at + (8 if kind == _FIXED64 else 4)
         else:
             raise ValueError(f"a field of kind {kind}")
-        if length > len(data) - at:
-            raise ValueError(f"a field of {length} bytes where {len(data) - at} are left")
-        yield number, data[at : at + length]
-        at += length
+        if stop > len(data):
+            raise ValueError(f"a field of {stop - at} bytes where {len(data) - at} are left")
+        yield number, kind, at, stop
+        at = stop
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:

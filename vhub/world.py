@@ -11,7 +11,8 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.network import Network
-from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate
+from foosim.protocol.rovers import RoverRobot
+from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate, velocity
 from foosim.protocol.scenes import build_scene
 from foosim.vhub.geometry import Crossing, LineOfSight, Sight
 
@@ -76,6 +77,19 @@ class World:
             found = position[0] + x, position[1] + y, position[2] + z
             (self._fixed if pose is None else self._antennas)[key] = found
         return found
+
+    def velocity(self, endpoint: str) -> Vector:
+        """Return how fast the body moves that an endpoint is, or is on board of (m/s, world frame); 0 without one."""
+        robot, frame = self.body(endpoint), self._frame
+        if frame is None or self._pose(robot) is None:
+            return ORIGIN
+        return velocity(self._bodies[robot], frame.layout[robot], frame.numbers)
+
+    def vehicle_height_m(self, name: str) -> float | None:
+        """Return how high the hull of a rover is; None for what is no vehicle."""
+        deployment = self._deployment
+        is_rover = deployment.is_hall and isinstance(deployment.robots.get(name), RoverRobot)
+        return deployment.hall.rover.height if is_rover else None
 
     def _pose(self, robot: str) -> Pose | None:
         """Return the pose of a robot's last link; None for what has no body."""

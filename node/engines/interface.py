@@ -2,7 +2,7 @@
 
 An engine holds the bodies of one layout and the scenery, and remembers nothing that matters: every tick starts with a
 complete load of what is solved, from the frame. What is not loaded is parked, out of everybody's way. A change of
-layout builds another engine. Neighbours: `bullet` and `pure` are the two engines; `node.solve` calls them in order.
+layout builds another engine. Neighbours: `bullet` and `pure` are the two engines; `node.solver` calls them in order.
 """
 
 from __future__ import annotations

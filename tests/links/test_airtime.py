@@ -11,11 +11,9 @@ from hypothesis import strategies as st
 from foosim.vhub.radio.airtime import (
     lora_airtime_ns,
     lrwpan_airtime_ns,
-    lrwpan_exchange_ns,
     serialisation_ns,
     wifi_ack_ns,
     wifi_airtime_ns,
-    wifi_exchange_ns,
 )
 from foosim.vhub.radio.errors import DOT11P_MODES, HT_MODES, WIFI_MODES
 from foosim.vhub.radio.timings import (
@@ -70,11 +68,11 @@ def test_acknowledgements() -> None:
 
 def test_whole_exchanges() -> None:
     """300 bytes with the mean backoff of 7.5 slots: 281.5 us and 3552 a second; 651.5 us at 10 MHz, broadcast."""
-    exchange = wifi_exchange_ns("ofdm_24", 300, WIFI_5, True)
+    exchange = WIFI_5.difs_ns + wifi_airtime_ns("ofdm_24", 300, WIFI_5)
+    exchange += WIFI_5.sifs_ns + wifi_ack_ns("ofdm_24", WIFI_5)
     assert exchange == (34 + 136 + 16 + 28) * 1000
     assert round(1e9 / (exchange + 7.5 * 9_000)) == 3552
-    assert wifi_exchange_ns("ofdm10_6", 300, DOT11P, False) + 7.5 * 13_000 == 651_500
-    assert wifi_exchange_ns("ofdm_24", 300, WIFI_5, False) == (34 + 136) * 1000
+    assert DOT11P.difs_ns + wifi_airtime_ns("ofdm10_6", 300, DOT11P) + 7.5 * 13_000 == 651_500
 
 
 def test_spaces_between_frames() -> None:
@@ -90,10 +88,10 @@ def test_802154() -> None:
     """32 us a byte; sensing 128, turnaround 192 before the frame and before the acknowledgement of 11 bytes."""
     assert lrwpan_airtime_ns(102) == (127 + 6) * 32_000, "the longest frame"
     assert lrwpan_airtime_ns(50) == 81 * 32_000
-    assert lrwpan_exchange_ns(50, unicast=False) == 128_000 + 192_000 + 2_592_000
-    assert lrwpan_exchange_ns(50) == 2_912_000 + 192_000 + 352_000
     # With the mean of 3.5 backoff periods, and the turnaround back to listening, 84 kb/s.
-    cycle = lrwpan_exchange_ns(50) + 3.5 * LRWPAN.unit_backoff_ns + LRWPAN.turnaround_ns
+    sent = LRWPAN.cca_ns + LRWPAN.turnaround_ns + lrwpan_airtime_ns(50)
+    acknowledged = LRWPAN.turnaround_ns + LRWPAN.ack_bytes * LRWPAN.byte_ns
+    cycle = sent + acknowledged + 3.5 * LRWPAN.unit_backoff_ns + LRWPAN.turnaround_ns
     assert cycle == 4_768_000 and 50 * 8e9 / cycle == pytest.approx(84e3, rel=0.005)
 
 

@@ -30,10 +30,12 @@ IMPAIRMENTS: Final = (
     "order: free",
     "delay: 3 ms",
     "reorder: {probability: 30 %, extra: 7 ms}",
+    "capacity: 2",
 )
 CAUSES: Final = {
     "random_loss", "burst_loss", "queue_full", "crc_fail", "too_big", "expired", "partition", "rx_down", "out_of_range",
     "snr", "collision", "node_down", "no_route", "filtered", "duty_cycle", "queue_codel", "blocked",
+    "evicted",
 }  # fmt: skip
 RADIOS: Final = (
     "", "wifi_5_indoor", "zigbee", "lora_eu868", "dot11p", "range_only", "lte"

@@ -69,6 +69,7 @@ SHAPES: Final = {
     "lognormal, mean: 2 ms, sd: 6 ms": lognormal(2, 6),
     "pareto, mean: 2 ms, alpha: 2.5": lomax(2, 2.5, 10_000),
     "pareto, mean: 2 ms, alpha: 1.5, max: 1 s": lomax(2, 1.5, 1000),
+    "pareto, mean: 2 ms, alpha: 1.2": lomax(2, 1.2, 10_000),
     "pareto, mean: 2 ms, alpha: 20, max: 12 ms": lomax(2, 20, 12),
     "mixture, parts: [{share: 30 %, to: 2 ms}, {share: 70 %, from: 3 ms, to: 5 ms}]": mixture((0.3, 0, 2), (0.7, 3, 5)),
     "mixture, parts: [{share: 99.9 %, from: 0.1 ms, to: 0.8 ms}, {share: 0.1 %, from: 0.8 ms, to: 100 ms}]": mixture(

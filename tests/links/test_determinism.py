@@ -68,6 +68,7 @@ NETWORKS: Final[dict[str, tuple[str, ...]]] = {
     "trace": rules("trace: {file: lte.trace}, queue: {packets: 30}, duplicate: 10 %"),
     "table": rules("jitter: {shape: table, file: wild.dist, mean: 8 ms, sd: 4 ms}, order: free"),
     "errors": rules("corrupt: {bit_error_rate: 0.002 p, deliver: true}, reorder: {probability: 20 %, extra: 9 ms}"),
+    "capacity": rules(f"delay: 15 ms, capacity: 3, duplicate: 20 %, {WORKED}"),
     "late": rules(f"rate: 300 kbit/s, ttl: 12 ms, {WORKED}"),
     "chaos": (
         *rules("delay: 1 ms"),

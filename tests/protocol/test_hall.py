@@ -16,7 +16,7 @@ from foosim.protocol.frame import fitting_edits
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Add, Edit, Freeze, Push, Remove, Thaw
 from foosim.protocol.obstacles import Circle, Rectangle, obstacle, obstacles_of
-from foosim.protocol.scene import Cylinder, Shape, antenna_position, forward_kinematics
+from foosim.protocol.scene import Cylinder, Shape, forward_kinematics
 from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import initial_frame, initial_numbers
 
@@ -121,8 +121,7 @@ def test_the_scene_has_rovers_where_they_are_and_antennas_above_them() -> None:
     rover, base = scene.bodies["rover03"], scene.bodies["base"]
     ((name, position, orientation),) = forward_kinematics(rover, layout["rover03"], numbers)
     assert (name, position) == ("rover03", (-6.25, 11.25, 0.0)) and orientation[2] < 0.0
-    assert antenna_position(rover, layout["rover03"], numbers) == (-6.25, 11.25, 0.5)
-    assert antenna_position(base, layout["base"], numbers) == (-17.5, 0.0, 3.0)
+    assert (rover.antenna, base.antenna) == ((0.0, 0.0, 0.5), (0.0, 0.0, 3.0))
     hulls = [shape.geometry for body in (rover, base) for shape in body.links[0].shapes[:1]]
     assert hulls == [Cylinder(0.3, 0.35), Cylinder(0.2, 1.2)]
 

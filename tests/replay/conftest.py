@@ -64,8 +64,8 @@ def messages_of(path: Path) -> list[Message]:
     return [content for content in contents_of(path) if isinstance(content, Message)]
 
 
-def rewritten(path: Path, out: Path, messages: Iterable[Message]) -> Path:
-    """Write a capture with other messages."""
+def rewritten(path: Path, out: Path, messages: Iterable[Message], chunk: int = 0) -> Path:
+    """Write a capture with other messages, so many in a chunk; all of them for 0."""
     with out.open("xb", buffering=0) as stream:
         mcap = McapWriter(partial(write_all, stream.fileno()), PROFILE)
         channels = declare_topics(mcap)
@@ -74,9 +74,11 @@ def rewritten(path: Path, out: Path, messages: Iterable[Message]) -> Path:
                 mcap.add_attachment(content.name, content.media_type, content.data)
             elif isinstance(content, records.Metadata):
                 mcap.add_metadata(content.name, content.metadata)
-        for message in messages:
+        for number, message in enumerate(messages, 1):
             stamps = message.log_ns, message.publish_ns, message.sequence
             mcap.add_message(channels[message.topic], *stamps, message.data)
+            if chunk and number % chunk == 0:
+                mcap.end_chunk()
         mcap.finish()
     return out
 

@@ -26,9 +26,11 @@ from foosim.client.payloads import BallPosition
 from foosim.client.replay import (
     Replay,
     Replayed,
+    ReplayedLine,
     ReplayedPacket,
     ReplayedPoses,
     ReplayedRow,
+    ReplayedScene,
     ReplayGone,
     ReplayRefused,
     ReplayTime,
@@ -124,6 +126,9 @@ def test_a_listener_hears_all_that_was_delivered_in_order(run: Path) -> None:
         assert ball and all(isinstance(packet.value, BallPosition) for packet in ball)
         poses = [item for item in items if isinstance(item, ReplayedPoses)]
         assert poses[0].poses["ball"].position[2] > 0 and "ball2" in poses[-1].poses
+        scenes = [item for item in items if isinstance(item, ReplayedScene)]
+        assert len(scenes) == 2 and scenes[0].time_ns == 0 and b"ball2" in scenes[1].update
+        assert any(item.text.startswith("supervisor: ") for item in items if isinstance(item, ReplayedLine))
         rows = [item for item in items if isinstance(item, ReplayedRow)]
         assert {row.topic for row in rows} == {"/clients", "/epochs", "/layout"}
         assert rows[0].row["tick"] == 0

@@ -5,20 +5,36 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
+from foxglove.messages import SceneUpdate
+from mcap.records import Schema
+from mcap_protobuf.decoder import DecoderFactory
 
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import BadValue
 from foosim.protocol.names import LINE_NAMES
-from foosim.protocol.replay_messages import PACKETS, POSES, ROWS, PlayedPacket, PlayedPoses, PlayedRow
+from foosim.protocol.replay_messages import (
+    LOG,
+    PACKETS,
+    POSES,
+    ROWS,
+    SCENE,
+    PlayedLine,
+    PlayedPacket,
+    PlayedPoses,
+    PlayedRow,
+    PlayedScene,
+)
 from foosim.rehearsal.play_entries import Entries, Entry, Selection, make_selection
 from foosim.rehearsal.play_reader import Read, ReadAhead, read_span
 from foosim.rehearsal.playing import Reading, Span
+from foosim.rehearsal.rehearse import rehearse
 from foosim.vhub.capture_reader import Scan, deployment_of, open_capture, read_about
 from foosim.vhub.rows import PacketRow
-from tests.replay.conftest import TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
+from tests.replay.conftest import TABLE, TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
 
 MS = 1_000_000
 
@@ -95,6 +111,47 @@ def test_poses_and_rows_are_played_as_they_stand(run: Path) -> None:
     assert [row.row for row in rows if row.topic == "clients"] == theirs
 
 
+def test_scenes_and_the_log_are_played_as_they_stand(run: Path) -> None:
+    entries = played(run)
+    scenes = [decode(PlayedScene, entry.payload) for entry in entries if entry.stream == SCENE]
+    theirs = [message for message in messages_of(run) if message.topic == "/scene"]
+    assert [(scene.time_ns, scene.update) for scene in scenes] == [(message.log_ns, message.data) for message in theirs]
+    assert len(scenes) == 2, "one for each layout"
+    lines = [decode(PlayedLine, entry.payload) for entry in entries if entry.stream == LOG]
+    assert len(lines) == len([message for message in messages_of(run) if message.topic == "/log"]) > 0
+    assert {line.level for line in lines} <= {"info", "warning", "error"}
+    assert any(line.text.startswith("supervisor: ") for line in lines)
+
+
+def test_names_are_changed_in_scenes(run: Path) -> None:
+    selection = make_selection(deployment_of(read_about(run)), ["/scene"], remaps=["red.goal:=keeper", "ball:=sphere"])
+    before, after = (
+        [scene_of(decode(PlayedScene, entry.payload).update) for entry in played(run, chosen) if entry.stream == SCENE]
+        for chosen in (Selection(("/scene",)), selection)
+    )
+    for old, new in zip(before, after, strict=True):
+        ids = [entity.id for entity in new.entities]
+        assert {"keeper/slide", "keeper/spin", "sphere", "scenery"} < set(ids) and "ball" not in ids
+        for one, other in zip(old.entities, new.entities, strict=True):
+            other.id, other.frame_id = one.id, one.frame_id
+        assert str(old) == str(new), "nothing else changes"
+
+
+def scene_of(update: bytes) -> Any:
+    """A SceneUpdate by other people's reader."""
+    schema = SceneUpdate.get_schema()
+    decoder = DecoderFactory().decoder_for("protobuf", Schema(1, schema.data, schema.encoding, schema.name))
+    assert decoder is not None
+    return decoder(update)
+
+
+def test_packets_without_payloads_are_not_played(tmp_path: Path) -> None:
+    path = tmp_path / "hashed.mcap"
+    rehearse(TABLE.read_text(), TABLE.name, 50, 1, ["engine=pure", "capture.payloads=hashed"], capture=path)
+    found = selected(path)
+    assert found["/tf"] > 2 and not any(topic.startswith("/packets") for topic in found)
+
+
 def test_what_is_selected_is_played_and_nothing_else(run: Path) -> None:
     everything = selected(run)
     assert "/tick" not in everything and "/frame" not in everything and everything["/tf"] > 20
@@ -130,7 +187,7 @@ def test_names_are_changed_in_packets_and_poses(run: Path) -> None:
     [
         ({"topics": ["/packet"]}, r"--topic: not one of .*, '/packet', nearest is '/packets'"),
         ({"topics": ["packets"]}, r"--topic: .*nearest is '/packets'"),
-        ({"topics": ["/scene"]}, r"--topic: not one of"),
+        ({"topics": ["/scenes"]}, r"--topic: not one of .*, '/scenes', nearest is '/scene'"),
         ({"regexes": ["("]}, r"--regex: not a regular expression \(.*\), '\('"),
         ({"excluded": ["*"]}, r"--exclude: not a regular expression"),
         ({"remaps": ["camera"]}, r"--remap: not OLD:=NEW"),
@@ -160,9 +217,7 @@ class Reader:
 
     def __init__(self, path: Path, span: Span, entries_max: int = 1000) -> None:
         self.woken = threading.Event()
-        self.ahead = ReadAhead(
-            path, deployment_of(read_about(path)), Selection(), span, entries_max, self.woken.set
-        )
+        self.ahead = ReadAhead(path, deployment_of(read_about(path)), Selection(), span, entries_max, self.woken.set)
 
     def take(self) -> Read:
         while (read := self.ahead.take()) is None:
@@ -188,7 +243,12 @@ def test_any_part_is_read_as_a_part_of_the_whole(run: Path) -> None:
     try:
         for number, from_ns in enumerate((0, 1, 100 * MS, 254 * MS + 1, 599 * MS, end_ns, 3 * MS)):
             reader.ahead.ask(Reading(number, from_ns))
-            assert reader.take_all() == [entry for entry in everything if entry.time_ns >= from_ns]
+            found = reader.take_all()
+            if from_ns:
+                standing = [entry for entry in everything if entry.stream == SCENE and entry.time_ns < from_ns][-1]
+                update = decode(PlayedScene, standing.payload).update
+                assert decode(PlayedScene, found.pop(0).payload) == PlayedScene(from_ns, update), "what holds there"
+            assert found == [entry for entry in everything if entry.time_ns >= from_ns]
     finally:
         reader.ahead.close()
     reader = Reader(run, Span(0, 200 * MS))

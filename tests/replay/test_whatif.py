@@ -16,8 +16,10 @@ from foosim.protocol.errors import DeploymentError
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.whatif import WhatIf, _age_ms, what_if
 from foosim.rehearsal.whatif_picture import picture
+from foosim.rehearsal.whatif_reading import Offers
 from foosim.vhub.capture_reader import open_capture
-from tests.replay.conftest import TABLE, Done, capture_to, disturb, replay
+from foosim.vhub.rows import PACKETS, CaptureError, PacketRow
+from tests.replay.conftest import TABLE, TICKS, Done, capture_to, disturb, messages_of, replay, rewritten, with_row
 
 NETWORKS: Final = {
     "wire": "links: [{id: w, from: '*', to: '*', delay: 1 ms, jitter: {shape: gamma, sd: 1 ms}, rate: 400 kbit/s,"
@@ -55,8 +57,31 @@ def test_by_its_own_network_every_fate_is_the_captured_one(tmp_path: Path, netwo
 
 def test_frames_of_every_tick_are_read_and_not_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     capture = open_capture(captured(tmp_path / "run.mcap", "wifi", "capture.frames_every=1 tick"))
-    monkeypatch.setattr("foosim.rehearsal.whatif.Replica", None)
+    monkeypatch.setattr("foosim.rehearsal.whatif_reading.Replica", None)
     assert what_if(capture).changed == 0
+
+
+def test_ticks_are_judged_while_the_capture_is_read(run: Path) -> None:
+    """What is held of it is what is in flight, and a chunk."""
+    capture = open_capture(run)
+    taken: list[PacketRow] = []
+    held = []
+    for offered in Offers(capture, "first", taken.append).ticks():
+        assert offered.row is not None
+        held.append(len(taken) - sum(row.sent_ns < offered.row.tick * capture.deployment.tick_ns for row in taken))
+    assert len(held) == TICKS and len(taken) > 900 and max(held) < 300
+
+
+def test_a_packet_that_stands_too_late_or_twice_is_refused(run: Path, tmp_path: Path) -> None:
+    messages = messages_of(run)
+    packets = [number for number, message in enumerate(messages) if message.topic == PACKETS]
+    last = messages[packets[-1]]
+    late = [*messages[: packets[-1]], with_row(last, sent_ns=40_000_000), *messages[packets[-1] + 1 :]]
+    with pytest.raises(CaptureError, match=r"sent at tick 20 stands behind what was sent later"):
+        what_if(open_capture(rewritten(run, tmp_path / "late.mcap", late, chunk=100)))
+    twice = [*messages[: packets[-1]], last, *messages[packets[-1] :]]
+    with pytest.raises(CaptureError, match=r"packet \d+ of \S+ to \S+ has two fates"):
+        what_if(open_capture(rewritten(run, tmp_path / "twice.mcap", twice)))
 
 
 def changed_by(path: Path, *sets: str) -> WhatIf:

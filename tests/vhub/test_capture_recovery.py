@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 
 from foosim.protocol.errors import Refused
 from foosim.protocol.journal import Journal, JournalError
-from foosim.vhub import capture_file
+from foosim.vhub import capture_left
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import UNCLEAN, Recovered, recover_capture
@@ -216,7 +216,7 @@ def test_a_writer_goes_on_with_what_it_left(
     chunked: bytes, path: Path, hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unsynced: int
 ) -> None:
     """As a vHub does that was killed and started again: it feeds all of its journal, and the run goes on."""
-    monkeypatch.setattr(capture_file, "UNSYNCED_BYTES", unsynced)
+    monkeypatch.setattr(capture_left, "UNSYNCED_BYTES", unsynced)
     whole = rows(path, 64)
     for size in (10, first_chunk(chunked), len(chunked) // 2, len(chunked) - 3000):
         going = cut(tmp_path, chunked[:size])

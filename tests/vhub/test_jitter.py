@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 from itertools import pairwise
-from math import exp, log1p, sqrt
+from math import exp, log, log1p, sqrt
 from statistics import NormalDist
 from typing import Final
 
@@ -14,8 +14,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
+from foosim.protocol.impairments import ParetoJitter
 from foosim.vhub import jitter, numbers
-from foosim.vhub.jitter import CELLS, gamma_quantiles_ns, interpolate_ns
+from foosim.vhub.jitter import (
+    CELLS,
+    HALF_CELLS,
+    HALVES,
+    TAIL_CELL,
+    _lomax_scale,
+    gamma_quantiles_ns,
+    interpolate_ns,
+    moments_ns,
+    quantiles_ns,
+)
 
 S: Final = 1_000_000_000
 TAIL: Final = 1.0 - 2.0**-20
@@ -27,13 +38,17 @@ def share(cell: int) -> float:
 
 
 def moments(quantiles: tuple[int, ...]) -> tuple[float, float]:
-    """Mean and standard deviation of what is drawn: a straight line over each cell, and over each of a heavy tail's."""
-    cells = [(1 / CELLS, low, high) for low, high in pairwise(quantiles[: CELLS + 1])]
-    if len(quantiles) > CELLS + 1:
-        tail = [quantiles[CELLS - 1], *quantiles[CELLS + 1 :]]
-        cells[-1:] = [(CELLS**-2, low, high) for low, high in pairwise(tail)]
-    mean = sum(share * (low + high) / 2 for share, low, high in cells)
-    square = sum(share * (low * low + low * high + high * high) / 3 for share, low, high in cells)
+    """Mean and standard deviation of what draws give: a straight line between words, the closer the higher they are."""
+    words = [cell << 52 for cell in range(TAIL_CELL)]
+    words += [2**64 - 2**bits + (place << bits - 8) for bits in range(60, 11, -1) for place in range(128)]
+    drawn = [interpolate_ns(quantiles, word) for word in (*words, 2**64 - 1)]
+    assert all(low <= high for low, high in pairwise(drawn)), "more luck is never less delay"
+    shares = [(after - word) / 2**64 for word, after in pairwise((*words, 2**64))]
+    mean = sum(share * (low + high) / 2 for share, (low, high) in zip(shares, pairwise(drawn), strict=True))
+    square = sum(
+        share * (low * low + low * high + high * high) / 3
+        for share, (low, high) in zip(shares, pairwise(drawn), strict=True)
+    )
     return mean, sqrt(square - mean * mean)
 
 
@@ -83,10 +98,10 @@ def test_mean_and_spread_are_what_is_configured(mean_ns: int, ratio: float) -> N
     """From the narrowest to the widest that a deployment may have; wide ones have a finer tail."""
     sd_ns = round(mean_ns * ratio)
     quantiles = gamma_quantiles_ns(mean_ns, sd_ns)
-    assert len(quantiles) == (1 + (ratio > 1.0)) * CELLS + 1 and quantiles[0] >= 0
-    drawn = [*quantiles[:CELLS], *(quantiles[CELLS + 1 :] or quantiles[CELLS:])]
-    assert all(low <= high for low, high in pairwise(drawn)), "never falls: more luck is never less delay"
+    assert quantiles[0] >= 0 and all(low <= high for low, high in pairwise(quantiles))
     mean, sd = moments(quantiles)
+    found_mean, found_sd = moments_ns(quantiles)
+    assert found_mean == pytest.approx(mean, rel=1e-4, abs=1.0) and found_sd == pytest.approx(sd, rel=1e-3, abs=1.0)
     assert mean == pytest.approx(mean_ns, rel=0.0005, abs=0.6)
     assert sd == pytest.approx(sd_ns, rel=0.005, abs=1.0)
 
@@ -124,6 +139,49 @@ def test_the_ends_of_a_cell_are_its_quantiles() -> None:
         last = interpolate_ns(quantiles, (cell + 1 << 52) - 1)
         assert quantiles[cell + 1] - 1 <= last <= quantiles[cell + 1]
     assert interpolate_ns(quantiles, 2**64 - 1) <= quantiles[CELLS]
+
+
+def test_a_heavy_tail_is_finer_the_rarer_it_is() -> None:
+    """Each quantile where its probability is, whole and linear between; rarer than 2^-52 there is nothing."""
+    law = ParetoJitter.model_validate({"shape": "pareto", "mean": "1 us", "alpha": 1.2, "max": "60 s"})
+    quantiles = quantiles_ns(law)
+    assert len(quantiles) == TAIL_CELL + HALVES * HALF_CELLS + 1
+    for cell in (0, 1, TAIL_CELL - 1, TAIL_CELL):
+        assert interpolate_ns(quantiles, cell << 52) == pytest.approx(quantiles[cell], abs=1)
+    for half in range(HALVES):
+        whole = 2 ** (60 - half)
+        for place in (0, 1, 40, 63):
+            at = TAIL_CELL + half * HALF_CELLS + place
+            step = whole // 2 // HALF_CELLS
+            word = 2**64 - 1 - (whole - place * step) + (place == 0)
+            assert quantiles[at] <= interpolate_ns(quantiles, word) <= quantiles[at] + quantiles[at + 1] // step + 1
+            middle = interpolate_ns(quantiles, word + step // 2)
+            assert middle == pytest.approx((quantiles[at] + quantiles[at + 1]) / 2, rel=0.02, abs=1)
+    assert interpolate_ns(quantiles, 2**64 - 1) == quantiles[-1] == 60 * S
+
+
+@pytest.mark.parametrize(
+    ("mean", "alpha", "top"),
+    [
+        ("1 us", 1.2, "60 s"),
+        ("1 us", 2.5, "60 s"),
+        ("2 ms", 1.05, "60 s"),
+        ("2 ms", 1.2, "10 s"),
+        ("2 ms", 2.0, "3 s"),
+        ("1 s", 1.5, "3 s"),
+        ("1 s", 5.0, "60 s"),
+    ],
+)
+def test_a_pareto_law_cut_anywhere_has_its_moments(mean: str, alpha: float, top: str) -> None:
+    """Against the integrals of the cut law, with tails from nearly none to nearly no mean."""
+    law = ParetoJitter.model_validate({"shape": "pareto", "mean": mean, "alpha": alpha, "max": top})
+    found_mean, found = moments_ns(quantiles_ns(law))
+    scale = _lomax_scale(law.mean_ns, alpha, law.max_ns)
+    u = 1 + law.max_ns / scale
+    by_two = log(u) if alpha == 2.0 else (u ** (2 - alpha) - 1) / (2 - alpha)
+    square = 2 * scale * scale * (by_two - (1 - u ** (1 - alpha)) / (alpha - 1))
+    assert found_mean == pytest.approx(law.mean_ns, rel=1e-3)
+    assert found == pytest.approx(sqrt(square - law.mean_ns**2), rel=2e-3)
 
 
 def test_drawn_jitter_has_the_distribution() -> None:

@@ -103,6 +103,9 @@ def test_ranges_are_where_the_formulas_say() -> None:
         ({"preset": "lora_eu868", "spreading_factor": 12}, "mtu is above the 51 B of LoRaWAN at spreading factor 12"),
         ({"medium": "wired", "rate": "1 Mbit/s", "queue": {"bytes": "500 B"}},
          "a packet of 1500 B does not fit into the queue of 500 B"),
+        ({"preset": "lora_eu868", "duty_cycle": "10 %"}, "duty_cycle is above the 1 % that the EU allows at 868.1 MHz"),
+        ({"preset": "lora_eu868", "frequency": "869.5 MHz", "duty_cycle": "20 %"},
+         "duty_cycle is above the 10 % that the EU allows at 869.5 MHz"),
         ({"queue": {"packets": 3}}, "the queue has no effect: no rate, no medium"),
     ],
 )  # fmt: skip

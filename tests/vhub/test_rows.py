@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Add, Edit, Push, Remove
+from foosim.vhub.capture_columns import word_of
 from foosim.vhub.rows import (
     CLIENTS,
     EPOCHS,
@@ -213,3 +214,10 @@ def test_an_edit_of_a_wrong_shape_is_refused() -> None:
 
 def test_topics_are_those_of_the_readme() -> None:
     assert {EPOCHS, RECOVERIES, TICK, LAYOUT, FRAME, PACKETS, CLIENTS} == set(ROW_TYPES)
+
+
+def test_a_draw_is_read_or_refused() -> None:
+    assert (word_of(""), word_of("00000000000000ff")) == (None, 255)
+    for text in ("ff", "0x000000000000ff", "00000000000000FF", "00000000000000ff\n", "00000000000000f_f"):
+        with pytest.raises(CaptureError, match="it has 16 hex digits"):
+            word_of(text)

@@ -51,22 +51,9 @@ def wifi_ack_ns(mode: str, timing: WifiTiming) -> int:
     return _ofdm_ns(timing, WIFI_ACK_BYTES, MODES[mode].control_bits)
 
 
-@lru_cache(maxsize=65_536)
-def wifi_exchange_ns(mode: str, size_bytes: int, timing: WifiTiming, unicast: bool) -> int:
-    """Return how long one exchange holds the channel, without backoff: DIFS and frame; unicast also SIFS and ACK."""
-    held = timing.difs_ns + wifi_airtime_ns(mode, size_bytes, timing)
-    return held + timing.sifs_ns + wifi_ack_ns(mode, timing) if unicast else held
-
-
 def lrwpan_airtime_ns(size_bytes: int, timing: LrwpanTiming = LRWPAN) -> int:
     """Return the duration of an 802.15.4 frame with `size_bytes` of payload, with MAC and physical headers."""
     return (size_bytes + LRWPAN_OVERHEAD_BYTES + timing.phy_bytes) * timing.byte_ns
-
-
-def lrwpan_exchange_ns(size_bytes: int, timing: LrwpanTiming = LRWPAN, unicast: bool = True) -> int:
-    """Return the time from the start of channel sensing to the end: sensing, turnaround, frame; turnaround and ACK."""
-    sent = timing.cca_ns + timing.turnaround_ns + lrwpan_airtime_ns(size_bytes, timing)
-    return sent + timing.turnaround_ns + timing.ack_bytes * timing.byte_ns if unicast else sent
 
 
 @lru_cache(maxsize=65_536)

@@ -198,8 +198,10 @@ def sensing(contenders: int, airtime_ns: int, unicast: bool, timing: LrwpanTimin
     A station's cycle is its backoffs and looks at the channel and, where one of these finds it free, an exchange. Busy
     is the share of the others' cycles on the air, given that one does not send, by bisection. Who looks within a
     turnaround of the first to find the channel free sees nothing and collides with it: with l such in the mean, groups
-    of 1 + Poisson(l) send at once, and an attempt is alone with exp(-l) / (1 + l). Judgement, compared with a
-    simulation of the stations: within 10 % of its throughput for up to 10 stations, too low by a third beyond.
+    of 1 + Poisson(l) send at once, and an attempt is alone with exp(-l) / (1 + l). Where many wait, the next one is on
+    the air before the group that sent last is back: it is not among those who look, and its first looks are in vain.
+    Judgement, compared with a simulation of the stations: within an eighth of its throughput for up to 20 stations, too
+    low by a sixth for 30, and for 50 by up to a third where frames are long.
     """
     n = min(max(contenders, 1), CONTENDERS_MAX)
     turn, frame, cca = float(timing.turnaround_ns), float(airtime_ns), float(timing.cca_ns)
@@ -216,10 +218,13 @@ def sensing(contenders: int, airtime_ns: int, unicast: bool, timing: LrwpanTimin
             looks += reached
             waiting += reached * wait
             reached *= busy
-        length = waiting + (1.0 - reached) * (turn + frame + tail)
-        idle = length - (1.0 - reached) * (turn + frame)
-        others = (n - 1) * looks * turn / idle
-        return length, 1.0 - reached, others, exp(-others) / (1.0 + others)
+        sends = 1.0 - reached
+        length = waiting + sends * (turn + frame + tail)
+        one_before = 1.0 - exp(-(n - 1) * looks / length * (tail + cca))
+        away = one_before * one_before * one_before  # cubed: fits few stations, where a group is back in time
+        look = (looks - away * sends) / (length - sends * (turn + frame)) * turn
+        others = look * (n - 1 - away) / (1.0 + look * away)  # l = look (n - 1 - away (1 + l))
+        return length, sends, others, exp(-others) / (1.0 + others)
 
     low, high = 0.0, 1.0
     for _ in range(50):

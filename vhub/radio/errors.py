@@ -89,7 +89,9 @@ MODES: Final[Mapping[str, Mode]] = MappingProxyType({mode.name: mode for mode in
 WIFI_MODES: Final = tuple(mode.name for mode in MODES.values() if mode.family == "ofdm")
 HT_MODES: Final = tuple(mode.name for mode in MODES.values() if mode.family == "ht")
 DOT11P_MODES: Final = tuple(mode.name for mode in MODES.values() if mode.family == "ofdm10")
-"""Each in order of rising rate, as `frames.WifiFrames` wants it."""
+DOT11N_MODES: Final = ("ofdm_6", *HT_MODES)
+"""Each in order of rising rate, as `frames.WifiFrames` wants it. The first is that of broadcasts; 802.11n's is one of
+old."""
 
 
 def _bit_error(points: int, snr: float) -> float:

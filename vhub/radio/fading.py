@@ -127,10 +127,6 @@ def nakagami_m(distance_m: float) -> float:
     return 1.5 if distance_m < 80.0 else 0.75
 
 
-RICIAN_K_DB: Final = 8.0
-"""Source: INET's default for Rician fading."""
-
-
 def block_of(time_ns: int, coherence_ns: int) -> int:
     """Return the number of the block that a time falls into: the counter of its draw."""
     return time_ns // coherence_ns

@@ -41,6 +41,8 @@ class Environment:
     sigma_nlos: float = 0.0
     d_corr_los: float = 10.0
     d_corr_nlos: float = 10.0
+    has_vehicles: bool = False
+    """Whether a vehicle in between takes away what it does between vehicles (`vehicle_blockage_db`)."""
 
     @property
     def has_nlos_curve(self) -> bool:
@@ -240,8 +242,8 @@ def vehicle_blockage_db(
     """Return what a vehicle between two vehicles takes away, in dB, to be added to the loss with line of sight.
 
     Nothing when both antennas stand above it; else a log-normal number of mean 9 dB and standard deviation 4.5 dB (both
-    below its height) or 5 and 4 (one below), the mean plus max(0, 15 lg d - 41). `word` is the draw: one for the whole
-    passage of a blocker, not one for each packet. Source: 3GPP TR 37.885, 6.2.1. A car is 1.6 m high, a lorry 3 m.
+    below its height) or 5 and 4 (one below), the mean plus max(0, 15 lg d - 41). `word` is the draw: one for a pair and
+    a blocker, not one for each packet. Source: 3GPP TR 37.885, 6.2.1. A car is 1.6 m high, a lorry 3 m.
     """
     if min(tx_height_m, rx_height_m) > blocker_height_m:
         return 0.0
@@ -268,6 +270,7 @@ ENVIRONMENTS: Final[Mapping[str, Environment]] = MappingProxyType(
             *(3.0, 4.0, 10.0, 13.0),
             los=Curve(38.77, 16.7, 18.2),
             nlos=_V2V_NLOS,
+            has_vehicles=True,
         ),
         "v2v_highway": TwoCurves(
             "3GPP TR 37.885 table 6.2.1-1, highway; correlation distances as ns-3 has them (25 m in line of sight in"
@@ -275,6 +278,7 @@ ENVIRONMENTS: Final[Mapping[str, Environment]] = MappingProxyType(
             *(3.0, 4.0, 10.0, 13.0),
             los=Curve(32.4, 20.0, 20.0),
             nlos=_V2V_NLOS,
+            has_vehicles=True,
         ),
         "urban_micro": UrbanCell(
             f"{_TR38901}, urban micro (street canyon)",

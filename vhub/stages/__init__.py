@@ -14,11 +14,13 @@ from typing import Final
 
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.admit import Admit
+from foosim.vhub.stages.capacity import Capacity
 from foosim.vhub.stages.channel import Channel
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.duty import Duty
 from foosim.vhub.stages.mangle import Mangle
 from foosim.vhub.stages.medium import make_medium
+from foosim.vhub.stages.own import Own
 from foosim.vhub.stages.policy import Policy
 from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.receiver import Receiver
@@ -33,7 +35,9 @@ STAGES: Final[tuple[Callable[[LinkSetup], Stage | None], ...]] = (
     make_medium,
     Channel.for_link,
     make_residual,
+    Own.for_link,
     Mangle.for_link,
     Delay.for_link,
+    Capacity.for_link,
     Receiver.for_link,
 )

@@ -24,6 +24,7 @@ class Channel(Stage):
         assert setup.budget is not None
         self._budget, self._air = setup.budget, setup.air
         self._factor = setup.settings.spreading_factor if setup.settings.medium == "lora" else 0
+        self._is_gateway = setup.settings.gateway
         self._curve = error_curve(setup.settings)
 
     @classmethod
@@ -62,7 +63,7 @@ class Channel(Stage):
         """LoRa captures: a signal survives others that are together weaker by their spreading factor's isolation."""
         factor = self._factor
         power_dbm = flight.received_cdbm / 100.0
-        if not lora_received(factor, power_dbm):
+        if not lora_received(factor, power_dbm, self._is_gateway):
             flight.error_threshold = UNIT
             return OUT_OF_RANGE
         if not flight.by_factor:

@@ -1,4 +1,4 @@
-"""Delay: queue, access, airtime and propagation, the constant delay, jitter, clogs; then the order of the link.
+"""Delay: queue, access, airtime and propagation, the constant delay, a model's, jitter, clogs; then the link's order.
 
 Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo unless
 they say otherwise. A clog that is asked for, or healed, while packets are on their way moves their due times: as if it
@@ -40,11 +40,11 @@ class Delay(Stage):
         settings = setup.settings
         timed = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
         late = settings.jitter is not None or settings.reorder is not None or settings.burst is not None
-        return cls(setup) if timed or late or settings.delay_ns or setup.holds else None
+        return cls(setup) if timed or late or settings.delay_ns or setup.holds or setup.model is not None else None
 
     def at_sending(self, flight: Flight) -> str:
         spent_ns = flight.phase_ns + flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
-        due_ns = flight.sent_ns + spent_ns + self._delay_ns
+        due_ns = flight.sent_ns + spent_ns + self._delay_ns + flight.model_ns
         if self._quantiles_ns:
             flight.jitter_ns = jitter_ns = interpolate_ns(self._quantiles_ns, flight.words[_JITTER])
             due_ns += jitter_ns

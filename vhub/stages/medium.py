@@ -193,6 +193,8 @@ class OnAir(Stage):
 
 def wifi_modes(settings: Radio) -> tuple[str, ...]:
     """Return the modulations of a Wi-Fi radio, in order of rising rate."""
+    if settings.standard == "802.11n":
+        return errors.DOT11N_MODES
     return errors.DOT11P_MODES if settings.bandwidth_hz < 15e6 else errors.WIFI_MODES
 
 

@@ -1,0 +1,138 @@
+"""Several players as one core: each gets what is its own, all speak together, and one that is refused ends all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from foosim.client.core import ClientCore
+from foosim.client.crew import Crew
+from foosim.client.errors import PlayerError
+from foosim.client.player import Commands, Samples
+from foosim.protocol import channels
+from foosim.protocol.actions import Publish, Say
+from foosim.protocol.codec import decode_any, encode
+from foosim.protocol.command import DONE, FAILED, REFUSED
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Done, Down, Go, Join
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+RED, BLUE = "player-red", "player-blue"
+
+
+class Counts:
+    """A player that counts its turns, and fails when it is told to."""
+
+    fails = False
+
+    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+        self.turns = 0
+
+    def act(self, tick: int, samples: Samples) -> Commands:
+        if self.fails:
+            raise ValueError("too much")
+        self.turns += 1
+        return {}
+
+
+def crew_of(*names: str) -> Crew:
+    return Crew([ClientCore(name, "one", 0) for name in names], lambda path: Counts)
+
+
+def say(crew: Crew, channel: channels.Channel, name: str, message: Any) -> list[Any]:
+    """Let a message come to somebody, and all act; return what is said then, a line as its text."""
+    crew.receive(channel, name, encode(message), 0)
+    return heard(crew)
+
+
+def heard(crew: Crew) -> list[Any]:
+    crew.step(0)
+    found = [
+        action.text if isinstance(action, Say) else (action.name, decode_any(action.channel.message, action.payload))
+        for action in crew.actions
+        if isinstance(action, Publish | Say)
+    ]
+    crew.actions.clear()
+    return found
+
+
+def begun() -> Crew:
+    crew = crew_of(RED, BLUE)
+    for name in (RED, BLUE):
+        say(crew, channels.CLIENT_WELCOME, name, ClientWelcome(name, "one", "hub", 0, 0, "t", TABLE.read_text()))
+    return crew
+
+
+def test_all_say_hello_and_join_under_their_own_names() -> None:
+    crew = crew_of(RED, BLUE)
+    crew.wake(0)
+    hellos = heard(crew)
+    assert [name for name, _ in hellos] == [RED, BLUE] and all(isinstance(said, ClientHello) for _, said in hellos)
+    for name in (RED, BLUE):
+        welcome = ClientWelcome(name, "one", "hub", 0, 0, "t", TABLE.read_text())
+        ((joins, join),) = say(crew, channels.CLIENT_WELCOME, name, welcome)
+        assert joins == name and isinstance(join, Join) and join.name == name
+    assert not crew.is_over
+
+
+def test_who_gets_a_go_acts_and_nobody_else() -> None:
+    crew = begun()
+    ((name, done),) = say(crew, channels.DOWN, BLUE, Go(1, 5, 0, []))
+    assert name == BLUE and isinstance(done, Done) and (done.name, done.tick) == (BLUE, 5)
+    turns = {name: player.player.turns for name, player in crew._players.items()}  # type: ignore[union-attr]
+    assert turns == {RED: 0, BLUE: 1}
+
+
+def test_those_due_at_one_tick_speak_together_in_the_order_in_which_it_came() -> None:
+    crew = begun()
+    for name in (BLUE, RED):
+        crew.receive(channels.DOWN, name, encode(Go(1, 5, 0, [])), 0)
+    assert [name for name, _ in heard(crew)] == [BLUE, RED]
+
+
+def test_what_names_nobody_here_is_refused_and_counted() -> None:
+    crew = begun()
+    (line,) = say(crew, channels.DOWN, "stranger", Go(1, 5, 0, []))
+    assert line.startswith(f"{RED}: ") and "stranger" in line
+    assert [core.statistics().malformed for core in crew.cores] == [1, 0]
+
+
+def test_one_that_is_refused_ends_all() -> None:
+    crew = crew_of(RED, BLUE)
+    (line,) = say(crew, channels.CLIENT_REFUSAL, BLUE, ClientRefusal(BLUE, "one", "there is one already"))
+    assert line == f"{BLUE}: refused by the vHub: there is one already"
+    assert crew.is_over and crew.leave() == REFUSED
+
+
+def test_one_that_fails_says_who_and_at_which_tick(monkeypatch: pytest.MonkeyPatch) -> None:
+    crew = begun()
+    monkeypatch.setattr(Counts, "fails", True)
+    with pytest.raises(PlayerError, match=f"player {BLUE} at tick 5: act failed: ValueError: too much"):
+        say(crew, channels.DOWN, BLUE, Go(1, 5, 0, []))
+
+
+def test_it_is_over_when_the_run_has_ended_for_all() -> None:
+    crew = begun()
+    over = []
+    for name in (RED, BLUE):
+        say(crew, channels.DOWN, name, Down(1, 9, 0, [], True))
+        over.append(crew.is_over)
+    assert over == [False, True] and crew.leave() == DONE
+
+
+def test_a_vhub_that_is_gone_is_missed_by_all_and_lost_for_good_in_the_end() -> None:
+    crew = begun()
+    crew.hub_alive(False, 0)
+    lines = heard(crew)
+    assert [line.partition(":")[0] for line in lines] == [RED, BLUE]
+    deployment = crew.cores[0].deployment
+    assert deployment is not None
+    assert crew.deadline_ns() <= deployment.deadlines.vhub_back_ns
+    crew.wake(deployment.deadlines.vhub_back_ns)
+    assert crew.is_over and crew.leave() == FAILED
+    assert [action.text for action in crew.actions if isinstance(action, Say)] == [
+        f"{name}: lost the vHub" for name in (RED, BLUE)
+    ]

@@ -1,0 +1,369 @@
+"""Captures in several files: together they are the one that is not split, and each can be read by itself."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.disk import Level
+from foosim.protocol.journal import Journal
+from foosim.vhub import capture_file, capture_left, capture_writer
+from foosim.vhub.capture_cut import cut_capture
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_parts import Joined, files_from
+from foosim.vhub.capture_reader import open_capture, read_about
+from foosim.vhub.capture_recovery import recover_capture
+from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.keeping import Keep
+from foosim.vhub.mcap_file import Message
+from foosim.vhub.records import Closing
+from foosim.vhub.resume import end_of, first_tick_of, recall
+from foosim.vhub.rows import CaptureError
+from tests.vhub.conftest import LOG_LINES, NAME
+from tests.vhub.test_capture_branch import journal_until
+from tests.vhub.test_capture_recovery import LAST, read_by_others, rows
+from tests.vhub.test_capture_room import Disk
+
+if TYPE_CHECKING:
+    from tests.vhub.conftest import HubRun
+
+BY_TIME = "capture.split_time=20 ms"
+"""Ten ticks, as often as a frame is captured: files begin at ticks 10, 20, ..., 60."""
+METADATA = {"run": "run-1", "fingerprint": "00"}
+
+
+def split_by(run: HubRun, *sets: str) -> tuple[str, Deployment]:
+    text = apply_sets(run.text, NAME, sets)
+    return text, load_deployment(text, NAME)
+
+
+def write(path: Path, run: HubRun, *sets: str, until: int | None = None) -> CaptureWriter:
+    text, deployment = split_by(run, *sets)
+    writer = CaptureWriter(path, deployment, NAME, text, METADATA)
+    epochs = {epoch.tick: epoch for epoch in run.epochs}
+    for closing in run.closings[:until]:
+        if closing.frame.tick in epochs:
+            writer.keep(epochs[closing.frame.tick])
+        writer.keep(closing)
+    for line in LOG_LINES:
+        writer.log(*line)
+    writer.finish({"reason": "enough"})
+    return writer
+
+
+def messages(path: Path) -> list[Message]:
+    return [content for content in Joined(path).contents() if isinstance(content, Message)]
+
+
+def joined_rows(path: Path, last: int = LAST) -> dict[str, list[object]]:
+    """The rows of all files up to a tick, without the log and the frame that a file ends with between two others."""
+    kept: dict[str, list[object]] = {}
+    for message in messages(path):
+        if message.topic != "/log" and message.log_ns <= last * 2_000_000:
+            kept.setdefault(message.topic, []).append(message)
+    return kept
+
+
+@pytest.fixture(scope="module")
+def parts(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run in seven files; not to be changed."""
+    path = tmp_path_factory.mktemp("split") / "run.mcap"
+    write(path, hub_run, BY_TIME)
+    return path
+
+
+@pytest.fixture
+def copied(parts: Path, tmp_path: Path) -> Path:
+    for file in files_from(parts):
+        shutil.copy(file, tmp_path)
+    return tmp_path / parts.name
+
+
+def names(path: Path) -> list[str]:
+    return sorted(file.name for file in path.parent.glob("*.mcap"))
+
+
+NAMES = ["run.mcap", *(f"run_{number:04d}.mcap" for number in range(1, 7))]
+
+
+def test_all_files_together_have_the_rows_of_one(parts: Path, path: Path) -> None:
+    assert [file.name for file in files_from(parts)] == NAMES
+    assert messages(parts) == messages(path)
+    capture, whole = open_capture(parts), open_capture(path)
+    assert capture.finished and capture.about.end == whole.about.end
+    assert capture.ticks.tolist() == whole.ticks.tolist() and (capture.digests == whole.digests).all()
+    assert capture.clients == whole.clients and capture.epochs == whole.epochs
+    assert {**capture_info(parts).topics} == {**capture_info(path).topics}
+    assert capture_info(parts).chain == capture_info(path).chain
+    assert capture_info(parts).bytes == sum(file.stat().st_size for file in files_from(parts))
+    assert capture_info(parts).parts == tuple(NAMES) and capture_info(path).parts == ("run.mcap",)
+
+
+def test_each_file_stands_by_itself(parts: Path, path: Path, tmp_path: Path) -> None:
+    chains = {}
+    for at, file in enumerate(files_from(parts)):
+        alone = tmp_path / "alone" / file.name
+        alone.parent.mkdir(exist_ok=True)
+        shutil.copy(file, alone)
+        capture, info = open_capture(alone), capture_info(alone)
+        first = 10 * at
+        assert capture.ticks.tolist() == list(range(first, first + 10 if at < 6 else 65))
+        assert capture.finished is (at == 6), "the rest of it is not here"
+        assert int(next(block for block in capture.frame_blocks if len(block)).ticks[0]) == first
+        assert capture.epochs and capture.about.deployment_text == open_capture(parts).about.deployment_text
+        assert read_by_others(alone) > 0
+        if at:
+            assert (info.metadata["part"], info.metadata["part_after"]) == (str(at), NAMES[at - 1])
+            assert (info.metadata["cut_from"], info.metadata["cut_tick"]) == ("run.mcap", str(first))
+        chains[at] = info.chain
+        alone.unlink()
+        cut_capture(path, tmp_path / f"{at}.mcap", first * 2_000_000, (first + 9 if at < 6 else 64) * 2_000_000)
+        cut = open_capture(tmp_path / f"{at}.mcap")
+        assert {row.client for row in cut.clients} == {row.client for row in capture.clients}
+        assert capture_info(tmp_path / f"{at}.mcap").chain == info.chain
+    assert chains[6] == capture_info(path).chain
+
+
+def test_what_is_read_is_a_file_and_all_behind_it(parts: Path, path: Path) -> None:
+    rest = open_capture(parts.with_name("run_0003.mcap"))
+    assert rest.ticks.tolist() == list(range(30, 65)) and rest.finished
+    assert messages(rest.path)[-50:] == messages(path)[-50:]
+
+
+def test_a_file_ends_when_it_is_large(
+    hub_run: HubRun, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(capture_writer, "BATCH_ROWS", 40)
+    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
+    write(tmp_path / "run.mcap", hub_run, "capture.split_size=64 KiB")
+    files = files_from(tmp_path / "run.mcap")
+    assert messages(files[0]) == messages(path)
+    assert len(files) > 1 and all(file.stat().st_size > 64 * 1024 for file in files[:-1])
+
+
+def test_a_cut_is_one_file(parts: Path, path: Path, tmp_path: Path) -> None:
+    for source, out in ((parts, "one.mcap"), (path, "other.mcap")):
+        cut_capture(source, tmp_path / out, 30 * 2_000_000, 55 * 2_000_000)
+    assert messages(tmp_path / "one.mcap") == messages(tmp_path / "other.mcap")
+    one, other = (read_about(tmp_path / name).metadata for name in ("one.mcap", "other.mcap"))
+    assert one == other
+
+
+# --- what is missing, or of others -----------------------------------------------------------------------------------
+
+
+def test_a_file_that_is_missing_is_named(copied: Path) -> None:
+    (copied.parent / "run_0003.mcap").unlink()
+    for named in ("run.mcap", "run_0001.mcap"):
+        with pytest.raises(CaptureError, match=r"run_0003\.mcap: is missing, run_0004\.mcap goes on behind it"):
+            open_capture(copied.parent / named)
+    assert open_capture(copied.parent / "run_0004.mcap").ticks[0] == 40
+    copied.unlink()
+    with pytest.raises(CaptureError, match=r"run\.mcap: is missing, run_0001\.mcap goes on behind it"):
+        open_capture(copied)
+
+
+def test_without_its_last_files_a_capture_has_no_end(copied: Path) -> None:
+    for number in (5, 6):
+        (copied.parent / f"run_000{number}.mcap").unlink()
+    capture = open_capture(copied)
+    assert not capture.finished and capture.ticks[-1] == 49 and not read_about(copied).finished
+    assert capture.about.end["goes_on_in"] == "run_0005.mcap"
+
+
+def test_a_file_of_another_run_or_without_its_end_is_refused(copied: Path, hub_run: HubRun, tmp_path: Path) -> None:
+    second = copied.parent / "run_0002.mcap"
+    content = second.read_bytes()
+    second.write_bytes(content[: len(content) * 2 // 3])
+    with pytest.raises(CaptureError, match=r"run_0002\.mcap: it has no end, and run_0003\.mcap goes on behind it"):
+        open_capture(copied)
+    second.write_bytes((copied.parent / "run_0004.mcap").read_bytes())
+    with pytest.raises(CaptureError, match=r"run_0002\.mcap: is not what run_0001\.mcap goes on in"):
+        open_capture(copied)
+    with pytest.raises(CaptureError, match=r"run_0001\.mcap: exists already"):
+        copied.unlink()
+        write(copied, hub_run, BY_TIME)
+
+
+def test_others_of_like_names_are_left_alone(path: Path, tmp_path: Path) -> None:
+    for name in ("run.mcap", "run_0001.mcap", "run_12.mcap"):
+        shutil.copy(path, tmp_path / name)
+    assert files_from(tmp_path / "run.mcap") == [tmp_path / "run.mcap"]
+
+
+# --- unclean ends ----------------------------------------------------------------------------------------------------
+
+
+def left_behind(parts: Path, folder: Path, count: int, size: int) -> Path:
+    """What a writer leaves that is killed within the file number `count`, or just before it (size -1)."""
+    folder.mkdir()
+    files = files_from(parts)
+    for file in files[:count]:
+        shutil.copy(file, folder)
+    if size >= 0:
+        (folder / files[count].name).write_bytes(files[count].read_bytes()[:size])
+    return folder / parts.name
+
+
+def places(parts: Path) -> Iterator[tuple[int, int]]:
+    for count, file in list(enumerate(files_from(parts)))[1:7:2]:
+        size = file.stat().st_size
+        for place in ((-1, size // 2), (3, size - 9_000), (9_000, size - 1))[count // 2]:
+            yield count, place
+
+
+def test_killed_anywhere_the_journal_gives_what_is_missing(
+    parts: Path, path: Path, hub_run: HubRun, tmp_path: Path
+) -> None:
+    with Journal(tmp_path / "journals", "vhub") as journal:
+        for record in hub_run.journal:
+            journal.append(record)
+    whole = rows(path)
+    for number, (count, size) in enumerate(places(parts)):
+        left = left_behind(parts, tmp_path / str(number), count, size)
+        found = recover_capture(left, tmp_path / "journals")
+        assert found is not None and found.is_whole and found.tick >= LAST, (count, size)
+        assert open_capture(left).finished and open_capture(left).ticks.tolist() == list(range(found.tick + 1))
+        made = rows_of_all(left)
+        assert {topic: len(made[topic]) for topic in ("/tick", "/packets", "/clients", "/epochs", "/layout")} == {
+            topic: len(whole[topic]) for topic in ("/tick", "/packets", "/clients", "/epochs", "/layout")
+        }, (count, size)
+        assert made["/packets"] == whole["/packets"] and names(left) == NAMES
+        shutil.rmtree(left.parent)
+
+
+def rows_of_all(path: Path) -> dict[str, list[dict[str, object]]]:
+    """The rows of all files, each as it stands in the file but for what only a clock knew."""
+    out = path.parent / "joined.mcap"
+    cut_capture(path, out)
+    found = rows(out)
+    out.unlink()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("closed", "lefts", "unsynced"),
+    [
+        (9, [(1, -1), (2, 9_000)], 1000),
+        (10, [(4, 30_000)], 1000),
+        (33, [(4, 30_000)], 1 << 23),
+        (LAST, [(6, 90_000)], 1000),
+    ],
+)
+def test_a_vhub_goes_on_with_what_it_left_wherever_its_journal_ends(
+    parts: Path,
+    path: Path,
+    hub_run: HubRun,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    closed: int,
+    lefts: list[tuple[int, int]],
+    unsynced: int,
+) -> None:
+    """The machine was lost: files may be further than the journal, whole ones too."""
+    monkeypatch.setattr(capture_left, "UNSYNCED_BYTES", unsynced)
+    text, deployment = split_by(hub_run, BY_TIME)
+    records = journal_until(hub_run, closed)
+    for number, (count, size) in enumerate(lefts):
+        left = left_behind(parts, tmp_path / str(number), count, size)
+        writer = CaptureWriter(
+            left, deployment, NAME, text, METADATA, None, first_tick_of(records), end_of(deployment, records)
+        )
+        assert writer.begun_with.tick <= closed
+        past = recall(deployment, "run-1", records, writer.begun_with, 0)
+        assert past is not None
+        if past.known is not None:
+            writer.keep(Closing(past.known, past.known.digest, [], []))
+        for item in past.kept:
+            writer.keep(item.closing if isinstance(item, Keep) else item.epoch)
+        for epoch in hub_run.epochs:
+            if past.epoch is None or epoch.epoch > past.epoch.epoch:
+                writer.keep(epoch)
+        for closing in hub_run.closings:
+            if closing.frame.tick > past.state.closed:
+                writer.keep(closing)
+        writer.finish({"reason": "enough"})
+        made, whole = rows_of_all(left), rows(path)
+        assert names(left) == NAMES and open_capture(left).finished
+        assert [row["tick"] for row in made["/tick"]] == list(range(LAST + 1))
+        for topic in ("/tick", "/packets", "/clients", "/layout", "/scene", "/tf", "/frame"):
+            assert made[topic] == whole[topic], (topic, count, size)
+        assert len(made["/epochs"]) == len(whole["/epochs"])
+        assert capture_info(left).chain == capture_info(path).chain
+
+
+# --- disks that refuse -----------------------------------------------------------------------------------------------
+
+
+def test_a_disk_that_refuses_leaves_whole_files(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It refuses rows, the next file's description, what is repeated there, or a file's end."""
+    monkeypatch.setattr(capture_writer, "BATCH_ROWS", 40)
+    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
+    taken = Disk(1 << 40, monkeypatch)
+    taken.looks = lambda free: 1 << 40
+    counts = set()
+    write(tmp_path / "all" / "run.mcap", hub_run, BY_TIME)
+    first = (tmp_path / "all" / "run.mcap").stat().st_size
+    for room in (first - 3_000, first + 10, first + 20_000, first + 36_000, first + 60_000, first + 90_000):
+        taken.room = room
+        path = tmp_path / str(room) / "run.mcap"
+        writer = write(path, hub_run, BY_TIME)
+        assert writer.state.level is Level.OUT and "cannot be written, No space left" in writer.state.text
+        found, capture = writer.statistics(), open_capture(path)
+        assert found.offered == found.written + found.refused and found.refused > 0
+        assert capture.about.unfinished_bytes == 0
+        assert len(capture.ticks) + len(capture.packets) + len(capture.epochs) + logged(path) == found.written
+        assert all(len(open_capture(file).ticks) for file in files_from(path)), "none that holds nothing"
+        counts.add(len(files_from(path)))
+        taken.room = 1 << 40
+        if not capture.finished:
+            assert recover_capture(path) is not None
+        assert open_capture(path).finished and read_by_others(files_from(path)[-1]) > 0
+    assert len(counts) > 1
+
+
+def logged(path: Path) -> int:
+    """How many of the test's lines of the log are there."""
+    texts = {text.encode() for _, text, _ in LOG_LINES}
+    return sum(any(text in message.data for text in texts) for message in messages(path) if message.topic == "/log")
+
+
+# --- only the last ---------------------------------------------------------------------------------------------------
+
+
+def test_only_the_last_is_kept(hub_run: HubRun, path: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run.mcap"
+    write(run, hub_run, BY_TIME, "capture.last=50 ms")
+    assert names(run) == NAMES[3:], "of 50 ms before tick 60 something is in the file of ticks 30 to 39"
+    capture = open_capture(run)
+    assert capture.ticks.tolist() == list(range(30, 65)) and capture.finished
+    info = capture_info(run)
+    assert (info.first_tick, info.metadata["last"], info.metadata["cut_tick"]) == (30, "50 ms", "30")
+    assert info.chain == capture_info(path).chain
+    assert messages(run)[-50:] == messages(path)[-50:]
+    (tmp_path / "run_0004.mcap").unlink()
+    with pytest.raises(CaptureError, match=r"run_0004\.mcap: is missing, run_0005\.mcap goes on behind it"):
+        open_capture(run)
+
+
+def test_what_was_let_go_does_not_count(hub_run: HubRun, tmp_path: Path) -> None:
+    """All files together are larger than the capture may be; those that are there never are."""
+    sizes = [file.stat().st_size for file in files_from(write(tmp_path / "a" / "run.mcap", hub_run, BY_TIME).path)]
+    quota = f"capture.max_bytes={max(sum(sizes[at : at + 4]) for at in range(4)) // 1024 + 40} KiB"
+    text, deployment = split_by(hub_run, BY_TIME, "capture.last=20 ms", quota, "capture.reserve=64 KiB")
+    writer = CaptureWriter(tmp_path / "run.mcap", deployment, NAME, text, METADATA)
+    for closing in hub_run.closings:
+        writer.keep(closing)
+    writer.finish()
+    assert writer.statistics().refused == 0 and open_capture(tmp_path / "run.mcap").ticks[-1] == 64
+    assert writer.statistics().bytes == sum(file.stat().st_size for file in files_from(tmp_path / "run.mcap"))
+    without = write(tmp_path / "b" / "run.mcap", hub_run, BY_TIME, quota, "capture.reserve=64 KiB")
+    assert without.statistics().refused > 0, "what is not let go counts"

@@ -1,0 +1,50 @@
+"""When the vHub speaks and what it waits for: deliveries before the rest of a closing, answers of clients together."""
+
+from __future__ import annotations
+
+from foosim.protocol import channels
+from foosim.protocol.actions import Journal, Publish
+from foosim.protocol.messages import Tempo, Up
+from tests.vhub.test_sessions import PERIODS, Hub, sent
+
+
+def test_deliveries_may_leave_behind_their_record_and_before_the_rest_of_the_closing() -> None:
+    hub = Hub().begin()
+    hub.said()
+    spoken: list[list[object]] = []
+
+    def speak(now_ns: int) -> int:
+        spoken.append([*hub.core.actions])
+        return now_ns + 7
+
+    hub.core.speak = speak
+    hub.close(0)
+    actions, _ = spoken
+    assert isinstance(actions[-2], Journal)
+    assert isinstance(actions[-1], Publish) and actions[-1].channel is channels.DELIVERIES
+    assert len(hub.core.actions) > len(actions), "the capture gets the closing when it is complete"
+
+
+def test_what_clients_have_to_answer_is_waited_for_together() -> None:
+    hub = Hub()
+    assert hub.core.lacking == (channels.UP, 1), "somebody has to join"
+    hub.begin()
+    assert hub.core.lacking[0] is channels.COMMIT
+    hub.commit(0)
+    assert hub.core.lacking == (channels.UP, len(PERIODS))
+    first, *others = PERIODS
+    hub.done(first, 0)
+    assert hub.core.lacking == (channels.UP, len(others))
+    for name in others:
+        hub.done(name, 0)
+    assert hub.core.lacking[0] is channels.COMMIT
+
+
+def test_what_is_sent_between_ticks_ends_no_wait() -> None:
+    hub = Hub().begin()
+    hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
+    hub.enter("ear")
+    hub.close(0)
+    before = hub.core.lacking
+    hub.say(channels.UP, "ear", Up("ear", "one", [sent(1)]))
+    assert hub.core.lacking == before and before[0] is channels.COMMIT

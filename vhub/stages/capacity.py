@@ -1,0 +1,51 @@
+"""Capacity: how many packets are on their way on a link at once; one more takes the place of a random one.
+
+That is how TigerBeetle's simulator bounds a path (src/testing/packet_simulator.zig). Who is evicted is drawn by the
+packet that comes, known at once, and said at arrival.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from foosim.vhub.memory import LinkState
+from foosim.vhub.packet import Flight
+from foosim.vhub.setup import LinkSetup
+from foosim.vhub.stages.stage import Stage
+
+EVICTED: Final = "evicted"
+CAPACITY_BLOCK: Final = 3
+"""The block of a packet's draws of which the first word says whose place it takes."""
+
+
+class Capacity(Stage):
+    """Knows what is on its way on a link."""
+
+    def __init__(self, setup: LinkSetup, most: int) -> None:
+        self._setup, self._most = setup, most
+
+    @classmethod
+    def for_link(cls, setup: LinkSetup) -> Capacity | None:
+        most = setup.settings.capacity
+        return None if most is None else cls(setup, most)
+
+    def at_sending(self, flight: Flight) -> str:
+        memory = self._setup.memory
+        flying = [place for place, (_, _, is_evicted) in enumerate(memory.under_way) if not is_evicted]
+        if len(flying) >= self._most:
+            place = flying[self._setup.words(flight, CAPACITY_BLOCK)[0] * len(flying) >> 64]
+            sequence, copy, _ = memory.under_way[place]
+            memory.under_way[place] = sequence, copy, True
+        memory.under_way.append((flight.sequence, flight.copy, False))
+        return ""
+
+    def at_arrival(self, flight: Flight, hindered: str) -> str:
+        evicted = (flight.sequence, flight.copy, True) in self._setup.memory.under_way
+        return EVICTED if evicted else ""
+
+
+def leave(memory: LinkState, flight: Flight) -> None:
+    """A packet has arrived, or was dropped at arrival: it is not on its way any more."""
+    for entry in (flight.sequence, flight.copy, False), (flight.sequence, flight.copy, True):
+        if entry in memory.under_way:
+            memory.under_way.remove(entry)
