@@ -18,7 +18,7 @@ from foosim.protocol.frame import CHAIN_START, chain_next
 from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, Scan, TickMark, chain_at_start, deployment_of
 from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, Fate
+from foosim.vhub.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, CaptureError, Fate
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +80,13 @@ def capture_info(path: Path | str) -> CaptureInfo:
     found = _Counts(scan)
     for message in scan.messages():
         found.take(message)
-    about, first, files = scan.about, max(0, found.first), files_from(path)
+    about, first, sizes = scan.about, max(0, found.first), _sizes(path)
     deployment = deployment_of(about)
     tick_ns = deployment.tick_ns
     return CaptureInfo(
         str(path),
-        tuple(file.name for file in files),
-        sum(file.stat().st_size for file in files),
+        tuple(sizes),
+        sum(sizes.values()),
         about.finished,
         about.unfinished_bytes,
         about.library,
@@ -111,6 +111,14 @@ def capture_info(path: Path | str) -> CaptureInfo:
         {name: len(content) for name, content in sorted(about.files.items())},
         dict(sorted(found.topics.items())),
     )
+
+
+def _sizes(path: Path) -> dict[str, int]:
+    """Return the bytes of each file that is read, by its name."""
+    try:
+        return {file.name: file.stat().st_size for file in files_from(path)}
+    except OSError as error:  # a run that keeps only the last lets files go meanwhile
+        raise CaptureError(f"{error.filename}: cannot be read, {error.strerror}") from None
 
 
 class _Counts:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import pytest
 
 from foosim.protocol.deployment import Deployment
@@ -21,11 +22,11 @@ from foosim.vhub.capture_reader import open_capture, read_about
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.keeping import Keep
-from foosim.vhub.mcap_file import Message
+from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.records import Closing
 from foosim.vhub.resume import end_of, first_tick_of, recall
 from foosim.vhub.rows import CaptureError
-from tests.vhub.conftest import LOG_LINES, NAME
+from tests.vhub.conftest import ADDED_AT, LOG_LINES, NAME, REMOVED_AT
 from tests.vhub.test_capture_branch import journal_until
 from tests.vhub.test_capture_recovery import LAST, read_by_others, rows
 from tests.vhub.test_capture_room import Disk
@@ -145,6 +146,21 @@ def test_a_file_ends_when_it_is_large(
     files = files_from(tmp_path / "run.mcap")
     assert messages(files[0]) == messages(path)
     assert len(files) > 1 and all(file.stat().st_size > 64 * 1024 for file in files[:-1])
+
+
+def test_a_file_begins_with_a_frame_that_is_there_anyway(hub_run: HubRun, tmp_path: Path) -> None:
+    every = "capture.frames_every=25 ticks"
+    write(tmp_path / "one" / "run.mcap", hub_run, every)
+    write(tmp_path / "run.mcap", hub_run, every, "capture.split_time=22 ms")
+    assert messages(tmp_path / "run.mcap") == messages(tmp_path / "one" / "run.mcap")
+    begun = {}
+    for file in files_from(tmp_path / "run.mcap"):
+        with file.open("rb") as stream:
+            contents = list(McapFile(stream, file.stat().st_size, file.name).contents())
+        alone = [content for content in contents if isinstance(content, Message)]
+        ticks = [msgspec.json.decode(message.data)["tick"] for message in alone if message.topic == "/tick"]
+        begun[ticks[0]] = sum(message.topic == "/layout" for message in alone)
+    assert (ADDED_AT, REMOVED_AT) == (25, 45) and begun == {0: 1, 25: 2, 50: 1}, "a layout begins where a file does"
 
 
 def test_a_cut_is_one_file(parts: Path, path: Path, tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from foosim.client.errors import RunEnded
 from foosim.protocol.deployment_file import load_deployment
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor.control import Control
+from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import open_capture
 from tests.wire.conftest import LONG
 from tests.wire.test_run import last_json
@@ -86,7 +87,8 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
     written, again = house.folder / "written", house.folder / "again"
     written.mkdir()
     again.mkdir()
-    sets = [word for setting in (*SETS, *scribes(written), PATIENT) for word in ("--set", setting)]
+    split = "capture.split_time=200 ms"
+    sets = [word for setting in (*SETS, *scribes(written), PATIENT, split) for word in ("--set", setting)]
     up = house.up("--json", *sets, players=True)
     info = house.info()
     with Control(info.simulation) as control, connect(info.radio, "ear") as ear, connect(info.radio, "mouth") as mouth:
@@ -115,8 +117,10 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
     assert content["digest"] == same["digest"]
     for name in ("red.txt", "blue.txt"):
         assert (written / name).read_text() == (again / name).read_text(), "each player was told everything once"
-    capture = open_capture(house.folder / content["capture"])
+    path = house.folder / content["capture"]
+    capture = open_capture(path)
     assert capture.about.finished
+    assert len(files_from(path)) == content["ticks"] * content["tick_ns"] // 200_000_000 + 1, "each has its time"
     assert [tick.tick for tick in capture.captured_ticks()] == list(range(content["ticks"] + 1))
     packets = capture.packets
     keys = list(zip(packets.source, packets.sequence, packets.destination, packets.copy, strict=True))

@@ -14,6 +14,7 @@ from foosim.protocol import disk
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.verify import verify_capture
 from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import UNCLEAN
 from tests.wire.conftest import House
@@ -25,7 +26,8 @@ def last_json(out: str) -> dict[str, Any]:
 
 
 def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(house: House) -> None:
-    up = house.up("--pace", "fast", "--engine", "pure", "--capture", "run.mcap", players=True)
+    split = ("--set", "capture.split_time=40 ms")
+    up = house.up("--pace", "fast", "--engine", "pure", "--capture", "run.mcap", *split, players=True)
     run = house.info()
     house.ticking(50)
     up.kill()
@@ -50,7 +52,7 @@ def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(hou
     assert capture.ticks.tolist() == list(range(last + 1)) and last >= int(had.ticks[-1])
     same = rehearse(house.table.read_text(), "table.yaml", last, None, ["engine=pure"])
     assert capture_info(path).chain == same.json["digest"]["chain"]
-    assert verify_capture(path).equal
+    assert verify_capture(path).equal and len(files_from(path)) >= 3
     packets = capture.packets
     fates = {fate: int((packets.fate == fate).sum()) for fate in ("delivered", "dropped", "in_flight")}
     assert sum(fates.values()) == len(packets) and fates["in_flight"] > 0
