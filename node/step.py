@@ -14,7 +14,7 @@ import msgspec
 
 from foosim.node.edits import edit
 from foosim.node.engines.interface import Engine
-from foosim.node.sensors import Sensor, make_sensor
+from foosim.node.sensors import Sensor, make_sensor, sample_all
 from foosim.node.world import world_of
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment, period_ticks
@@ -68,14 +68,14 @@ class Stepper:
         packets: list[RobotPacket] = []
         counters: list[int] = []
         tick, outboxes = frame.tick, frame.outboxes
-        for robot in robots:
-            if frame.numbers[robot.offsets["down"]] != 0.0:
-                continue
+        awake = [robot for robot in robots if frame.numbers[robot.offsets["down"]] == 0.0]
+        due = {robot.name: [sensor for sensor in self._sensors[robot.name] if tick % sensor[1] == 0] for robot in awake}
+        payloads = iter(sample_all([sensor[3] for sensors in due.values() for sensor in sensors], frame.numbers, tick))
+        for robot in awake:
             sends: list[tuple[str, str, bytes]] = []
-            for channel, period, slot, sensor in self._sensors[robot.name]:
-                if tick % period == 0:
-                    sends.append((channel, "", sensor.sample(frame.numbers, tick)))
-                    counters.append(slot)
+            for channel, _, slot, _ in due[robot.name]:
+                sends.append((channel, "", next(payloads)))
+                counters.append(slot)
             waiting = outboxes.get(robot.index)
             if waiting:
                 sends += [

@@ -8,9 +8,11 @@ from math import inf, nan, pi, sqrt
 from typing import Final
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from foosim.node.actuators.drive import DriveActuator
-from foosim.node.sensors import make_sensor
+from foosim.node.sensors import make_sensor, sample_all
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import Layout, build_layout
@@ -105,6 +107,32 @@ def test_rays_end_at_other_rovers_and_stations(fleet_text: Callable[..., str]) -
     ways = fitted.sample("proximity")
     assert ways[0] == pytest.approx(2.0 - sqrt(0.3**2 - 0.18**2) - 0.3), "a chord off the middle"
     assert ways[1] == pytest.approx(3.0 - 0.2 - 0.3)
+
+
+def test_what_is_sampled_together_has_the_bits_of_each_alone(fleet_text: Callable[..., str]) -> None:
+    """Whoever computes which rovers: with other ranges and numbers of rays among them, near each other or far."""
+    other = ("robots.rover02.sensors.proximity.rays=5", "robots.rover03.sensors.proximity.range=30 m")
+    fitted = Fitted(fleet_text(5, *other))
+    sensors = [
+        make_sensor(sensor, fitted.deployment, fitted.layout, rover, channel)
+        for rover in fitted.layout.rovers
+        for channel, sensor in sorted(fitted.deployment.robots[rover.name].sensors.items())
+    ]
+    place = st.tuples(st.floats(-19.0, 19.0), st.floats(-12.0, 12.0), st.floats(-3.0, 3.0))
+
+    @settings(max_examples=30)
+    @given(places=st.lists(place, min_size=5, max_size=5), tick=st.integers(0, 100))
+    def hold(places: list[tuple[float, float, float]], tick: int) -> None:
+        for rover, (x, y, heading) in zip(fitted.layout.rovers, places, strict=True):
+            at = rover.offsets["position"]
+            fitted.numbers[at : at + 2] = x, y
+            fitted.numbers[rover.offsets["heading"]] = heading
+        alone = [sensor.sample(fitted.numbers, tick) for sensor in sensors]
+        assert sample_all(sensors, fitted.numbers, tick) == alone
+        assert sample_all(sensors[::-1][:7], fitted.numbers, tick) == alone[::-1][:7]
+
+    hold()
+    assert sample_all([], fitted.numbers, 0) == []
 
 
 def test_beyond_its_range_a_ray_sees_nothing_and_has_no_noise(fleet_text: Callable[..., str]) -> None:
