@@ -22,7 +22,7 @@ from foosim.protocol.errors import BadValue, show
 from foosim.protocol.names import nearest_name
 from foosim.vhub.capture_reader import DECODERS, About, Scan, deployment_of
 from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import ROW_TYPES, TICK, CaptureError, FrameRow
+from foosim.vhub.rows import ROW_TYPES, TICK, CaptureError, FrameRow, Row
 from foosim.vhub.transforms import read_poses
 from foosim.vhub.viewing import LOG, POSES, VIEW_TYPES
 
@@ -194,7 +194,7 @@ class _Comparison:
 
     def _compare(self, channel: Channel, one: Message, other: Message) -> None:
         found: tuple[str, Any, Any] | None = None
-        if one.data != other.data:
+        if one.data != other.data and not _differ_in_walls(one, other):
             found = first_difference(_content(one), _content(other), self._fields)
         for name, value_a, value_b in (
             (LOG_TIME, one.log_ns, other.log_ns),
@@ -212,6 +212,29 @@ class _Comparison:
         return Difference(at.topic, at.log_ns, at.log_ns // self._tick_ns, channel.equal, name, a, b)
 
 
+def _differ_in_walls(one: Message, other: Message) -> bool:
+    """Whether two rows are equal but for the fields that a clock of the real world told: most of those of two runs."""
+    unwalled = _UNWALLED.get(one.topic)
+    if not unwalled:
+        return False
+    return bool(msgspec.structs.replace(_row(one), **unwalled) == msgspec.structs.replace(_row(other), **unwalled))
+
+
+_UNWALLED: Final = {
+    topic: dict.fromkeys((name for name in kind.__struct_fields__ if name.startswith(WALL)), 0)
+    for topic, kind in ROW_TYPES.items()
+}
+"""What a topic's rows have in place of those fields."""
+
+
+def _row(message: Message) -> Row:
+    try:
+        row: Row = DECODERS[message.topic].decode(message.data)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise CaptureError(f"{message.topic} at {message.log_ns} ns: {error}") from None
+    return row
+
+
 def _content(message: Message) -> Any:
     """Return what a message holds, as plain values with names."""
     if message.topic == POSES:
@@ -219,12 +242,9 @@ def _content(message: Message) -> Any:
         return {pose.link: {"position": [*pose.position], "orientation": [*pose.orientation]} for pose in poses}
     if message.topic in VIEW_TYPES:
         return {"content": message.data.hex()}
-    try:
-        row = DECODERS[message.topic].decode(message.data)
-    except KeyError:
+    if message.topic not in DECODERS:
         return {"content": message.data.hex()}
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise CaptureError(f"{message.topic} at {message.log_ns} ns: {error}") from None
+    row = _row(message)
     content = _plain(row)
     if isinstance(row, FrameRow) and len(row.values) % 8 == 0:
         content["values"] = np.frombuffer(row.values, dtype="<f8").tolist()

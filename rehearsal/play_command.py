@@ -85,6 +85,11 @@ def play(  # noqa: PLR0913, PLR0917  # a command's options
         insecure,
         pki,
     )
+    raise typer.Exit(_play(capture, options, json))
+
+
+def _play(capture: Path, options: PlayOptions, json: bool) -> int:
+    """Play until the end, or until it is told to stop; return the exit code."""
     stopper = Stopper()
     Stop().then(stopper.stop)
     lines = Lines(sys.stderr if json else sys.stdout)
@@ -94,7 +99,7 @@ def play(  # noqa: PLR0913, PLR0917  # a command's options
         typer.echo(encode_json(asdict(result)).decode())
     else:
         lines.say(_played_text(result))
-    raise typer.Exit(FAILED if result.failed else DONE)
+    return FAILED if result.failed else DONE
 
 
 def _period_ns(text: str) -> int:

@@ -70,29 +70,31 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     if free:
         raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))
 
-    def show(process: str, level: str, text: str) -> None:
-        if level != "info":
-            typer.echo(f"{process}: {level}: {text}", err=True)
-
-    settled = Settings(on_say=show)
-    if plan.branch is not None and not json:
-        typer.echo(plan.branch.text)
     if not json:
-        for line in start_lines(meanings(plan.deployment), str(file)):
+        for line in (*([plan.branch.text] if plan.branch else []), *start_lines(meanings(plan.deployment), str(file))):
             typer.echo(line)
     inputs: dict[str, Any] = {"capture": capture, "start": plan.start, "folder": file.parent}
-    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settled, **inputs).json
-    if json:
-        typer.echo(encode_json(result).decode())
-    else:
-        seconds = (result["ticks"] - result["first_tick"]) * result["tick_ns"] / 1e9
-        score = f", {score_text(result)}" if result["score"] else ""
-        typer.echo(f"{seconds:.2f} s simulated at {result['rtf']}x{score}")
-        packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
-        handovers = f"{result['handovers']} hand-overs of the ball, " if result["score"] else ""
-        typer.echo(f"{handovers}packets {packets}")
-        typer.echo(f"digest of all ticks {result['digest']['chain']}")
+    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=Settings(on_say=_show), **inputs).json
+    typer.echo(encode_json(result).decode() if json else _told(result))
     raise typer.Exit(FAILED if result["failed"] else DONE)
+
+
+def _show(process: str, level: str, text: str) -> None:
+    if level != "info":
+        typer.echo(f"{process}: {level}: {text}", err=True)
+
+
+def _told(result: dict[str, Any]) -> str:
+    """Return a result for people."""
+    seconds = (result["ticks"] - result["first_tick"]) * result["tick_ns"] / 1e9
+    score = f", {score_text(result)}" if result["score"] else ""
+    packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
+    handovers = f"{result['handovers']} hand-overs of the ball, " if result["score"] else ""
+    return (
+        f"{seconds:.2f} s simulated at {result['rtf']}x{score}\n"
+        f"{handovers}packets {packets}\n"
+        f"digest of all ticks {result['digest']['chain']}"
+    )
 
 
 def _swarm(file: Path, duration: str | None, first: int, count: int, json: bool) -> int:

@@ -15,7 +15,6 @@ from typing import Final
 from pydantic import ValidationError
 
 from foosim.protocol.frame import Frame, chain_next
-from foosim.protocol.layout import Layout
 from foosim.protocol.network import event_of
 from foosim.protocol.radios import Radio
 from foosim.protocol.units import format_ns
@@ -23,18 +22,24 @@ from foosim.rehearsal.report_map import Map, MapMaker
 from foosim.rehearsal.report_settings import (
     event_text,
     impairments_text,
-    mean_loss,
-    mean_own_delay_ns,
     radio_text,
     rule_ends,
     sends_once,
 )
 from foosim.rehearsal.report_tallies import BinTally, LinkTally, RuleTally, SenderTally
-from foosim.vhub.capture_columns import frames_of
-from foosim.vhub.capture_reader import CaptureData, Scan, chain_at_start, layout_of
+from foosim.vhub.capture_reader import (
+    DECODERS,
+    TICK_MARKS,
+    CaptureData,
+    FrameReader,
+    Scan,
+    TickMark,
+    chain_at_start,
+)
 from foosim.vhub.events import Timeline
+from foosim.vhub.lint import delay_of, residual_of
 from foosim.vhub.profiles import Profiles
-from foosim.vhub.rows import FRAME, LAYOUT, PACKETS, TICK, CaptureError, FrameRow, LayoutRow, PacketRow, TickRow
+from foosim.vhub.rows import PACKETS, TICK, CaptureError, PacketRow
 
 BINS: Final = 60
 """At most so many spans of time."""
@@ -205,17 +210,17 @@ class Report:
 def gather(capture: CaptureData, name: str) -> Report:
     """Return the report of an opened capture; `name` is what it is called. Raises CaptureError for a damaged one."""
     gathered = _Gathered(capture)
-    layout: Layout | None = None
-    for _, row in Scan(capture.path).rows(frozenset({PACKETS, TICK, LAYOUT, FRAME})):
-        if isinstance(row, PacketRow):
-            gathered.take_packet(row)
-        elif isinstance(row, TickRow):
-            gathered.take_tick(row)
-        elif isinstance(row, LayoutRow):
-            layout = layout_of(capture.path, capture.deployment, row)
-        elif isinstance(row, FrameRow):
-            assert layout is not None, "checked when the capture was opened"
-            gathered.take_frame(frames_of(layout, [row]).frame(0))
+    scan = Scan(capture.path)
+    frames = FrameReader(scan, capture.deployment)
+    for message in scan.messages(FrameReader.TOPICS | {PACKETS, TICK}):
+        if message.topic == PACKETS:
+            gathered.take_packet(scan.decode(DECODERS[PACKETS], message))
+        elif message.topic == TICK:
+            gathered.take_tick(scan.decode(TICK_MARKS, message))
+        else:
+            frame = frames.frame(message)
+            if frame is not None:
+                gathered.take_frame(frame)
     return gathered.result(name)
 
 
@@ -290,7 +295,7 @@ class _Gathered:
             Profiles(self._deployment, self._deployment.network).find(row.source, row.destination, row.channel).settings
         )
 
-    def take_tick(self, row: TickRow) -> None:
+    def take_tick(self, row: TickMark) -> None:
         for edit in row.edits:
             if edit.kind == "network":
                 at_ns = row.tick * self._tick_ns
@@ -410,9 +415,9 @@ class _Gathered:
             radio,
             len(tally.links),
             tally.offered,
-            round(mean_loss(settings), 9),
+            round(residual_of(settings)[0], 9),
             round(tally.residual / (tally.passed + tally.residual), 9) if tally.passed + tally.residual else 0.0,
-            _ms(mean_own_delay_ns(settings, self._deployment.asset_files)),
+            _ms(delay_of(settings, self._deployment.asset_files)[0]),
             _ms(tally.own.mean),
             round(tally.dropped / judged, 9) if judged else 0.0,
             _ms(tally.delay.mean),

@@ -1,6 +1,6 @@
-"""A network's settings as people read them, and what they amount to on average.
+"""A network's settings as people read them.
 
-Neighbours: `report` compares this with what was measured; the vHub's stages decide fates.
+Neighbours: `report` shows them; `vhub.lint` says what they amount to.
 """
 
 from __future__ import annotations
@@ -9,13 +9,11 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from foosim.protocol.codec import encode_json
-from foosim.protocol.impairments import Burst, Impairments, LinkSettings, Markov4, TableJitter
+from foosim.protocol.impairments import Impairments, LinkSettings
 from foosim.protocol.network import Event, LinkRule
 from foosim.protocol.radios import Radio
 from foosim.protocol.table import Part
-from foosim.protocol.traces import read_table
 from foosim.protocol.units import format_ns
-from foosim.vhub.jitter import moments_ns, quantiles_ns
 
 _UNITS: Final = (
     ("_bps", "bit/s"),
@@ -126,58 +124,6 @@ def rule_ends(rule: LinkRule) -> str:
     if rule.channels is not None:
         ends += f" on {', '.join(rule.channels)}"
     return ends if rule.via is None else f"{ends} via {rule.via}"
-
-
-def mean_loss(settings: Impairments) -> float:
-    """Return the share that is lost on average for reasons that geometry does not explain."""
-    kept = 1.0 - settings.loss
-    if settings.outages is not None:
-        on, off = settings.outages.mean_on_ns, settings.outages.mean_off_ns
-        kept *= on / (on + off)
-    if settings.burst is not None:
-        kept *= 1.0 - settings.burst.loss
-    chain = settings.gilbert_elliott
-    if chain is not None:
-        kept *= (chain.r * chain.k + chain.p * chain.h) / (chain.p + chain.r)
-    if settings.markov4 is not None:
-        kept *= 1.0 - _mean_of_four(settings.markov4)
-    return 1.0 - kept
-
-
-def _mean_of_four(chain: Markov4) -> float:
-    """Return the mean loss of four states, by the balance of flows between each two of them.
-
-    Source: Salsano, Ludovici and Ordine (2009), as `stages.residual` names it.
-    """
-    if not chain.p13:
-        return chain.p14 / (1.0 + chain.p14)
-    if chain.p32 and not chain.p23:
-        return 0.0  # whoever comes to state 2 stays
-    within = chain.p32 / chain.p23 if chain.p23 else 0.0
-    if not chain.p31:
-        return 1.0 / (1.0 + within)
-    lost = chain.p13 / chain.p31
-    return (lost + chain.p14) / (1.0 + chain.p14 + lost + lost * within)
-
-
-def mean_own_delay_ns(settings: Impairments, files: Mapping[str, bytes]) -> float:
-    """Return the mean of what a link adds by itself: constant delay, jitter, bad times, what is reordered."""
-    mean = float(settings.delay_ns)
-    if settings.burst is not None:
-        mean += _bad_share(settings.burst) * settings.burst.bad_extra_delay_ns
-    if settings.reorder is not None:
-        mean += settings.reorder.probability * settings.reorder.extra_ns
-    jitter = settings.jitter
-    if jitter is None:
-        return mean
-    table = read_table(files[jitter.file].decode("ascii", "replace")) if isinstance(jitter, TableJitter) else ()
-    return mean + moments_ns(quantiles_ns(jitter, table))[0]
-
-
-def _bad_share(burst: Burst) -> float:
-    """Return the share of what passes that passes in a bad time."""
-    share = burst.loss / burst.bad_loss if burst.bad_loss else 0.0
-    return share * (1.0 - burst.bad_loss) / (1.0 - burst.loss)
 
 
 def sends_once(settings: Radio) -> bool:

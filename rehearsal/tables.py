@@ -8,8 +8,9 @@ Neighbours: `export` writes the tables, `vhub.rows` has the types, `client.paylo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, Final, Literal
 
 import msgspec
@@ -130,18 +131,24 @@ def _plain(kind: inspect.Type) -> inspect.Type:
     return kind
 
 
-def _values(row: Row, columns: Iterable[Column]) -> Iterator[Any]:
-    for column in columns:
-        value = getattr(row, column.name)
-        yield encode_json(value).decode() if column.kind == "json" else value
+def _values(row: Row, json: Iterable[int]) -> list[Any]:
+    """Return the values of a row in the order of its columns; `json` are the places of those that are JSON."""
+    values = list(msgspec.structs.astuple(row))
+    for place in json:
+        values[place] = encode_json(values[place]).decode()
+    return values
+
+
+def _json_places(columns: Sequence[Column]) -> list[int]:
+    return [place for place, column in enumerate(columns) if column.kind == "json"]
 
 
 def _rows_table(name: str, topic: str, kind: type[Row]) -> Table:
     columns = _columns(kind)
-    decoder = msgspec.json.Decoder(kind)
+    decoder, json = msgspec.json.Decoder(kind), _json_places(columns)
 
     def rows(decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
-        yield tuple(_values(decode(decoder, message), columns))
+        yield tuple(_values(decode(decoder, message), json))
 
     return Table(name, topic, columns, rows)
 
@@ -182,13 +189,13 @@ class _PacketRows(_Decoded):
     """All packets. `value` has the numbers of a payload where its channel is a robot's sensor or actuator."""
 
     _decoder = msgspec.json.Decoder(PacketRow)
-    _columns = _columns(PacketRow)
+    _json = _json_places(_columns(PacketRow))
 
     def rows(self, decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
         row = decode(self._decoder, message)
         kind = self.kind(row.source, row.channel) or self.kind(row.destination, row.channel)
         numbers = self.numbers(kind, row.payload)
-        yield (*_values(row, self._columns), encode_json(numbers).decode() if numbers else None)
+        yield (*_values(row, self._json), encode_json(numbers).decode() if numbers else None)
 
 
 _COMMAND_FIELDS: Final = (
@@ -211,14 +218,15 @@ class _Commands(_Decoded):
     """Packets to robots on the channels that move them, with their numbers; a number that a robot has not is empty."""
 
     _decoder = msgspec.json.Decoder(PacketRow)
+    _fields = attrgetter(*_COMMAND_FIELDS)
+    _numbers = tuple(_command_numbers())
 
     def rows(self, decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
         row = decode(self._decoder, message)
         kind = self.kind(row.destination, row.channel)
         if kind in COMMAND_KINDS:
             numbers = self.numbers(kind, row.payload)
-            fields = (getattr(row, name) for name in _COMMAND_FIELDS)
-            yield (*fields, *(numbers.get(name) for name in _command_numbers()))
+            yield (*self._fields(row), *(numbers.get(name) for name in self._numbers))
 
 
 # --- poses -----------------------------------------------------------------------------------------------------------

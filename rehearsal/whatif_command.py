@@ -19,7 +19,7 @@ from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.whatif import CHANGED_KEPT, LinkChange, PacketChange, WhatIf, what_if
 from foosim.rehearsal.whatif_picture import picture
 from foosim.vhub.capture_reader import CaptureData, open_capture
-from foosim.vhub.link_models import differing_models
+from foosim.vhub.link_models import check_link_models, differing_models
 
 LINKS_SHOWN = 40
 
@@ -78,6 +78,7 @@ def _deployment(capture: CaptureData, network: Path | None, settings: list[str])
     other = None if network is None else (read_deployment_text(network), str(network))
     text = with_network(about.deployment_text, about.deployment_name, other, settings)
     deployment = load_deployment(text, about.deployment_name)
+    check_link_models(deployment.network, *(other or (about.deployment_text, about.deployment_name)), settings)
     lacking = {path: digest for path, digest in deployment.files().items() if path not in about.files}
     folder = Path() if network is None else network.parent
     return deployment.with_assets({**about.files, **(read_files(folder, ".", lacking) if lacking else {})})

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tomllib
 import venv
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -249,6 +250,31 @@ def test_the_neighbours_that_a_module_names_exist() -> None:
             if module not in known and not re.search(rf"\b{module}\b", path.read_text().split('"""', 2)[2]):
                 strangers.append(f"{name_of(path)}: {name}")
     assert not strangers, "\n".join(strangers)
+
+
+def test_nothing_is_there_for_tests_alone() -> None:
+    """What protocol, node and vHub define is used, by another line than its own, outside of `tests/`."""
+    used = Counter(
+        word
+        for path in (*SOURCES, *python_files("bench", "docs"))
+        for word in re.findall(r"\w+", re.sub(r'"""[\s\S]*?"""', "", path.read_text()))
+    )
+    idle = [
+        f"{name_of(path)}: {name}"
+        for path in python_files("protocol", "node", "vhub")
+        for node in tree_of(path).body
+        for name in _defined(node)
+        if not name.startswith("_") and used[name] < 2
+    ]
+    assert not idle, "\n".join(idle)
+
+
+def _defined(node: ast.stmt) -> list[str]:
+    """The names that a statement of a module defines."""
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return [node.name]
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    return [target.id for target in targets if isinstance(target, ast.Name)]
 
 
 def test_nothing_is_left_for_later() -> None:

@@ -13,7 +13,7 @@ from math import exp, inf
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.impairments import GilbertElliott, Impairments, Markov4, TableJitter
+from foosim.protocol.impairments import Burst, GilbertElliott, Impairments, Markov4, TableJitter
 from foosim.protocol.network import LinkRule, Network
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
@@ -86,7 +86,7 @@ class Meaning:
     burst_ns: int | None
     """Mean length of a bad time."""
     delay_mean_ns: int
-    """Beside queue, medium and way: the constant delay, jitter, what bad times add."""
+    """Beside queue, medium and way: the constant delay, jitter, what bad times and reordering add."""
     delay_sd_ns: int
     delay_p99_ns: int
     rate_bps: int | None
@@ -217,27 +217,21 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
 
 
 def residual_of(settings: Impairments) -> tuple[float, float | None, int | None]:
-    """Return the mean loss of a link's residual stage; of bursts the mean number of losses in a row, or the mean length
-    of a bad time in ns."""
-    loss, burst = settings.loss, settings.burst
-    chain = settings.gilbert_elliott
+    """Return the mean loss of a link's residual stage; of bursts the mean number of losses in a row, and the mean
+    length of a bad time in ns; None where there is no such thing."""
+    burst, outages, chain = settings.burst, settings.outages, settings.gilbert_elliott
     if burst is not None and burst.mean_burst is not None:
         chain = chain_of_burst(burst)
+    lost, run, bad_ns = settings.loss, None, None
     if chain is not None or settings.markov4 is not None:
-        steps, lost = _chain(chain) if chain is not None else _four_states(settings.markov4)
-        return *_runs(steps, [state + (1.0 - state) * loss for state in lost]), None
-    bad_ns, good, bad_loss = None, 1.0, 1.0
-    if burst is not None:
-        assert burst.mean_bad_ns is not None
-        bad_ns, bad_loss = burst.mean_bad_ns, burst.bad_loss
-        good *= 1.0 - burst.loss / burst.bad_loss
-    if settings.outages is not None:
-        on_ns, off_ns = settings.outages.mean_on_ns, settings.outages.mean_off_ns
-        good *= on_ns / (on_ns + off_ns)
-        bad_ns = off_ns if bad_ns is None else max(bad_ns, off_ns)
-    share = (1.0 - good) * bad_loss
-    mean = share + (1.0 - share) * loss
-    return mean, None, bad_ns
+        steps, losses = _chain(chain) if chain is not None else _four_states(settings.markov4)
+        lost, run = _runs(steps, [state + (1.0 - state) * lost for state in losses])
+    elif burst is not None:
+        lost, bad_ns = lost + (1.0 - lost) * burst.loss, burst.mean_bad_ns
+    if outages is not None:
+        on_ns, off_ns = outages.mean_on_ns, outages.mean_off_ns
+        lost, bad_ns = lost + (1.0 - lost) * off_ns / (on_ns + off_ns), max(bad_ns or 0, off_ns)
+    return lost, run, bad_ns
 
 
 Matrix = list[list[float]]
@@ -276,10 +270,15 @@ def _runs(steps: Matrix, lost: Sequence[float]) -> tuple[float, float | None]:
 
 
 def delay_of(settings: Impairments, files: Mapping[str, bytes]) -> tuple[int, int, int]:
-    """Return mean, standard deviation and 99th percentile of a link's own delay, in ns, by the table of its jitter."""
+    """Return mean, standard deviation and 99th percentile of a link's own delay, in ns, by the table of its jitter.
+
+    What bad times and reordering add to what passes is in the mean alone, and shifts the percentile by it.
+    """
     base_ns = settings.delay_ns
     if settings.burst is not None:
-        base_ns += round(settings.burst.bad_extra_delay_ns * settings.burst.loss / settings.burst.bad_loss)
+        base_ns += round(settings.burst.bad_extra_delay_ns * _bad_share(settings.burst))
+    if settings.reorder is not None:
+        base_ns += round(settings.reorder.extra_ns * settings.reorder.probability)
     jitter = settings.jitter
     if jitter is None:
         return base_ns, 0, base_ns
@@ -288,6 +287,12 @@ def delay_of(settings: Impairments, files: Mapping[str, bytes]) -> tuple[int, in
     mean_ns, sd_ns = moments_ns(quantiles)
     p99_ns = interpolate_ns(quantiles, int(0.99 * 2**64))
     return base_ns + round(mean_ns), round(sd_ns), base_ns + p99_ns
+
+
+def _bad_share(burst: Burst) -> float:
+    """Return the share of what passes that passes in a bad time."""
+    passing = 1.0 - burst.loss
+    return burst.loss / burst.bad_loss * (1.0 - burst.bad_loss) / passing if passing else 0.0
 
 
 def _is_air(settings: Radio) -> bool:

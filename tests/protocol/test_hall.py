@@ -73,7 +73,7 @@ def test_what_does_not_fit_is_refused_with_its_place(
 def test_a_process_has_its_players_on_one_host() -> None:
     hosts = "hosts={a: {address: 10.0.0.1}, b: {address: 10.0.0.2}}"
     found = problems(WAREHOUSE, hosts, "players.pilot01.host=a")
-    assert found[0] == "players.pilot01.process: a process whose players are not all on the same host, 'fleet'"
+    assert found[0] == "players.pilot01.process: a process whose players are not all on the same host, 'fleet-west'"
 
 
 def test_a_world_is_a_table_or_a_hall() -> None:
@@ -159,6 +159,6 @@ def test_a_circle_is_clear_of_a_rectangle_from_where_it_touches(x: float, y: flo
 
 def test_players_that_name_a_process_share_it(fleet_text: Callable[..., str]) -> None:
     deployment = load_deployment(fleet_text(2, "players.pilot02.process=own"), "hall.yaml")
-    assert deployment.player_processes() == {"fleet": ["dispatch", "pilot01"], "own": ["pilot02"]}
+    assert deployment.player_processes() == {"fleet-west": ["dispatch", "pilot01"], "own": ["pilot02"]}
     table = load_deployment(TABLE, "table.yaml")
     assert table.player_processes() == {"player-blue": ["player-blue"], "player-red": ["player-red"]}

@@ -7,19 +7,17 @@ from dataclasses import replace
 from html import escape
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pytest
 from msgspec.structs import replace as replace_row
 
-from foosim.protocol.impairments import Impairments
 from foosim.protocol.scene import Box, Cylinder, Shape, turn
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
 from foosim.rehearsal.report_map import MapMaker, outline
 from foosim.rehearsal.report_page import _runs, page
-from foosim.rehearsal.report_settings import mean_loss, mean_own_delay_ns
 from foosim.rehearsal.report_svg import WHOLE, round_up
 from foosim.rehearsal.report_tallies import SAMPLES, LinkTally, Sample
 from foosim.rehearsal.system import System
@@ -159,30 +157,6 @@ def test_configured_stands_beside_measured(run: Path) -> None:
     assert rule.own_loss_configured == 0.005 and rule.own_delay_configured_ms == pytest.approx(1.3, abs=1e-3)
     assert rule.own_delay_ms == pytest.approx(1.3, abs=0.05) and 0.0 < rule.own_loss < 0.015
     assert not rule.is_changed and rule.own_loss == pytest.approx(report.causes["random_loss"] / rule.packets)
-
-
-def test_means_of_models_of_loss_and_delay() -> None:
-    def settings(**keys: Any) -> Impairments:
-        return Impairments.model_validate(keys)
-
-    burst = {"loss": "5 %", "mean_bad": "20 ms", "bad_loss": "50 %", "bad_extra_delay": "9 ms"}
-    assert mean_loss(settings(loss="10 %", burst=burst)) == pytest.approx(1 - 0.9 * 0.95)
-    assert mean_own_delay_ns(settings(burst=burst), {}) == pytest.approx(9e6 * 0.1 * 0.5 / 0.95)
-    assert mean_loss(settings(gilbert_elliott={"p": "10 %", "r": "30 %", "h": "20 %"})) == pytest.approx(0.25 * 0.8)
-    assert mean_loss(settings(outages={"mean_on": "3 s", "mean_off": "1 s"})) == pytest.approx(0.25)
-    four = {"p13": "5 %", "p31": "30 %", "p32": "20 %", "p23": "40 %", "p14": "2 %"}
-    steps = np.array([[0.93, 0, 0.05, 0.02], [0, 0.6, 0.4, 0], [0.3, 0.2, 0.5, 0], [1.0, 0, 0, 0]])
-    shares = np.full(4, 0.25)
-    for _ in range(2000):
-        shares = (shares[:, None] * steps).sum(axis=0)
-    assert mean_loss(settings(markov4=four)) == pytest.approx(shares[2] + shares[3])
-    for stuck, loss in (({"p13": "0 %", "p31": "30 %", "p14": "25 %"}, 0.2), ({"p13": "5 %", "p31": "0 %"}, 1.0)):
-        assert mean_loss(settings(markov4=stuck)) == pytest.approx(loss)
-    assert mean_loss(settings(markov4={"p13": "5 %", "p31": "30 %", "p32": "10 %"})) == 0.0
-    heavy = {"shape": "gamma", "mean": "1 ms", "sd": "4 ms"}
-    assert mean_own_delay_ns(settings(jitter=heavy, delay="1 ms"), {}) == pytest.approx(2e6, rel=0.01)
-    reorder = {"probability": "10 %", "extra": "5 ms"}
-    assert mean_own_delay_ns(settings(reorder=reorder), {}) == pytest.approx(0.5e6)
 
 
 def test_events_are_bands_and_are_told(found: Report) -> None:

@@ -1,11 +1,8 @@
 """The command `foosim-supervisor` without a run: help, what it refuses before anything starts, exit codes."""
 
 import json
-import sys
-from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
@@ -14,6 +11,7 @@ from foosim.protocol.identity import identities_of
 from foosim.supervisor import cli, pki
 from foosim.supervisor.run_folder import runs_folder
 from foosim.supervisor.up import check_capture
+from tests.supervisor.conftest import Command, Typed
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 COMMANDS = (
@@ -21,32 +19,10 @@ COMMANDS = (
 )
 
 
-class Done(NamedTuple):
-    """What a command left."""
-
-    code: object
-    out: str
-    err: str
-
-
-Command = Callable[..., Done]
-
-
 @pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Command:
-    """Runs `foosim-supervisor` with arguments, in an empty folder."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("COLUMNS", "120")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str | Path) -> Done:
-        monkeypatch.setattr(sys, "argv", ["foosim-supervisor", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        printed = capsys.readouterr()
-        return Done(ended.value.code, printed.out, printed.err)
-
-    return run
+def command(typed: Typed) -> Command:
+    """Runs `foosim-supervisor`."""
+    return typed("foosim-supervisor", cli.main)
 
 
 def test_help_names_every_command_and_the_exit_codes(command: Command) -> None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import pytest
 import yaml
@@ -24,6 +23,7 @@ from foosim.supervisor.net_text import link_line
 from foosim.vhub.capture_reader import CaptureData, open_capture
 from foosim.vhub.explain import STAGE_NAMES, PacketName, explain_packet, parse_packet
 from foosim.vhub.rows import PACKETS, PacketRow
+from tests.supervisor.conftest import Command, Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NETWORK: Final[Mapping[str, Any]] = {
@@ -41,32 +41,10 @@ WALL: Final = {
 TICKS: Final = 320
 
 
-class Done(NamedTuple):
-    """What a command left."""
-
-    code: object
-    out: str
-    err: str
-
-
-Command = Callable[..., Done]
-
-
 @pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Command:
-    """Runs `foosim-net` with arguments, in an empty folder."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("COLUMNS", "120")
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str | Path) -> Done:
-        monkeypatch.setattr(sys, "argv", ["foosim-net", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            net_command.main()
-        printed = capsys.readouterr()
-        return Done(ended.value.code, printed.out, printed.err)
-
-    return run
+def command(typed: Typed) -> Command:
+    """Runs `foosim-net`."""
+    return typed("foosim-net", net_command.main)
 
 
 def text_of(**network: Any) -> str:

@@ -8,6 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import pytest
 
 from foosim.protocol.deployment import Deployment
@@ -166,3 +167,35 @@ def test_lines_are_for_people() -> None:
     lines = start_lines([wifi] * 40, "some.yaml")
     assert len(lines) == LINES_MAX and lines[-1] == "and 29 more: foosim-net lint some.yaml"
     assert start_lines([wifi], "some.yaml") == [f"network {meaning_line(wifi)}"]
+
+
+def test_means_of_models_of_loss_and_delay() -> None:
+    def settings(**keys: Any) -> Impairments:
+        return Impairments.model_validate(keys)
+
+    def mean_loss(**keys: Any) -> float:
+        return residual_of(settings(**keys))[0]
+
+    def mean_delay_ns(**keys: Any) -> int:
+        return delay_of(settings(**keys), {})[0]
+
+    burst = {"loss": "5 %", "mean_bad": "20 ms", "bad_loss": "50 %", "bad_extra_delay": "9 ms"}
+    assert mean_loss(loss="10 %", burst=burst) == pytest.approx(1 - 0.9 * 0.95)
+    assert mean_delay_ns(burst=burst) == pytest.approx(9e6 * 0.1 * 0.5 / 0.95)
+    assert mean_delay_ns(burst={**burst, "loss": "50 %"}) == pytest.approx(9e6)
+    outages = {"mean_on": "3 s", "mean_off": "1 s"}
+    assert mean_loss(outages=outages, loss="10 %", burst=burst) == pytest.approx(1 - 0.75 * 0.9 * 0.95)
+    assert mean_loss(outages=outages, gilbert_elliott={"p": "1 %", "r": "19 %"}) == pytest.approx(1 - 0.75 * 0.95)
+    four = {"p13": "5 %", "p31": "30 %", "p32": "20 %", "p23": "40 %", "p14": "2 %"}
+    steps = np.array([[0.93, 0, 0.05, 0.02], [0, 0.6, 0.4, 0], [0.3, 0.2, 0.5, 0], [1.0, 0, 0, 0]])
+    shares = np.full(4, 0.25)
+    for _ in range(2000):
+        shares = (shares[:, None] * steps).sum(axis=0)
+    assert mean_loss(markov4=four) == pytest.approx(shares[2] + shares[3])
+    for stuck, loss in (({"p13": "0 %", "p31": "30 %", "p14": "25 %"}, 0.2), ({"p13": "5 %", "p31": "0 %"}, 1.0)):
+        assert mean_loss(markov4=stuck) == pytest.approx(loss)
+    assert mean_loss(markov4={"p13": "5 %", "p31": "30 %", "p32": "10 %"}) == 0.0
+    heavy = {"shape": "gamma", "mean": "1 ms", "sd": "4 ms"}
+    assert mean_delay_ns(jitter=heavy, delay="1 ms") == pytest.approx(2e6, rel=0.01)
+    reorder = {"probability": "10 %", "extra": "5 ms"}
+    assert mean_delay_ns(reorder=reorder) == pytest.approx(0.5e6)

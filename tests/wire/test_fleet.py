@@ -31,7 +31,7 @@ def test_players_that_share_a_process_are_what_they_would_be_alone(
     assert content["reason"] == "done" and content["ticks"] == 100 and content["score"] is None
     (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
     logs = {log.stem for log in (run / "logs").iterdir()}
-    assert logs == {"supervisor", "vhub", "west", "east", "fleet", "other"}
+    assert logs == {"supervisor", "vhub", "west", "east", "fleet-west", "other"}
     rehearsed = rehearse(text, "hall.yaml", 100, nodes=None).json
     for same in ("digest", "packets", "nodes"):
         assert content[same] == rehearsed[same], same

@@ -142,7 +142,7 @@ def wifi_access(
         if attempt & 1 == 0:
             block = words(attempt >> 1)
         at = (attempt & 1) << 2
-        slots = block[at] * (window << min(attempt, doublings)) >> 64
+        slots = block[at] * (window << (attempt if attempt < doublings else doublings)) >> 64
         spent_ns += round(slots * slot_share_ns)
         if block[at + 1] < point.threshold:
             outcome = "collision"

@@ -149,12 +149,13 @@ class OnAir(Stage):
     def _transmit(self, flight: Flight, broadcast: bool, cause: str) -> None:
         sender, air, source = self._sender, self._air, flight.source
         air.advance(flight.sent_ns)
-        ready_ns = max(flight.sent_ns + flight.phase_ns, sender.free_ns)
+        ready_ns = flight.sent_ns + flight.phase_ns
+        ready_ns = max(ready_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
         (delay_ns, occupancy_ns, retries, _, outcome), air_ns = self.access(flight, broadcast, UNIT if cause else None)
         end_ns, until_ns = start_ns + delay_ns, start_ns + occupancy_ns
         flight.air_start_ns, flight.air_end_ns = end_ns - air_ns, end_ns
-        flight.airtime_ns = airtime_ns = min(air_ns, delay_ns)
+        flight.airtime_ns = airtime_ns = air_ns if air_ns < delay_ns else delay_ns
         flight.access_ns = end_ns - ready_ns - airtime_ns
         flight.retries = retries
         if outcome == "ok":
