@@ -339,11 +339,11 @@ class _Story:
 
     def _frame(self) -> Frame | None:
         found = None
-        for block in self.capture.frame_blocks:
-            for index, tick in enumerate(block.ticks):
-                if tick <= self.tick:
-                    found = block, index
-        return None if found is None else found[0].frame(found[1])
+        for frame in self.capture.each_frame():
+            if frame.tick > self.tick:
+                break
+            found = frame
+        return found
 
     def _residual(self) -> tuple[str, dict[str, Any]]:
         row, stage = self.row, self.stages["residual"]
