@@ -91,7 +91,7 @@ def _stay(planting: Planting) -> None:
 
 @register("deliveries out of order", "deliveries are in (due, source, sequence, copy) order", 1)
 def _disorder(planting: Planting) -> None:
-    planting.swap(state, "_order", lambda flight: (flight.destination, -flight.due_ns, flight.sequence))
+    planting.swap(state, "order_of", lambda flight: (flight.destination, -flight.due_ns, flight.sequence))
 
 
 @register("deliveries come early", "what is sent at k arrives at ceil(due / T)", 1)
