@@ -31,10 +31,11 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 13,
-    "Still._newer": PAIRS_KEPT,
-    "Still._older": PAIRS_KEPT,
-    "Propagation._paths": limits.CLIENTS_MAX,  # of one frame
-    "Propagation._heard": 2 * PLACES_KEPT,
+    "_Memory._newer": PAIRS_KEPT,
+    "_Memory._older": PAIRS_KEPT,
+    "Propagation._ways": limits.CLIENTS_MAX,  # a pair that talks, or hears
+    "Propagation._bounds": 2 * PLACES_KEPT,
+    "Propagation._shares": 2 * PLACES_KEPT,
     "Fabric.states": limits.CLIENTS_MAX,
     "Fabric._links": limits.CLIENTS_MAX,
     "Fabric.radios": limits.CLIENTS_MAX,

@@ -13,6 +13,7 @@ import platform
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -95,15 +96,20 @@ def origin_metadata(origin: Origin | None) -> dict[str, str]:
 
 def declare_topics(mcap: McapWriter) -> dict[str, int]:
     """Declare all topics, also those that stay empty; return their channels."""
-    channels = {}
+    return {topic: mcap.add_channel(topic, encoding, schema) for topic, encoding, schema in _topics()}
+
+
+@cache
+def _topics() -> tuple[tuple[str, str, tuple[str, str, bytes]], ...]:
+    """Return each topic with its encoding and schema, made once: a run waits while another file is begun."""
+    topics = []
     for topic, kind in ROW_TYPES.items():
         schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(row_schema(kind)))
-        channels[topic] = mcap.add_channel(topic, "json", schema)
+        topics.append((topic, "json", schema))
     for topic, message in VIEW_TYPES.items():
-        view_schema = message.get_schema()
-        content = (view_schema.name, view_schema.encoding, view_schema.data)
-        channels[topic] = mcap.add_channel(topic, "protobuf", content)
-    return channels
+        view = message.get_schema()
+        topics.append((topic, "protobuf", (view.name, view.encoding, view.data)))
+    return tuple(topics)
 
 
 def library_versions() -> dict[str, str]:
@@ -252,7 +258,7 @@ class CaptureFile:
         on_disk = room_on_disk(self._file, self._reserve)
         rooms = [replace(on_disk, left=on_disk.left - last)]
         if self._bytes_max is not None:
-            left = self._bytes_max - self.bytes - last
+            left = self._bytes_max - self.total_bytes - last
             where = f"of the {megabytes(self._bytes_max)} that it may have"
             rooms.append(Room(left, min(self._reserve, self._bytes_max // 8), where))
         return min(rooms, key=lambda room: room.left / room.reserve)
@@ -297,7 +303,7 @@ class CaptureFile:
         os.close(self._file)
 
     @property
-    def bytes(self) -> int:
+    def total_bytes(self) -> int:
         """How many bytes the capture has, in all its files."""
         return self.mcap.offset + (0 if self._split is None else self._split.earlier_bytes)
 
@@ -339,9 +345,12 @@ class CaptureFile:
         mcap.add_attachment(DEPLOYMENT, "application/yaml", described.text.encode())
         for path, file in deployment.asset_files.items():
             mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
-        versions = library_versions() | model_versions(deployment.network)
-        mcap.add_attachment(VERSIONS, "application/json", encode_json(versions))
+        mcap.add_attachment(VERSIONS, "application/json", self._versions)
         return channels
+
+    @cached_property
+    def _versions(self) -> bytes:
+        return encode_json(library_versions() | model_versions(self._described.deployment.network))
 
     def _let_go(self) -> None:
         if self._file >= 0:

@@ -44,7 +44,6 @@ class CaptureStatistics:
     (`written`), or not (`refused`), or on its way.
     """
 
-    rows: int
     bytes: int
     offered: int
     written: int
@@ -134,9 +133,8 @@ class CaptureWriter:
         return self._syncer.tick
 
     def statistics(self) -> CaptureStatistics:
-        mcap = self._file.mcap
         counts = self._offered - self._passed, self._written, self._refused, self._queued_rows, self._waits
-        return CaptureStatistics(mcap.messages, self._file.bytes, *counts, self._file.done.tick, self.synced_tick)
+        return CaptureStatistics(self._file.total_bytes, *counts, self._file.done.tick, self.synced_tick)
 
     def _put(self, item: Item) -> None:
         rows = _rows_in(item)

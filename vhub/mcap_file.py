@@ -32,6 +32,7 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 MESSAGE: Final = int(Opcode.MESSAGE)
 CHUNK_BYTES_MAX: Final = 64 * 1024 * 1024
 """A reader refuses a larger chunk, or any larger record: its memory is bounded by one of them."""
+LIBRARY: Final = f"foosim {version('foosim')}, mcap {version('mcap')}"
 COMPRESSION: Final = "zstd"
 COMPRESSION_LEVEL: Final = 1
 _MESSAGE: Final = struct.Struct("<BQHIQQ")
@@ -41,8 +42,7 @@ _INDEX: Final = struct.Struct("<BQHI")
 INDEX_FIELDS: Final = struct.Struct("<HI")
 _CHUNK: Final = struct.Struct("<BQQQQII4sQ")
 CHUNK_FIELDS: Final = struct.Struct("<QQQII")
-CHUNK_HEAD_BYTES_MAX: Final = CHUNK_FIELDS.size + 64
-"""Its fields, and the name of a compression."""
+CHUNK_HEAD_BYTES_MAX: Final = CHUNK_FIELDS.size + 64  # its fields, and the name of a compression
 _FOOTER_START: Final = struct.Struct("<BQQQ")
 PLACE: Final = struct.Struct("<Q")
 
@@ -90,7 +90,7 @@ class McapWriter:
         self._index: dict[int, array[int]] = {channel.id: array("Q") for channel in self._book.channels}
         if book is None:
             self._put(MAGIC)
-            self._put_record(records.Header(profile, f"foosim {version('foosim')}, mcap {version('mcap')}"))
+            self._put_record(records.Header(profile, LIBRARY))
 
     @property
     def chunk_bytes(self) -> int:

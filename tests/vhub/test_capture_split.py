@@ -228,9 +228,9 @@ def left_behind(parts: Path, folder: Path, count: int, size: int) -> Path:
 
 
 def places(parts: Path) -> Iterator[tuple[int, int]]:
-    for count, file in list(enumerate(files_from(parts)))[1:7:2]:
+    for count, file in list(enumerate(files_from(parts)))[1:]:
         size = file.stat().st_size
-        for place in ((-1, size // 2), (3, size - 9_000), (9_000, size - 1))[count // 2]:
+        for place in ((-1, size // 2), (3, size - 9_000), (9_000, size - 1))[count % 3]:
             yield count, place
 
 
