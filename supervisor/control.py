@@ -48,8 +48,10 @@ class NoAnswer(Failed):
 class Control:
     """A connection to one running supervisor. Use it in `with`."""
 
-    def __init__(self, address: str, credentials: Credentials | None = None) -> None:
-        """Connect to the simulation plane's address; raises ConnectError when nobody is there.
+    def __init__(
+        self, address: str, credentials: Credentials | None = None, give_up: Callable[[], bool] = lambda: False
+    ) -> None:
+        """Connect to the simulation plane's address; raises ConnectError when nobody is there, or at `give_up`.
 
         `credentials` are an operator's, where the run has certificates.
         """
@@ -59,7 +61,7 @@ class Control:
         self._credentials = credentials
         self._inbox = Inbox(WAITING_MAX)
         security = None if credentials is None else Security(credentials)
-        self._session = Session.client(address, CONNECT_S, security=security)
+        self._session = Session.client(address, CONNECT_S, give_up=give_up, security=security)
         self._wire = Wire(self._session, Plane.SIMULATION, self._inbox, self._name)
         self._wire.read(channels.OPERATOR_READS)
         self._requests = 0

@@ -11,7 +11,7 @@ import signal
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -23,6 +23,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Failed, Refused
 from foosim.protocol.exposure import Exposure
+from foosim.protocol.session import ConnectError
 from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.display import Display, recording_text, recovery_text
 from foosim.supervisor.hosts import check_hosts, fetch_capture
@@ -241,19 +242,33 @@ class Up:
 
     def _watch(self) -> None:
         """Show the run until its supervisor has ended."""
-        info = self.folder.info()
-        assert info is not None
+        control: Control | None = None
         next_s = time.monotonic()
         exposure = Exposure(self.plan.address, time.monotonic_ns())
-        with Control(info.simulation, operator_credentials(self.plan.options.pki)) as control:
+        with ExitStack() as stack:
             while self._goes_on():
                 reminder = exposure.due(time.monotonic_ns())
                 if reminder:
                     self.display.say(reminder)
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self.display.every_s
-                    self._show(control)
+                    control = control or self._connect(stack)
+                    if control is not None:
+                        self._show(control)
                 time.sleep(WATCH_S)
+
+    def _connect(self, stack: ExitStack) -> Control | None:
+        """Connect to the supervisor; None when it has ended before: the run was short, or somebody killed it."""
+        info, supervisor = self.folder.info(), self._launcher.children[SUPERVISOR]
+        if info is None:
+            return None
+        try:
+            credentials = operator_credentials(self.plan.options.pki)
+            return stack.enter_context(Control(info.simulation, credentials, lambda: supervisor.exit_code is not None))
+        except ConnectError:
+            if supervisor.exit_code is None:
+                raise
+            return None
 
     def _show(self, control: Control) -> None:
         supervisor = self._launcher.children[SUPERVISOR]

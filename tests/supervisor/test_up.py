@@ -1,17 +1,22 @@
-"""What the launcher does with processes that end again and again, and with those that somebody asks for."""
+"""What the launcher does with processes that end early, again and again, and with those that somebody asks for."""
 
 from __future__ import annotations
 
 import io
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Final
 
 import pytest
 
+from foosim.protocol.channels import SUPERVISOR
+from foosim.protocol.session import ConnectError
+from foosim.supervisor import control
 from foosim.supervisor.display import Display
 from foosim.supervisor.launcher import Child
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.supervisor.restarts import WAITS_S
+from foosim.supervisor.run_folder import RunInfo
 from foosim.supervisor.up import Up
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -49,4 +54,31 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
     up._start_wanted({"red": 1, "blue": 1})
     assert ends() == 9, "a word is heard once"
     assert said.getvalue().count("starts again in 0.5 s") == 2
+    up._launcher.close()
+
+
+def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up._launch(SUPERVISOR, ["true"])
+    supervisor = up._launcher.children[SUPERVISOR]
+    up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
+    supervisor.process.wait()
+    with ExitStack() as stack:
+        assert up._connect(stack) is None
+    up._watch()
+    up._launcher.close()
+
+
+def test_a_supervisor_that_runs_and_lets_nobody_in_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(control, "CONNECT_S", 0.0)
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up._launch(SUPERVISOR, ["sleep", "100"])
+    up.folder.write_info(RunInfo("run", "table", str(TABLE), 0, "", "tcp/127.0.0.1:1"))
+    with ExitStack() as stack, pytest.raises(ConnectError, match="no router answers at"):
+        up._connect(stack)
+    up._launcher.kill()
     up._launcher.close()
