@@ -44,7 +44,7 @@ def _old_epochs(planting: Planting) -> None:
     planting.swap(SupervisorCore, "_on_part", on_part)
 
 
-@register("supervisor does not compare bases", "a part counts if its basis is the supervisor's", 17)
+@register("supervisor does not compare bases", "a part counts if its basis is the supervisor's", 4)
 def _any_basis(planting: Planting) -> None:
     before: Any = planting.swap(
         core, "basis_of", lambda digest, edits, delivered: _AnyBasis(before(digest, edits, delivered))
@@ -133,7 +133,7 @@ def _forgotten(planting: Planting) -> None:
     planting.swap(Requests, "resume", lambda self, edits, answers: None)
 
 
-@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 3)
+@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 12)
 def _other_orders(planting: Planting) -> None:
     def open_epoch(self: Any, *given: Any) -> None:
         for tick in range(self.frame.tick, self.released):

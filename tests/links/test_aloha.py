@@ -37,7 +37,7 @@ def packet(source: str, sequence: int, sent_ns: int) -> Flight:
 @pytest.mark.parametrize("load", [0.1, 0.5, 1.0])
 def test_throughput_without_capture(proof: Proof, load: float) -> None:
     """Of equal powers whoever overlaps is lost, both of them; each packet is of a station of its own."""
-    n = proof.size(20_000, 200_000)
+    n = proof.size(8_000, 200_000)
     airtime_ns = lora_airtime_ns(7, SIZE)
     times = poisson_ns(n, load / airtime_ns * 1e9, proof.seed)
     gaps = [later - earlier >= airtime_ns for earlier, later in pairwise(times)]
@@ -46,7 +46,7 @@ def test_throughput_without_capture(proof: Proof, load: float) -> None:
     through = [not flight.cause for flight in flights]
     proof.exact("T17", f"ALOHA at load {load:g}: who is alone gets through, nobody else", sum(through), sum(alone), n)
     assert through == alone
-    within = 0.02 if proof.is_full else 0.06
+    within = 0.02 if proof.is_full else 0.1
     proof.ratio("T17", f"ALOHA at load {load:g}: throughput", load * sum(through) / n, load * exp(-2 * load), within, n)
 
 
