@@ -30,7 +30,7 @@ def _keeps(planting: Planting) -> None:
     before: Any = planting.swap(Inputs, "begin", begin)
 
 
-@register("node takes deliveries of another branch", "deliveries count in their branch (node)", 54)
+@register("node takes deliveries of another branch", "deliveries count in their branch (node)", 61)
 def _takes(planting: Planting) -> None:
     def take(self: Any, deliveries: Any, payload: bytes, own_tick: int) -> bool:
         return bool(before(self, replace(deliveries, branch=self._branch), payload, own_tick))
