@@ -79,11 +79,11 @@ def head_of(path: Path) -> dict[str, str]:
     return {}
 
 
-def number_of(path: Path, head: dict[str, str]) -> int:
-    """Return the number of a file that has one. Raises CaptureError."""
-    text = head[PART]
-    if not (text.isascii() and text.isdigit() and len(text) < 10):
-        raise CaptureError(f"{path}: its number is {text!r}")
+def number_of(path: Path, head: dict[str, str], entry: str = PART) -> int:
+    """Return a whole number that a file says of itself. Raises CaptureError when it is none."""
+    text = head[entry]
+    if not (text.isascii() and text.isdigit() and len(text) < 19):
+        raise CaptureError(f"{path}: its {entry} is no number, {text!r}")
     return int(text)
 
 

@@ -65,7 +65,7 @@ class Split:
             head = head_of(path)
             if PART not in head or number_of(path, head) != known:
                 raise CaptureError(f"{path}: is not the file of number {known} of {self._path}")
-            first_tick = int(head.get(CUT_TICK, "0"))
+            first_tick = number_of(path, head, CUT_TICK) if CUT_TICK in head else 0
             if known < number:
                 self._earlier.append(_File(path, first_tick, path.stat().st_size))
             else:

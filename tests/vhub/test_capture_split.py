@@ -20,12 +20,13 @@ from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_parts import Joined, files_from
 from foosim.vhub.capture_reader import open_capture, read_about
 from foosim.vhub.capture_recovery import recover_capture
+from foosim.vhub.capture_split import Split
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.keeping import Keep
-from foosim.vhub.mcap_file import McapFile, Message
+from foosim.vhub.mcap_file import McapFile, McapWriter, Message
 from foosim.vhub.records import Closing
 from foosim.vhub.resume import end_of, first_tick_of, recall
-from foosim.vhub.rows import CaptureError
+from foosim.vhub.rows import PROFILE, CaptureError
 from tests.vhub.conftest import ADDED_AT, LOG_LINES, NAME, REMOVED_AT
 from tests.vhub.test_capture_branch import journal_until
 from tests.vhub.test_capture_recovery import LAST, read_by_others, rows
@@ -205,6 +206,19 @@ def test_a_file_of_another_run_or_without_its_end_is_refused(copied: Path, hub_r
     with pytest.raises(CaptureError, match=r"run_0001\.mcap: exists already"):
         copied.unlink()
         write(copied, hub_run, BY_TIME)
+
+
+@pytest.mark.parametrize("entries", [{"part": "none"}, {"part": "0", "cut_tick": "-1"}, {"part": "0", "cut_tick": ""}])
+def test_a_number_that_is_none_is_refused(tmp_path: Path, hub_run: HubRun, entries: dict[str, str]) -> None:
+    path = tmp_path / "run.mcap"
+    written: list[bytes] = []
+    mcap = McapWriter(written.append, PROFILE)
+    mcap.add_metadata("foosim", entries)
+    mcap.finish()
+    path.write_bytes(b"".join(written))
+    split = Split(path, split_by(hub_run, BY_TIME)[1].capture, 2_000_000)
+    with pytest.raises(CaptureError, match=r"run\.mcap: its (part|cut_tick) is no number, '"):
+        split.take_over(0, 0)
 
 
 def test_others_of_like_names_are_left_alone(path: Path, tmp_path: Path) -> None:
