@@ -69,12 +69,14 @@ def fetch_capture(remote: Remote, run: str, path: Path) -> None:
             problem = _receive(process.stdout, path, came)
         except OSError as error:
             problem = f"{path}: {error.strerror}"
+        # Who is not read to the end dies of the closed pipe: that ending is our doing and says nothing.
+        is_cut_here = bool(problem) and process.stdout.read(1) != b""
         process.stdout.close()
         lines = process.stderr.read().decode("utf-8", "replace").splitlines()
     if process.returncode or problem:
         for part in came:
             part.unlink(missing_ok=True)
-        code = process.returncode
+        code = 0 if is_cut_here else process.returncode
         why = "; ".join(lines[-1:]) if code == 1 else remote.why(code, lines) if code else problem
         where = f"host {remote.name}, in foosim's state folder as hosts/{run}/{CAPTURE}"
         raise Failed(f"the capture stays on {where}: {why or problem}")

@@ -185,7 +185,7 @@ def test_a_capture_comes_home_whole_or_stays(there: There, tmp_path: Path) -> No
     folder.mkdir(parents=True)
     content = os.urandom(3_000_001)
     (folder / CAPTURE).write_bytes(content)
-    (folder / "capture_0001.mcap").write_bytes(content[:70_000])
+    (folder / "capture_0001.mcap").write_bytes(content[:2_000_000])
     damaging = there.bin / "foosim-guard"
     for damage in ("head -c 2999999", "head -c 3050000", "tr a b", "grep -av end"):
         damaging.write_text(f'#!/bin/sh\n{command_path("foosim-guard")} "$@" | {damage}\n')
@@ -195,7 +195,7 @@ def test_a_capture_comes_home_whole_or_stays(there: There, tmp_path: Path) -> No
         assert not list(tmp_path.glob("home*")) and (folder / CAPTURE).exists()
     fetch_capture(there.remote(), RUN, home)
     assert home.read_bytes() == content and not folder.exists()
-    assert (tmp_path / "home_0001.mcap").read_bytes() == content[:70_000]
+    assert (tmp_path / "home_0001.mcap").read_bytes() == content[:2_000_000]
     assert sorted(file.name for file in tmp_path.glob("home*")) == ["home.mcap", "home_0001.mcap"]
 
 
