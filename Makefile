@@ -13,7 +13,7 @@ SEED ?= 17
 WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test play minutes swarm swarm-gate faults fuzz stats machines lint bench clean environment
+.PHONY: help up test play minutes swarm swarm-gate faults fuzz stats machines lint bench compiled clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
@@ -27,7 +27,8 @@ help:
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
 	@echo 'make machines  further cuts between machines: needs root, see docs/testing.md'
 	@echo 'make lint    ruff and mypy alone'
-	@echo 'make bench   measure speed, latency and throughput (ARGS: options of the bench)'
+	@echo 'make compiled  .venv-compiled: foosim with its hot path compiled, as pip installs it where a C compiler is'
+	@echo 'make bench   measure speed, latency and throughput of that (ARGS: options of the bench)'
 	@echo 'make clean   remove environments, caches and builds; captures stay'
 
 up: environment
@@ -71,12 +72,15 @@ lint: environment
 	@for package in $(PACKAGES); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
 	@$(PYTHON) -m mypy .typecheck/foosim tests $(wildcard bench)
 
-bench: environment
-	@$(PYTHON) -m bench $(ARGS)
+bench: compiled
+	@.venv-compiled/bin/python -m bench $(ARGS)
+
+compiled: environment
+	@sh tools/compiled.sh
 
 environment:
 	@sh tools/environment.sh
 
 clean:
-	rm -rf .venv .venv-uv .typecheck .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
+	rm -rf .venv .venv-uv .venv-compiled .typecheck .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
 	find $(wildcard $(PACKAGES) tests bench) -type d -name __pycache__ -prune -exec rm -rf {} +

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, sin, sqrt
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Literal
 
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.radio_materials import UNKNOWN, RadioMaterial
@@ -26,8 +26,9 @@ Colour = tuple[float, float, float, float]
 Pose = tuple[str, Vector, Quaternion]
 """Name of a link, position of its origin and orientation, in the world frame."""
 
-ORIGIN: Final[Vector] = (0.0, 0.0, 0.0)
-UPRIGHT: Final[Quaternion] = (0.0, 0.0, 0.0, 1.0)
+# Not Final: compiled by mypyc 2.4, a Final tuple of so many floats counts as not set.
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

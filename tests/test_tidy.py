@@ -327,7 +327,7 @@ def test_the_wheel_of_the_sdist_holds_every_module(tmp_path: Path) -> None:
     source.mkdir()
     for package in PACKAGES:
         copytree(ROOT / package, source / package, ignore=ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         (source / name).write_bytes((ROOT / name).read_bytes())
     # Without --wheel or --sdist, build makes the sdist, and the wheel from what is in the sdist.
     run(sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", cwd=source)

@@ -54,7 +54,7 @@ class Path(NamedTuple):
     cause: str
 
 
-UNKNOWN: Final[Vector] = (inf, inf, inf)
+UNKNOWN: Vector = (inf, inf, inf)
 NOWHERE: Final = Path(0, (), 0, 0, 0, OUT_OF_RANGE)
 """Before anything is known of the ends."""
 

@@ -165,9 +165,9 @@ def snr_needed(mode: str, size_bytes: int, per: float = GOOD_PER) -> int:
 # --- LoRa: a receiver's floor, and what other spreading factors leave of it -----------------------------------------
 
 LORA_FACTORS: Final = (7, 8, 9, 10, 11, 12)
-LORA_SENSITIVITY_DBM: Final = (-124.0, -127.0, -130.0, -133.0, -135.0, -137.0)
+LORA_SENSITIVITY_DBM: Final[tuple[float, ...]] = (-124.0, -127.0, -130.0, -133.0, -135.0, -137.0)
 """Of a device, by spreading factor 7 to 12 at 125 kHz. Source: SX1272 datasheet, as in the ns-3 module lorawan."""
-LORA_GATEWAY_SENSITIVITY_DBM: Final = (-130.0, -132.5, -135.0, -137.5, -140.0, -142.5)
+LORA_GATEWAY_SENSITIVITY_DBM: Final[tuple[float, ...]] = (-130.0, -132.5, -135.0, -137.5, -140.0, -142.5)
 """Of a gateway. Source: SX1301 datasheet, as in the ns-3 module lorawan."""
 LORA_ISOLATION_DB: Final = (
     (6, -16, -18, -19, -19, -20),

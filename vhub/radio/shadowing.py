@@ -17,7 +17,7 @@ from foosim.protocol.draws import draw_words, gaussian
 
 LATTICES: Final = ((0, 1.0 / 0.25), (1, 1.0 / 1.0), (2, 1.0 / 2.8))
 """Number, and nodes per correlation distance: the pitches are 0.25, 1 and 2.8 correlation distances."""
-ROOT_WEIGHTS: Final = (sqrt(0.3), sqrt(0.4), sqrt(0.3))
+ROOT_WEIGHTS: Final[tuple[float, ...]] = (sqrt(0.3), sqrt(0.4), sqrt(0.3))
 """Square roots of each lattice's share of the variance."""
 _LOW_32: Final = 0xFFFF_FFFF
 
