@@ -1,21 +1,17 @@
-"""The rules of the house, as tests: who may import whom, what stays pure, how long things get, what a wheel holds.
+"""The rules of the house, as tests: who may import whom, what stays pure, how long things get.
 
-They read the source as text and syntax trees, and import nothing of it, apart from the last two, which install it.
+They read the source as text and syntax trees, and import nothing of it, apart from the last one.
 A rule that is in the way is changed here, in one place, with its reason.
 """
 
 import ast
 import importlib
 import re
-import subprocess
-import sys
 import tomllib
-import venv
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from shutil import copytree, ignore_patterns
 from typing import Any
 
 import pytest
@@ -312,39 +308,3 @@ def test_the_makefile_links_every_package_for_the_type_checker() -> None:
 def test_each_command_has_its_function(script: str) -> None:
     module, _, function = PYPROJECT["project"]["scripts"][script].partition(":")
     assert callable(getattr(importlib.import_module(module), function))
-
-
-def run(*arguments: str | Path, cwd: Path) -> str:
-    """Standard output of a command, which must succeed."""
-    done = subprocess.run([*map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{arguments}:\n{done.stdout}\n{done.stderr}"
-    return done.stdout
-
-
-def test_the_wheel_of_the_sdist_holds_every_module(tmp_path: Path) -> None:
-    """Build in a copy (a stale build/ would ship deleted modules), install in a clean environment, import all of it."""
-    source = tmp_path / "source"
-    source.mkdir()
-    for package in PACKAGES:
-        copytree(ROOT / package, source / package, ignore=ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
-        (source / name).write_bytes((ROOT / name).read_bytes())
-    # Without --wheel or --sdist, build makes the sdist, and the wheel from what is in the sdist.
-    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", cwd=source)
-    (wheel,) = (tmp_path / "dist").glob("*.whl")
-
-    environment = tmp_path / "environment"
-    venv.create(environment, symlinks=True)
-    python = environment / "bin" / "python"
-    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=tmp_path)
-    # Our dependencies, by a path file: it adds a folder without running what the folder's own path files ask for, so
-    # the editable install beside them stays out of sight.
-    (site_packages,) = environment.glob("lib/python*/site-packages")
-    (site_packages / "dependencies.pth").write_text("\n".join(path for path in sys.path if path.endswith("-packages")))
-
-    program = "from importlib import import_module as get; import sys\n"
-    program += "for name in sys.argv[1:]: assert get(name).__file__.startswith(sys.prefix), get(name)"
-    run(python, "-I", "-W", "error", "-c", program, *modules(), cwd=tmp_path)
-    assert len(list(site_packages.glob("foosim/*/py.typed"))) == len(PACKAGES)
-    for script in PYPROJECT["project"]["scripts"]:
-        assert "Usage" in run(environment / "bin" / script, "--help", cwd=tmp_path)
