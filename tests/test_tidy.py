@@ -289,6 +289,69 @@ def test_tests_are_no_package() -> None:
     assert not list((ROOT / "tests").rglob("__init__.py"))
 
 
+def compiled() -> dict[str, ast.Module]:
+    """The modules that setup.py compiles, by dotted name, as syntax trees."""
+    (value,) = (
+        node.value
+        for node in tree_of(ROOT / "setup.py").body
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "COMPILED" and node.value is not None
+    )
+    named: dict[str, tuple[str, ...]] = eval(ast.unparse(value))
+    assert all(list(names) == sorted(set(names)) for names in (*named.values(), named)), "in order, each once"
+    paths = [ROOT / folder / f"{name}.py" for folder, names in named.items() for name in names]
+    return {".".join(("foosim", *path.relative_to(ROOT).with_suffix("").parts)): tree_of(path) for path in paths}
+
+
+def test_what_derives_from_a_compiled_class_is_compiled() -> None:
+    """An interpreted class cannot: it fails when it is made."""
+    modules = compiled()
+    wrong = []
+    for path in ALL_FILES:
+        named = {
+            alias.asname or alias.name: node.module
+            for node in ast.walk(tree_of(path))
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        if tree_of(path) in modules.values():
+            continue
+        wrong += [
+            f"{name_of(path)}:{node.lineno}: {node.name} derives from a class of {named[base.id]}"
+            for node in ast.walk(tree_of(path))
+            if isinstance(node, ast.ClassDef)
+            for base in node.bases
+            if isinstance(base, ast.Name) and named.get(base.id) in modules
+            if not is_open(modules[str(named[base.id])], base.id)
+        ]
+    assert not wrong, "\n".join(wrong)
+
+
+def is_open(tree: ast.Module, name: str) -> bool:
+    """Whether a compiled class says that interpreted ones may derive from it."""
+    (found,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == name)
+    return "allow_interpreted_subclasses" in ast.dump(found)
+
+
+def test_no_compiled_constant_is_a_tuple_of_floats_of_a_fixed_length() -> None:
+    """Those of mypyc 2.4 count as not set."""
+    fixed = re.compile(r"Final(?!.*\.\.\.).*")
+    wrong = [
+        f"{module}:{node.lineno}: {ast.unparse(node.target)}"
+        for module, tree in compiled().items()
+        for node in tree.body
+        if isinstance(node, ast.AnnAssign) and isinstance(node.value, ast.Tuple)
+        if fixed.fullmatch(ast.unparse(node.annotation)) and are_floats(node.value.elts)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def are_floats(values: list[ast.expr]) -> bool:
+    """Whether all look like numbers of which one is no whole one."""
+    whole = [isinstance(value, ast.Constant) and not isinstance(value.value, float) for value in values]
+    nested = any(isinstance(value, ast.Tuple | ast.Starred) for value in values)
+    return not all(whole) and not nested
+
+
 def test_every_package_folder_is_in_the_wheel() -> None:
     folders = sorted({path.parent.relative_to(ROOT) for path in SOURCES})
     setuptools = PYPROJECT["tool"]["setuptools"]
