@@ -20,7 +20,10 @@ from setuptools.errors import BaseError, CCompilerError
 
 COMPILED: Final = {
     "protocol": ("draws", "scene"),
-    "vhub": ("air", "budget", "fabric", "geometry", "links", "propagation", "rays", "setup", "world"),
+    "vhub": (
+        *("air", "budget", "fabric", "geometry", "links", "packet", "propagation", "rays", "room", "sendings"),
+        *("setup", "state", "world"),
+    ),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss"),
         *("shadowing", "timings"),

@@ -23,10 +23,11 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import Sent
 from foosim.rehearsal.whatif_reading import Frames, Offers, caveats, frames_for, world_of
 from foosim.vhub.capture_reader import CaptureData
+from foosim.vhub.memory import Joining
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.profiles import Profiles
 from foosim.vhub.rows import CaptureError, ClientRow, PacketRow, edit_of, packet_row
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 
 CHANGED_KEPT: Final = 10_000
 """How many changed packets a result names."""

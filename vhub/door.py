@@ -14,10 +14,11 @@ from foosim.protocol.actions import Journal
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import ClientHello, Done, Go, Join, Up
+from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import InputsRecord
 from foosim.vhub.sessions import Session, may_lockstep
-from foosim.vhub.state import Joining, Member
+from foosim.vhub.state import Member
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore

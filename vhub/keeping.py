@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from msgspec.structs import replace
-
 from foosim.protocol.messages import Epoch
 from foosim.vhub.commits import Commits, Committed
-from foosim.vhub.packet import IN_FLIGHT
+from foosim.vhub.packet import IN_FLIGHT, flight_of, state_of
 from foosim.vhub.records import Closing, closing_of
 from foosim.vhub.state import HubState
 
@@ -69,7 +67,10 @@ def last_closings(
     if not closings and closed is not None:
         closings.append(_unjudged(state, commits, closed, now_ns))
     for closing in closings[-1:]:
-        closing.fates += [replace(flight, cause=IN_FLIGHT) for flight in state.in_flight()]
+        for flight in state.in_flight():
+            left = flight_of(state_of(flight))
+            left.cause = IN_FLIGHT
+            closing.fates.append(left)
     return closings
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import msgspec
 
+from foosim.protocol.messages import Delivered
+
 
 class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """What a link's stages remember, and its account."""
@@ -94,3 +96,106 @@ class AirState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """A channel that radios share: what is on air, in the order of sending."""
 
     on_air: list[Transmission] = []
+
+
+class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    """A packet on its way, as it is written down: what a `packet.Flight` is.
+
+    Times are simulated nanoseconds. Levels are hundredths of dB or dBm, so that they compare as integers. What no stage
+    of the link has looked at is 0 or empty.
+    """
+
+    source: str
+    destination: str
+    channel: str
+    sequence: int
+    sent_ns: int
+    stamp_ns: int
+    payload: bytes
+    published: bool = False
+    """Whether it goes to all who subscribe; else its sender named the receiver."""
+    copy: int = 0
+    """1 for a copy that the link made."""
+    due_ns: int = 0
+    arrival_tick: int = -1
+    """-1 until it is on its way; a packet that is dropped at sending never is."""
+    cause: str = ""
+    rule: str = ""
+    words: tuple[int, ...] = ()
+    """The draws of the packet, when a stage asked for them: eight 64-bit words."""
+    slots: int = 0
+    """Which of them its link uses: bit n for slot n."""
+    released_wall_ns: int = 0
+    radio: str = ""
+    phase_ns: int = 0
+    """By how much later than its tick it came to its radio."""
+    queue_bytes: int = 0
+    """What waited before it when it came."""
+    queue_ns: int = 0
+    access_ns: int = 0
+    airtime_ns: int = 0
+    """On air or wire, the last time; what attempts before it took is in `access_ns`."""
+    propagation_ns: int = 0
+    jitter_ns: int = 0
+    distance_mm: int = 0
+    walls: tuple[str, ...] = ()
+    """Names of the bodies in the way."""
+    walls_cdb: int = 0
+    path_loss_cdb: int = 0
+    """With walls, shadowing and fading."""
+    shadowing_cdb: int = 0
+    fading_cdb: int = 0
+    received_cdbm: int = 0
+    snr_cdb: int = 0
+    interference: int = 0
+    """Power of others on air meanwhile, in units of 1e-21 W."""
+    rate_bps: int = 0
+    error_threshold: int = 0
+    """It was lost when its draw for errors was below this: the packet error rate in units of 2^-64."""
+    contenders: int = 0
+    retries: int = 0
+    is_bad: bool = False
+    """Whether the link was in a bad time."""
+    bits_flipped: int = 0
+    mangled: bytes = b""
+    """The payload as it arrives, where bits are flipped; what was offered stays."""
+    air_start_ns: int = 0
+    air_end_ns: int = 0
+    """When it was on air the last time; others who are on air between may spoil it."""
+    is_doubled: bool = False
+    """Whether the link makes a copy of it."""
+    is_settled: bool = False
+    """Whether it was acknowledged: nothing that is sent later spoils it."""
+    by_factor: tuple[int, ...] = ()
+    """Of LoRa: the interference by spreading factor, from 7 on."""
+    held_ns: int = 0
+    """For how long clogs put off its due time."""
+    model_ns: int = 0
+    """What a link model of one's own adds to its delay."""
+    outcome: str = ""
+    """What the medium found out and the channel says, at sending; empty when it came through."""
+
+
+class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A client that joins (again): its period in ticks (0: free-running) and what it subscribes to."""
+
+    name: str
+    period: int
+    subscriptions: list[tuple[str, str]]
+
+
+class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The whole state as it is written, field by field as `HubState.snapshot` makes it."""
+
+    closed: int
+    packets: tuple[int, int, int, int, int]
+    refusals: list[tuple[str, int]]
+    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int]]
+    links: list[tuple[str, str, str, LinkState]]
+    radios: list[tuple[str, str, RadioState]]
+    airs: list[tuple[str, AirState]]
+    asked: list[tuple[int, str]]
+    deliveries: list[tuple[int, list[Delivered]]]
+    final: tuple[int, bool]
+    branch: tuple[int, int]
+    flights: list[FlightState]

@@ -8,14 +8,14 @@ one file each.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from operator import attrgetter
 from typing import Final
 
-import msgspec
+from msgspec import convert
 
 from foosim.protocol.limits import PACKET_HEAD_BYTES_MAX
 from foosim.protocol.messages import Received
+from foosim.vhub.memory import FlightState
 from foosim.vhub.radio.noise import centi, level_of
 
 DELIVERED: Final = "delivered"
@@ -23,82 +23,55 @@ DROPPED: Final = "dropped"
 IN_FLIGHT: Final = "in_flight"
 
 
-class Flight(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """One offered packet: from `source` to one receiver. Times are simulated nanoseconds.
+class Flight:
+    """One offered packet: from `source` to one receiver. `memory.FlightState` says what its attributes are."""
 
-    Levels are hundredths of dB or dBm, so that they compare as integers. What no stage of the link has looked at is 0
-    or empty.
-    """
+    __slots__ = FlightState.__struct_fields__
 
-    source: str
-    destination: str
-    channel: str
-    sequence: int
-    sent_ns: int
-    stamp_ns: int
-    payload: bytes
-    published: bool = False
-    """Whether it goes to all who subscribe; else its sender named the receiver."""
-    copy: int = 0
-    """1 for a copy that the link made."""
-    due_ns: int = 0
-    arrival_tick: int = -1
-    """-1 until it is on its way; a packet that is dropped at sending never is."""
-    cause: str = ""
-    rule: str = ""
-    words: tuple[int, ...] = ()
-    """The draws of the packet, when a stage asked for them: eight 64-bit words."""
-    slots: int = 0
-    """Which of them its link uses: bit n for slot n."""
-    released_wall_ns: int = 0
-    radio: str = ""
-    phase_ns: int = 0
-    """By how much later than its tick it came to its radio."""
-    queue_bytes: int = 0
-    """What waited before it when it came."""
-    queue_ns: int = 0
-    access_ns: int = 0
-    airtime_ns: int = 0
-    """On air or wire, the last time; what attempts before it took is in `access_ns`."""
-    propagation_ns: int = 0
-    jitter_ns: int = 0
-    distance_mm: int = 0
-    walls: tuple[str, ...] = ()
-    """Names of the bodies in the way."""
-    walls_cdb: int = 0
-    path_loss_cdb: int = 0
-    """With walls, shadowing and fading."""
-    shadowing_cdb: int = 0
-    fading_cdb: int = 0
-    received_cdbm: int = 0
-    snr_cdb: int = 0
-    interference: int = 0
-    """Power of others on air meanwhile, in units of 1e-21 W."""
-    rate_bps: int = 0
-    error_threshold: int = 0
-    """It was lost when its draw for errors was below this: the packet error rate in units of 2^-64."""
-    contenders: int = 0
-    retries: int = 0
-    is_bad: bool = False
-    """Whether the link was in a bad time."""
-    bits_flipped: int = 0
-    mangled: bytes = b""
-    """The payload as it arrives, where bits are flipped; what was offered stays."""
-    air_start_ns: int = 0
-    air_end_ns: int = 0
-    """When it was on air the last time; others who are on air between may spoil it."""
-    is_doubled: bool = False
-    """Whether the link makes a copy of it."""
-    is_settled: bool = False
-    """Whether it was acknowledged: nothing that is sent later spoils it."""
-    by_factor: tuple[int, ...] = ()
-    """Of LoRa: the interference by spreading factor, from 7 on."""
-    held_ns: int = 0
-    """For how long clogs put off its due time."""
-    model_ns: int = 0
-    """What a link model of one's own adds to its delay."""
-    outcome: str = ""
-    """What the medium found out and the channel says, at sending; empty when it came through."""
+    def __init__(  # noqa: PLR0913, PLR0917  # all that a packet is
+        self,
+        source: str,
+        destination: str,
+        channel: str,
+        sequence: int,
+        sent_ns: int,
+        stamp_ns: int,
+        payload: bytes,
+        published: bool = False,
+        copy: int = 0,
+    ) -> None:
+        self.source, self.destination, self.channel = source, destination, channel
+        self.sequence, self.sent_ns, self.stamp_ns, self.payload = sequence, sent_ns, stamp_ns, payload
+        self.published, self.copy = published, copy
+        self.due_ns = self.slots = self.released_wall_ns = 0
+        self.arrival_tick = -1
+        self.cause = self.rule = self.radio = self.outcome = ""
+        self.words: tuple[int, ...] = ()
+        self.mangled = b""
+        self.phase_ns = self.queue_bytes = self.queue_ns = self.access_ns = self.airtime_ns = 0
+        self.propagation_ns = self.jitter_ns = self.held_ns = self.model_ns = self.bits_flipped = 0
+        self.is_bad = self.is_doubled = self.is_settled = False
+        self.walls: tuple[str, ...] = ()
+        self.by_factor: tuple[int, ...] = ()
+        self.distance_mm = self.walls_cdb = self.path_loss_cdb = self.shadowing_cdb = self.fading_cdb = 0
+        self.received_cdbm = self.snr_cdb = self.interference = self.rate_bps = self.error_threshold = 0
+        self.contenders = self.retries = self.air_start_ns = self.air_end_ns = 0
+
+
+def state_of(flight: Flight) -> FlightState:
+    """Return a flight as it is written down."""
+    return convert(flight, FlightState, from_attributes=True)
+
+
+def flight_of(state: FlightState) -> Flight:
+    """Return the flight that was written down."""
+    s = state
+    flight = Flight(
+        s.source, s.destination, s.channel, s.sequence, s.sent_ns, s.stamp_ns, s.payload, s.published, s.copy
+    )
+    for name in FlightState.__struct_fields__:
+        setattr(flight, name, getattr(state, name))
+    return flight
 
 
 def content_of(flight: Flight) -> bytes:
@@ -125,16 +98,15 @@ order_of: Final = attrgetter("due_ns", "source", "sequence", "copy", "destinatio
 """Where a packet stands among what arrives at one tick; the receiver tells copies of a broadcast apart."""
 
 
-@dataclass(slots=True)
 class Packets:
     """The account over all links: offered = delivered + dropped + in flight, at every tick."""
 
-    offered: int = 0
-    delivered: int = 0
-    dropped: int = 0
-    refused: int = 0
-    copies: int = 0
-    """Made by links, on purpose; they are in none of the other counts."""
+    def __init__(
+        self, offered: int = 0, delivered: int = 0, dropped: int = 0, refused: int = 0, copies: int = 0
+    ) -> None:
+        self.offered, self.delivered, self.dropped, self.refused = offered, delivered, dropped, refused
+        self.copies = copies
+        """Made by links, on purpose; they are in none of the other counts."""
 
     @property
     def in_flight(self) -> int:

@@ -21,8 +21,9 @@ from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Build, Commit, Delivered, Edit, Epoch, Recovered, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
 from foosim.protocol.start import first_chain
+from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 
 
 class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):

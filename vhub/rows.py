@@ -377,8 +377,6 @@ def packet_row(flight: Flight) -> PacketRow:
     )
 
 
-
-
 def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
     """Return what the stages of a radio found, in the order of a row."""
     threshold, walls = flight.error_threshold, flight.walls

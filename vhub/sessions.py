@@ -28,7 +28,8 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.names import nearest_name
 from foosim.vhub.downlinks import Downlinks
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.memory import Joining
+from foosim.vhub.state import HubState
 
 
 def may_lockstep(deployment: Deployment, name: str) -> bool:

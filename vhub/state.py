@@ -9,7 +9,6 @@ byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `records`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from operator import attrgetter
 
 import msgspec
@@ -23,8 +22,8 @@ from foosim.protocol.messages import Delivered, Deliveries, Disrupt, Edit, Epoch
 from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.links import Link
-from foosim.vhub.memory import AirState, LinkState, RadioState
-from foosim.vhub.packet import Flight, Packets, content_of, order_of
+from foosim.vhub.memory import Joining, Snapshot
+from foosim.vhub.packet import Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.room import Room
 from foosim.vhub.sendings import Sendings
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
@@ -33,28 +32,29 @@ OUTBOX_SHIFT = 16
 """A robot's sequence number is tick x 2^16 + index."""
 
 
-class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A client that joins (again): its period in ticks (0: free-running) and what it subscribes to."""
-
-    name: str
-    period: int
-    subscriptions: list[tuple[str, str]]
-
-
-@dataclass(slots=True)
 class Member:
     """A client that takes part, as the state knows it: in ticks and numbers, without its session."""
 
-    period: int
-    subscriptions: tuple[tuple[str, str], ...]
-    joined_tick: int
-    sequence: int = 0
-    """Greatest sequence number that was admitted."""
-    downlink: int = 0
-    """Number of the last message to the client."""
-    active: bool = True
-    branched: int = 0
-    """The number of that message when the last branch began: what was said then behind it is void."""
+    def __init__(
+        self,
+        period: int,
+        subscriptions: tuple[tuple[str, str], ...],
+        joined_tick: int,
+        sequence: int = 0,
+        downlink: int = 0,
+        active: bool = True,
+        branched: int = 0,
+    ) -> None:
+        self.period = period
+        self.subscriptions = subscriptions
+        self.joined_tick = joined_tick
+        self.sequence = sequence
+        """Greatest sequence number that was admitted."""
+        self.downlink = downlink
+        """Number of the last message to the client."""
+        self.active = active
+        self.branched = branched
+        """The number of that message when the last branch began: what was said then behind it is void."""
 
     def is_due(self, tick: int) -> bool:
         return self.active and self.period > 0 and tick % self.period == 0
@@ -62,23 +62,6 @@ class Member:
     def release_tick(self, tick: int) -> int:
         """Return the first tick, from `tick` on, at which something can be released to the client."""
         return tick if self.period == 0 else -(-tick // self.period) * self.period
-
-
-class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole state as it is written, field by field as `HubState.snapshot` makes it."""
-
-    closed: int
-    packets: tuple[int, int, int, int, int]
-    refusals: list[tuple[str, int]]
-    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int]]
-    links: list[tuple[str, str, str, LinkState]]
-    radios: list[tuple[str, str, RadioState]]
-    airs: list[tuple[str, AirState]]
-    asked: list[tuple[int, str]]
-    deliveries: list[tuple[int, list[Delivered]]]
-    final: tuple[int, bool]
-    branch: tuple[int, int]
-    flights: list[Flight]
 
 
 class HubState:
@@ -462,14 +445,14 @@ class HubState:
                 "deliveries": sorted(self.deliveries.items()),
                 "final": [self.final, self.was_final],
                 "branch": [self.branch, self.branch_tick],
-                "flights": self.in_flight(),
+                "flights": [state_of(flight) for flight in self.in_flight()],
             }
         )
 
     @classmethod
     def restore(cls, deployment: Deployment, snapshot: bytes) -> HubState:
         """Return the state that `snapshot` holds; raises Malformed when it holds none."""
-        content = decode_any(_Snapshot, snapshot)
+        content = decode_any(Snapshot, snapshot)
         state = cls(deployment)
         state.closed = content.closed
         state.packets = Packets(*content.packets)
@@ -483,7 +466,7 @@ class HubState:
         if not {state.closed, state.closed + 1} <= state.deliveries.keys():
             raise Malformed(f"a state after tick {state.closed} without the deliveries of that tick and the next")
         ends = {(source, destination) for source, destination, _ in state.fabric.states}
-        for flight in content.flights:
+        for flight in map(flight_of, content.flights):
             if (flight.source, flight.destination) not in ends:
                 raise Malformed(f"a packet in flight from {flight.source} to {flight.destination} without a link")
             state.fabric.restore_flight(flight)

@@ -18,9 +18,10 @@ from foosim.protocol.start import initial_frame
 from foosim.rehearsal.bus import Weather
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight
 from foosim.vhub.records import Closing
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT = TABLE.read_text()

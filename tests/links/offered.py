@@ -20,9 +20,10 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Deliveries, Edit, RobotPacket, Sent
 from foosim.protocol.start import initial_frame
 from foosim.vhub.fabric import Fabric
+from foosim.vhub.memory import Joining
 from foosim.vhub.numbers import ln
 from foosim.vhub.packet import Flight
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 ENDS: Final = ("a", "b", "c", "d")

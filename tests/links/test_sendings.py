@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Sent
-from foosim.vhub.packet import Flight
+from foosim.vhub.memory import Joining
+from foosim.vhub.packet import Flight, state_of
 from foosim.vhub.sendings import Sendings
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 from tests.links.offered import ENDS, Hub, deployment_of
 
 WIRED: Final = "{id: wired, from: d, to: red.goal, delay: 3 ms, jitter: {shape: gamma, sd: 2 ms}, loss: 20 %}"
@@ -65,7 +66,7 @@ def closed(state: HubState, said: list[list[tuple[str, str, int]]], *, in_halves
             fates += state.close_rest()
         else:
             seen.append(state.close_clients(frame, sent, fates))
-        seen += [fates, state.snapshot()]
+        seen += [[state_of(flight) for flight in fates], state.snapshot()]
     return seen
 
 

@@ -11,8 +11,9 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Sent
 from foosim.protocol.start import initial_frame
+from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SETS = (

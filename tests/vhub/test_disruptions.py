@@ -19,8 +19,9 @@ from foosim.protocol.messages import Disrupt, RobotPacket, Sent
 from foosim.protocol.network import Event, Network
 from foosim.protocol.start import initial_frame
 from foosim.vhub.events import Timeline
+from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60

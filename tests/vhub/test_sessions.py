@@ -37,8 +37,9 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.start import initial_frame
 from foosim.vhub.core import HubCore
+from foosim.vhub.memory import Joining
 from foosim.vhub.sessions import Sessions, may_lockstep
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SETS: Final = (
