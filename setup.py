@@ -21,8 +21,8 @@ from setuptools.errors import BaseError, CCompilerError
 COMPILED: Final = {
     "protocol": ("draws", "scene"),
     "vhub": (
-        *("air", "budget", "fabric", "geometry", "links", "packet", "propagation", "rays", "room", "sendings"),
-        *("setup", "state", "world"),
+        *("air", "budget", "fabric", "geometry", "links", "mcap_writer", "packet", "propagation", "rays", "room"),
+        *("sendings", "setup", "state", "to_rows", "world"),
     ),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss"),

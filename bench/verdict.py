@@ -30,7 +30,7 @@ from foosim.protocol.layout import build_layout
 from foosim.protocol.start import initial_numbers
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
-from foosim.vhub.rows import packet_row
+from foosim.vhub.to_rows import packet_row
 
 WAREHOUSE: Final = ROOT / "deploy" / "warehouse.yaml"
 TICK_NS: Final = 2_000_000

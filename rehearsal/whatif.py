@@ -26,8 +26,9 @@ from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.profiles import Profiles
-from foosim.vhub.rows import CaptureError, ClientRow, PacketRow, edit_of, packet_row
+from foosim.vhub.rows import CaptureError, ClientRow, PacketRow, edit_of
 from foosim.vhub.state import HubState
+from foosim.vhub.to_rows import packet_row
 
 CHANGED_KEPT: Final = 10_000
 """How many changed packets a result names."""

@@ -22,7 +22,8 @@ from foosim.vhub.capture_parts import END_METADATA, METADATA, Joined
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
 from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK, OWN
 from foosim.vhub.in_force import InForce
-from foosim.vhub.mcap_file import McapWriter, Message
+from foosim.vhub.mcap_file import Message
+from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK, CaptureError
 
 _BEFORE_TICK: Final = frozenset({EPOCHS, LAYOUT, CLIENTS, RECOVERIES})

@@ -1,9 +1,9 @@
 """The file of a capture: closings, epochs and lines become rows in it, one after the other, in the caller's thread.
 
 A new file is never written over an old one. A file that its writer left unfinished is gone on with behind its last
-whole chunk: what it has already is not written again, so a whole journal may be fed to it. Neighbours: `rows` and
-`viewing` (what is written), `mcap_file` (how), `capture_split` (in which files), `capture_left` (files that were left),
-`capture_writer` (the thread), `capture_recovery`.
+whole chunk: what it has already is not written again, so a whole journal may be fed to it. Neighbours: `to_rows`
+and `viewing` (what is written), `mcap_writer` (how), `capture_split` (in which files), `capture_left` (files that were
+left), `capture_writer` (the thread), `capture_recovery`.
 """
 
 from __future__ import annotations
@@ -30,25 +30,13 @@ from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, part_path, p
 from foosim.vhub.capture_split import OWN, Split
 from foosim.vhub.in_force import HOLDING
 from foosim.vhub.link_models import model_versions
-from foosim.vhub.mcap_file import Book, McapWriter, Message
+from foosim.vhub.mcap_file import Book, Message
 from foosim.vhub.mcap_scan import Scanned, read_messages
+from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.payload_hash import hashed_row, keeps_hashes
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import (
-    FORMAT,
-    FRAME,
-    LAYOUT,
-    PACKETS,
-    PROFILE,
-    ROW_TYPES,
-    CaptureError,
-    Row,
-    epoch_entry,
-    frame_row,
-    plan_of,
-    row_schema,
-    rows_of,
-)
+from foosim.vhub.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE, ROW_TYPES, CaptureError, Row, row_schema
+from foosim.vhub.to_rows import add_packets, epoch_entry, frame_row, plan_of, world_rows
 from foosim.vhub.viewing import LOG, POSES, SCENE, VIEW_TYPES, View
 
 DEPLOYMENT: Final = "deployment.yaml"
@@ -203,16 +191,12 @@ class CaptureFile:
         return True
 
     def _write_closing(self, closing: Closing) -> None:
-        add, encode, channels, done = self.mcap.add_message, self._encode, self._channels, self.done
-        tick, kept = closing.frame.tick, self._kept
-        for topic, log_ns, publish_ns, sequence, row in rows_of(closing, self._plan, self._known):
-            data = encode(row if kept is None else kept(row))
-            if topic == PACKETS:
-                add(channels[topic], log_ns, publish_ns, sequence, data)
-            else:
-                self._add(Message(topic, log_ns, publish_ns, sequence, data))
+        encode, kept, done, tick = self._encode, self._kept, self.done, closing.frame.tick
+        for topic, log_ns, publish_ns, sequence, row in world_rows(closing, self._plan, self._known):
+            self._add(Message(topic, log_ns, publish_ns, sequence, encode(row if kept is None else kept(row))))
             if topic == FRAME:
                 done.frame = tick
+        add_packets(self.mcap, self._channels[PACKETS], closing.fates, encode, kept)
         self._write_views(closing.frame)
         self._known = closing.frame
         done.tick = tick

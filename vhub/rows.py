@@ -1,32 +1,24 @@
-"""The rows of a capture: what is kept of every closed tick, as types of their own, and how a closing becomes rows.
+"""The rows of a capture: what is kept of every closed tick, as types of their own.
 
 A row is a JSON object; its JSON Schema is generated from its type. Viewers (Foxglove, Lichtblick) parse only a part of
 JSON Schema: objects of numbers, strings, booleans, objects and lists of these; no null, no choice between types, no
 reference, no list in a list. So a row has every field always, and -1 or an empty text where there is nothing to say.
 Fields that come from a clock of the real world have names that start with `wall_`: two runs differ in them.
-`rows_of` is pure, so what the writer missed can be made again from a fold of the journal (`records.fold`).
-Neighbours: `capture_writer`, `capture_reader`, `viewing` (what is looked at).
+Neighbours: `to_rows` (how a closing becomes rows), `capture_reader`, `viewing` (what is looked at).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
 
 import msgspec
 from msgspec import Meta
 
 from foosim.protocol import limits
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.draws import Slot
 from foosim.protocol.errors import Refused
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.message_types import Counter
-from foosim.protocol.messages import Add, Delivered, Disrupt, Edit, Epoch, Freeze, Push, Recovered, Remove, Thaw
-from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
-from foosim.vhub.records import Closing
+from foosim.protocol.messages import Add, Delivered, Disrupt, Edit, Freeze, Push, Remove, Thaw
 
 FORMAT: Final = 1
 """Version of the rows and of the capture's metadata; a reader refuses another one."""
@@ -260,10 +252,6 @@ ROW_TYPES: Final[Mapping[str, type[Row]]] = {
 }
 """The type of the rows of each topic."""
 
-Entry = tuple[str, int, int, int, Row]
-"""A row with its place: topic, log time and publish time (simulated ns), sequence number."""
-
-
 def row_schema(kind: type[Row]) -> dict[str, Any]:
     """Return the JSON Schema of a row, in the part of JSON Schema that viewers parse: everything in its place."""
     schema = msgspec.json.schema(kind)
@@ -284,190 +272,8 @@ def _in_place(schema: Any, definitions: Mapping[str, Any]) -> Any:
     return {key: _in_place(value, definitions) for key, value in typed.items() if key != "$defs"}
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What decides how a closing becomes rows: a function of the deployment."""
-
-    tick_ns: int
-    frames_every: int
-    base: Layout
-
-
-def plan_of(deployment: Deployment) -> Plan:
-    """Return the plan of a deployment's captures."""
-    return Plan(deployment.tick_ns, deployment.capture.frames_every, build_layout(deployment))
-
-
-def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
-    """Return the rows of one closing, in the order in which they are written.
-
-    `known` is the frame of the closing before, None at the start. The last closing of a run may bring a frame that is
-    known already: then its packets alone are new.
-    """
-    frame = closing.frame
-    at_ns = frame.tick * plan.tick_ns
-    mark = frame.tick & 0xFFFF_FFFF
-    entries: list[Entry] = []
-    if known is None or known.tick != frame.tick:
-        if known is None or known.layout.digest != frame.layout.digest:
-            entries.append((LAYOUT, at_ns, at_ns, mark, layout_row(frame, plan.base)))
-        entries += [(CLIENTS, at_ns, at_ns, mark, row) for row in _client_rows(closing)]
-        entries += [_recovery_entry(entry, plan) for entry in closing.recovered]
-        entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
-        if known is None or frame.tick % plan.frames_every == 0:
-            entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
-    for flight in closing.fates:
-        sent_ns = flight.sent_ns
-        entries.append(
-            (
-                PACKETS,
-                sent_ns,
-                flight.stamp_ns or sent_ns,
-                flight.sequence & 0xFFFF_FFFF,
-                packet_row(flight),
-            )
-        )
-    return entries
-
-
-_FATES: Final[Mapping[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
-_LOSS: Final = int(Slot.LOSS)
-_JITTER: Final = int(Slot.JITTER)
-_ERROR: Final = int(Slot.ERROR)
-
-
-def packet_row(flight: Flight) -> PacketRow:
-    """Return the row of a packet whose fate is final, or that is in flight at the end."""
-    fate = _FATES.get(flight.cause, DROPPED)
-    on_its_way = flight.arrival_tick >= 0
-    slots, words, payload = flight.slots, flight.words, flight.payload
-    return PacketRow(
-        flight.source,
-        flight.sequence,
-        flight.copy,
-        flight.destination,
-        flight.channel,
-        flight.sent_ns,
-        flight.stamp_ns,
-        flight.due_ns if on_its_way else -1,
-        flight.arrival_tick,
-        fate,
-        flight.cause if fate is DROPPED else "",
-        flight.rule,
-        words[_LOSS].to_bytes(8).hex() if slots >> _LOSS & 1 else "",
-        words[_JITTER].to_bytes(8).hex() if slots >> _JITTER & 1 and on_its_way else "",
-        len(payload),
-        payload,
-        flight.released_wall_ns,
-        flight.radio,
-        flight.published,
-        flight.queue_bytes,
-        flight.queue_ns,
-        flight.access_ns,
-        flight.airtime_ns,
-        flight.propagation_ns,
-        flight.jitter_ns,
-        flight.held_ns,
-        flight.model_ns,
-        flight.phase_ns,
-        flight.is_bad,
-        flight.bits_flipped,
-        flight.rate_bps,
-        *(_radio_inputs(flight) if flight.radio else ()),
-    )
-
-
-def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
-    """Return what the stages of a radio found, in the order of a row."""
-    threshold, walls = flight.error_threshold, flight.walls
-    return (
-        flight.distance_mm,
-        list(walls) if walls else [],
-        flight.walls_cdb,
-        flight.path_loss_cdb,
-        flight.shadowing_cdb,
-        flight.fading_cdb,
-        flight.received_cdbm,
-        flight.snr_cdb,
-        level_cdbm(flight.interference) if flight.interference else 0,
-        threshold * 1_000_000 >> 64,
-        flight.words[_ERROR].to_bytes(8).hex() if threshold else "",
-        flight.contenders,
-        flight.retries,
-    )
-
-
-def _tick_row(closing: Closing) -> TickRow:
-    frame = closing.frame
-    return TickRow(
-        frame.tick,
-        closing.digest.hex(),
-        [frame.entity_digest(entity).hex() for entity in frame.layout.entities],
-        [edit_row(edit) for edit in closing.edits],
-        [
-            DeliveredRow(d.due_ns, d.source, d.sequence, d.copy, d.destination, d.channel, d.payload)
-            for d in closing.delivered
-        ],
-        closing.wall_ns,
-    )
-
-
-def epoch_entry(epoch: Epoch, plan: Plan) -> Entry:
-    """Return the row of an epoch, in its place."""
-    at_ns = epoch.tick * plan.tick_ns
-    owners = [OwnerRow(robot, node) for robot, node in epoch.owners]
-    row = EpochRow(epoch.tick, epoch.epoch, epoch.digest.hex(), list(epoch.roster), owners, epoch.arithmetic.hex())
-    return EPOCHS, at_ns, at_ns, epoch.tick & 0xFFFF_FFFF, row
-
-
-def _recovery_entry(entry: Recovered, plan: Plan) -> Entry:
-    """Return the row of a loss or return, at the tick behind which it was."""
-    at_ns = entry.tick * plan.tick_ns
-    row = RecoveryRow(entry.what, entry.name, entry.reason, entry.tick, entry.epoch, entry.outage_ns)
-    return RECOVERIES, at_ns, at_ns, entry.tick & 0xFFFF_FFFF, row
-
-
-def layout_row(frame: Frame, base: Layout) -> LayoutRow:
-    """Return the row of a frame's layout; `base` is the deployment's own."""
-    layout = frame.layout
-    return LayoutRow(
-        frame.tick,
-        layout.digest.hex(),
-        layout.size,
-        [EntityRow(e.name, e.model, e.start, e.split, e.stop) for e in layout.entities],
-        [AddedRow(e.name, e.model) for e in layout.entities if e.name not in base],
-    )
-
-
-def frame_row(frame: Frame) -> FrameRow:
-    """Return the row of a frame."""
-    return FrameRow(frame.tick, frame.values.tobytes(), [OutboxRow(*item) for item in frame.outboxes.items()])
-
-
-def _client_rows(closing: Closing) -> list[ClientRow]:
-    tick = closing.frame.tick
-    rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
-    for joining in closing.joins:
-        subscriptions = [SubscriptionRow(source, channel) for source, channel in joining.subscriptions]
-        rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions))
-    return rows
-
-
-def edit_row(edit: Edit) -> EditRow:
-    """Return the row of an edit."""
-    if isinstance(edit, Add):
-        return EditRow("add", edit.name, edit.model, position=list(edit.position), velocity=list(edit.velocity))
-    if isinstance(edit, Remove):
-        return EditRow("remove", edit.name)
-    if isinstance(edit, Push):
-        return EditRow("push", edit.name, impulse=list(edit.impulse))
-    if isinstance(edit, Disrupt):
-        return EditRow("network", "", event=edit.event)
-    return EditRow("freeze" if isinstance(edit, Freeze) else "thaw", edit.name)
-
-
 def edit_of(row: EditRow) -> Edit:
-    """Return the edit that a row tells; the inverse of `edit_row`."""
+    """Return the edit that a row tells; the inverse of `to_rows.edit_row`."""
     if row.kind == "add":
         return Add(row.name, row.model, _vector(row.position), _vector(row.velocity))
     if row.kind == "remove":

@@ -23,7 +23,8 @@ from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import RECOVERIES, plan_of, rows_of
+from foosim.vhub.rows import RECOVERIES
+from foosim.vhub.to_rows import plan_of, rows_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 240

@@ -19,7 +19,8 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify_capture
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import EPOCHS, RECOVERIES, plan_of, rows_of
+from foosim.vhub.rows import EPOCHS, RECOVERIES
+from foosim.vhub.to_rows import plan_of, rows_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 160

@@ -16,8 +16,8 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import Disrupt, Edit, RobotPacket, Sent
 from foosim.protocol.presets import PRESETS
 from foosim.vhub.packet import Flight
-from foosim.vhub.rows import packet_row
 from foosim.vhub.state import HubState
+from foosim.vhub.to_rows import packet_row
 from tests.links.offered import ENDS, Hub, deployment_of, rule
 from tests.links.proof import Proof
 

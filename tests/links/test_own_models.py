@@ -27,9 +27,10 @@ from foosim.vhub.fabric import Fabric
 from foosim.vhub.link_models import ModelError, Passage, check_link_models, differing_models, model_versions
 from foosim.vhub.profiles import Profiles
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import PACKETS, PacketRow, packet_row
+from foosim.vhub.rows import PACKETS, PacketRow
 from foosim.vhub.stages.own import MODEL, MODEL_FAILED
 from foosim.vhub.state import HubState
+from foosim.vhub.to_rows import packet_row
 from tests.links.offered import MS, TABLE, Hub, deployment_of, every, fates, rule
 from tests.links.packages import ALL, install
 from tests.links.proof import Proof

@@ -14,7 +14,7 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import packet_row
+from foosim.vhub.to_rows import packet_row
 from tests.links.offered import TABLE
 from tests.links.proof import Proof
 

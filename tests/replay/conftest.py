@@ -20,7 +20,8 @@ from foosim.rehearsal.replay_command import app
 from foosim.rehearsal.system import System
 from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_file import declare_topics, write_all
-from foosim.vhub.mcap_file import McapFile, McapWriter, Message
+from foosim.vhub.mcap_file import McapFile, Message
+from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.rows import PROFILE
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -22,7 +22,8 @@ from foosim.vhub import capture_file
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.mcap_file import CHUNK_BYTES_MAX, McapWriter
+from foosim.vhub.mcap_file import CHUNK_BYTES_MAX
+from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.rows import CaptureError
 
 if TYPE_CHECKING:

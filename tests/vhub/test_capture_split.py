@@ -23,7 +23,8 @@ from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.capture_split import Split
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.keeping import Keep
-from foosim.vhub.mcap_file import McapFile, McapWriter, Message
+from foosim.vhub.mcap_file import McapFile, Message
+from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.records import Closing
 from foosim.vhub.resume import end_of, first_tick_of, recall
 from foosim.vhub.rows import PROFILE, CaptureError

@@ -19,8 +19,8 @@ from foosim.protocol.messages import Deliveries, Down
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import HeadRecord, HubRecord, InputsRecord, TickRecord, fold
 from foosim.vhub.resume import Captured, recall
-from foosim.vhub.rows import plan_of, rows_of
 from foosim.vhub.state import HubState
+from foosim.vhub.to_rows import plan_of, rows_of
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun

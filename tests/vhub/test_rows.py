@@ -27,19 +27,15 @@ from foosim.vhub.rows import (
     CaptureError,
     ClientRow,
     EditRow,
-    Entry,
     FrameRow,
     LayoutRow,
     PacketRow,
     TickRow,
     delivered_of,
     edit_of,
-    edit_row,
-    epoch_entry,
-    plan_of,
     row_schema,
-    rows_of,
 )
+from foosim.vhub.to_rows import Entry, edit_row, epoch_entry, plan_of, rows_of
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
