@@ -1,0 +1,248 @@
+"""How a closing becomes the rows of a capture, and how those of packets become messages in its file.
+
+`rows_of` is pure, so what the writer missed can be made again from a fold of the journal (`records.fold`).
+Neighbours: `rows` (the types), `capture_file` (writes what is made here).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.draws import Slot
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.messages import Add, Disrupt, Edit, Epoch, Freeze, Push, Recovered, Remove
+from foosim.vhub.mcap_writer import McapWriter
+from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
+from foosim.vhub.records import Closing
+from foosim.vhub.rows import (
+    CLIENTS,
+    EPOCHS,
+    FRAME,
+    LAYOUT,
+    PACKETS,
+    RECOVERIES,
+    TICK,
+    AddedRow,
+    ClientRow,
+    DeliveredRow,
+    EditRow,
+    EntityRow,
+    EpochRow,
+    Fate,
+    FrameRow,
+    LayoutRow,
+    OutboxRow,
+    OwnerRow,
+    PacketRow,
+    RecoveryRow,
+    Row,
+    SubscriptionRow,
+    TickRow,
+)
+
+Entry = tuple[str, int, int, int, Row]
+"""A row with its place: topic, log time and publish time (simulated ns), sequence number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What decides how a closing becomes rows: a function of the deployment."""
+
+    tick_ns: int
+    frames_every: int
+    base: Layout
+
+
+def plan_of(deployment: Deployment) -> Plan:
+    """Return the plan of a deployment's captures."""
+    return Plan(deployment.tick_ns, deployment.capture.frames_every, build_layout(deployment))
+
+
+def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
+    """Return the rows of one closing, in the order in which they are written.
+
+    `known` is the frame of the closing before, None at the start. The last closing of a run may bring a frame that is
+    known already: then its packets alone are new.
+    """
+    entries = world_rows(closing, plan, known)
+    for flight in closing.fates:
+        sent_ns, stamp_ns = flight.sent_ns, flight.stamp_ns
+        entries.append((PACKETS, sent_ns, stamp_ns or sent_ns, flight.sequence & 0xFFFF_FFFF, packet_row(flight)))
+    return entries
+
+
+def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
+    """Return the rows of one closing but for those of packets, which come behind them."""
+    frame = closing.frame
+    at_ns = frame.tick * plan.tick_ns
+    mark = frame.tick & 0xFFFF_FFFF
+    entries: list[Entry] = []
+    if known is None or known.tick != frame.tick:
+        if known is None or known.layout.digest != frame.layout.digest:
+            entries.append((LAYOUT, at_ns, at_ns, mark, layout_row(frame, plan.base)))
+        entries += [(CLIENTS, at_ns, at_ns, mark, row) for row in _client_rows(closing)]
+        entries += [_recovery_entry(entry, plan) for entry in closing.recovered]
+        entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
+        if known is None or frame.tick % plan.frames_every == 0:
+            entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
+    return entries
+
+
+def add_packets(
+    mcap: McapWriter,
+    channel: int,
+    flights: list[Flight],
+    encode: Callable[[Row], bytes],
+    kept: Callable[[Row], Row] | None,
+) -> None:
+    """Add the rows of packets to a file, as `encode` writes them; `kept` makes of a row what is kept of it.
+
+    The hot path: see the bench before changing it.
+    """
+    for flight in flights:
+        row: Row = packet_row(flight)
+        data = encode(row if kept is None else kept(row))
+        sent_ns, stamp_ns = flight.sent_ns, flight.stamp_ns
+        mcap.add_message(channel, sent_ns, stamp_ns or sent_ns, flight.sequence & 0xFFFF_FFFF, data)
+
+
+_FATES: Final[dict[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
+_LOSS: Final = int(Slot.LOSS)
+_JITTER: Final = int(Slot.JITTER)
+_ERROR: Final = int(Slot.ERROR)
+
+
+def packet_row(flight: Flight) -> PacketRow:
+    """Return the row of a packet whose fate is final, or that is in flight at the end."""
+    fate = _FATES.get(flight.cause, DROPPED)
+    on_its_way = flight.arrival_tick >= 0
+    slots, words, payload = flight.slots, flight.words, flight.payload
+    common = (
+        flight.source,
+        flight.sequence,
+        flight.copy,
+        flight.destination,
+        flight.channel,
+        flight.sent_ns,
+        flight.stamp_ns,
+        flight.due_ns if on_its_way else -1,
+        flight.arrival_tick,
+        fate,
+        flight.cause if fate is DROPPED else "",
+        flight.rule,
+        words[_LOSS].to_bytes(8).hex() if slots >> _LOSS & 1 else "",
+        words[_JITTER].to_bytes(8).hex() if slots >> _JITTER & 1 and on_its_way else "",
+        len(payload),
+        payload,
+        flight.released_wall_ns,
+        flight.radio,
+        flight.published,
+        flight.queue_bytes,
+        flight.queue_ns,
+        flight.access_ns,
+        flight.airtime_ns,
+        flight.propagation_ns,
+        flight.jitter_ns,
+        flight.held_ns,
+        flight.model_ns,
+        flight.phase_ns,
+        flight.is_bad,
+        flight.bits_flipped,
+        flight.rate_bps,
+    )
+    return PacketRow(*common, *_radio_inputs(flight)) if flight.radio else PacketRow(*common)
+
+
+def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
+    """Return what the stages of a radio found, in the order of a row."""
+    threshold, walls = flight.error_threshold, flight.walls
+    return (
+        flight.distance_mm,
+        list(walls) if walls else [],
+        flight.walls_cdb,
+        flight.path_loss_cdb,
+        flight.shadowing_cdb,
+        flight.fading_cdb,
+        flight.received_cdbm,
+        flight.snr_cdb,
+        level_cdbm(flight.interference) if flight.interference else 0,
+        threshold * 1_000_000 >> 64,
+        flight.words[_ERROR].to_bytes(8).hex() if threshold else "",
+        flight.contenders,
+        flight.retries,
+    )
+
+
+def _tick_row(closing: Closing) -> TickRow:
+    frame = closing.frame
+    return TickRow(
+        frame.tick,
+        closing.digest.hex(),
+        [frame.entity_digest(entity).hex() for entity in frame.layout.entities],
+        [edit_row(edit) for edit in closing.edits],
+        [
+            DeliveredRow(d.due_ns, d.source, d.sequence, d.copy, d.destination, d.channel, d.payload)
+            for d in closing.delivered
+        ],
+        closing.wall_ns,
+    )
+
+
+def epoch_entry(epoch: Epoch, plan: Plan) -> Entry:
+    """Return the row of an epoch, in its place."""
+    at_ns = epoch.tick * plan.tick_ns
+    owners = [OwnerRow(robot, node) for robot, node in epoch.owners]
+    row = EpochRow(epoch.tick, epoch.epoch, epoch.digest.hex(), list(epoch.roster), owners, epoch.arithmetic.hex())
+    return EPOCHS, at_ns, at_ns, epoch.tick & 0xFFFF_FFFF, row
+
+
+def _recovery_entry(entry: Recovered, plan: Plan) -> Entry:
+    """Return the row of a loss or return, at the tick behind which it was."""
+    at_ns = entry.tick * plan.tick_ns
+    row = RecoveryRow(entry.what, entry.name, entry.reason, entry.tick, entry.epoch, entry.outage_ns)
+    return RECOVERIES, at_ns, at_ns, entry.tick & 0xFFFF_FFFF, row
+
+
+def layout_row(frame: Frame, base: Layout) -> LayoutRow:
+    """Return the row of a frame's layout; `base` is the deployment's own."""
+    layout = frame.layout
+    return LayoutRow(
+        frame.tick,
+        layout.digest.hex(),
+        layout.size,
+        [EntityRow(e.name, e.model, e.start, e.split, e.stop) for e in layout.entities],
+        [AddedRow(e.name, e.model) for e in layout.entities if e.name not in base],
+    )
+
+
+def frame_row(frame: Frame) -> FrameRow:
+    """Return the row of a frame."""
+    return FrameRow(frame.tick, frame.values.tobytes(), [OutboxRow(*item) for item in frame.outboxes.items()])
+
+
+def _client_rows(closing: Closing) -> list[ClientRow]:
+    tick = closing.frame.tick
+    rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
+    for joining in closing.joins:
+        subscriptions = [SubscriptionRow(source, channel) for source, channel in joining.subscriptions]
+        rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions))
+    return rows
+
+
+def edit_row(edit: Edit) -> EditRow:
+    """Return the row of an edit."""
+    if isinstance(edit, Add):
+        return EditRow("add", edit.name, edit.model, position=list(edit.position), velocity=list(edit.velocity))
+    if isinstance(edit, Remove):
+        return EditRow("remove", edit.name)
+    if isinstance(edit, Push):
+        return EditRow("push", edit.name, impulse=list(edit.impulse))
+    if isinstance(edit, Disrupt):
+        return EditRow("network", "", event=edit.event)
+    return EditRow("freeze" if isinstance(edit, Freeze) else "thaw", edit.name)
+
+
