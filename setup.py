@@ -20,9 +20,10 @@ from setuptools.errors import BaseError, CCompilerError
 
 COMPILED: Final = {
     "protocol": ("draws", "scene"),
+    "rehearsal": ("whatif", "whatif_reading"),
     "vhub": (
-        *("air", "budget", "fabric", "geometry", "links", "mcap_writer", "packet", "propagation", "rays", "room"),
-        *("sendings", "setup", "state", "to_rows", "world"),
+        *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "numbers", "packet"),
+        *("propagation", "rays", "room", "sendings", "setup", "state", "to_rows", "world"),
     ),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss"),

@@ -4,12 +4,14 @@ Four free-running clients send to the table's robots over the table's links (del
 each tick. `radio` is captured, too: there they send by Wi-Fi with fading among the shelves and walls of the warehouse,
 in each tick to twelve of its rovers, which drive, and once to one another; the air has room for that. What they and the
 world say is encoded before the clock runs; reading it, judging, the record, the deliveries and, at the end, the
-finished capture are in the time. Whatever was sent and has no fate, or a fate and no row, is lost. Neighbours:
-`foosim.vhub.core`, `foosim.vhub.capture_writer`, `verdict` (a verdict alone).
+finished capture are in the time; garbage is collected as seldom as in the hub's process. Whatever was sent and has no
+fate, or a fate and no row, is lost.
+Neighbours: `foosim.vhub.core`, `foosim.vhub.capture_writer`, `verdict` (a verdict alone).
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import tempfile
 import time
@@ -26,6 +28,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.journal import Journal
+from foosim.protocol.loop import collect_seldom
 from foosim.protocol.messages import (
     Build,
     ClientHello,
@@ -76,7 +79,12 @@ def hub(seconds: float = 2.0) -> list[HubRate]:
     ticks = max(2, round(seconds * 500))
     table, hall = _table(ticks), _warehouse(ticks)
     ways = (("judged", table), ("journalled", table), ("captured", table), ("radio", hall))
-    return [_measure(way, load) for way, load in ways]
+    thresholds = gc.get_threshold()
+    collect_seldom()
+    rates = [_measure(way, load) for way, load in ways]
+    gc.unfreeze()
+    gc.set_threshold(*thresholds)
+    return rates
 
 
 @dataclass(frozen=True, slots=True)

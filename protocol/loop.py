@@ -31,6 +31,13 @@ NEVER_NS: Final = 2**63 - 1
 _LEVELS: Final = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
+def collect_seldom() -> None:
+    """What is loaded by now stays: collections of garbage need not walk through it, nor come every few ticks."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*GC_THRESHOLDS)
+
+
 class Wire:
     """One process on one plane: reads and publishes by the table of channels, under its own name."""
 
@@ -159,10 +166,7 @@ class Loop:
 
     def run(self, until: Callable[[], bool]) -> None:
         """Go round until `until` says so; `Inbox.wake` makes it look."""
-        # What is loaded by now stays: collections need not walk through it, nor come every few ticks.
-        gc.collect()
-        gc.freeze()
-        gc.set_threshold(*GC_THRESHOLDS)
+        collect_seldom()
         self.notify.ready(time.monotonic_ns())
         while not until():
             self.go_round()

@@ -6,7 +6,7 @@ its share is dropped. A function of what arrives alone. Neighbours: `state` asks
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 from foosim.vhub.packet import Flight, size_of
 
@@ -17,19 +17,25 @@ class Room:
     `is_shared`: all of them are one receiver, since one message goes to all.
     """
 
-    def __init__(self, flights: Iterable[Flight], bytes_max: int, *, is_shared: bool) -> None:
+    def __init__(self, flights: Sequence[Flight], bytes_max: int, *, is_shared: bool) -> None:
         self._is_shared = is_shared
+        self._left: dict[tuple[str, str], int] = {}
+        """Where too much arrives: what each source has left of its share."""
+        whole = 0
+        for flight in flights:
+            whole += size_of(flight)
+        if whole > bytes_max:
+            self._share(flights, bytes_max)
+
+    def _share(self, flights: Sequence[Flight], bytes_max: int) -> None:
+        """Find out to whom too much comes, and from whom."""
         wanted: dict[str, dict[str, int]] = {}
         for flight in flights:
-            of_receiver = wanted.setdefault("" if is_shared else flight.destination, {})
+            of_receiver = wanted.setdefault("" if self._is_shared else flight.destination, {})
             of_receiver[flight.source] = of_receiver.get(flight.source, 0) + size_of(flight)
-        self._left = {
-            (receiver, source): bytes_max // len(of_receiver)
-            for receiver, of_receiver in wanted.items()
-            if sum(of_receiver.values()) > bytes_max
-            for source in of_receiver
-        }
-        """Where too much arrives: what each source has left of its share."""
+        for receiver, of_receiver in wanted.items():
+            if sum(of_receiver.values()) > bytes_max:
+                self._left.update({(receiver, source): bytes_max // len(of_receiver) for source in of_receiver})
 
     def takes(self, flight: Flight) -> bool:
         """Whether a flight is taken."""
