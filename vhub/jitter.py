@@ -98,12 +98,13 @@ class _Gamma:
         return total * power, self._density
 
 
-ENDS: Final = (2.0**-20, 1.0 - 2.0**-20)
+FIRST: Final = 2.0**-20
+LAST: Final = 1.0 - FIRST
 """The probabilities of the first and last quantile: those at 0 and 1 would be 0 and infinite."""
 
 
 def _probabilities() -> tuple[float, ...]:
-    return ENDS[0], *(cell / CELLS for cell in range(1, CELLS)), ENDS[1]
+    return FIRST, *(cell / CELLS for cell in range(1, CELLS)), LAST
 
 
 _ANY_JITTER: Final[TypeAdapter[Jitter]] = TypeAdapter(Jitter)
@@ -131,7 +132,7 @@ def _quantiles_of(text: bytes, table: tuple[int, ...]) -> tuple[int, ...]:
 
 def _aboves(halves: int) -> Iterator[float]:
     """Yield the probability of more than each quantile of a heavy tail, all of them exact."""
-    yield 1.0 - ENDS[0]
+    yield 1.0 - FIRST
     yield from ((CELLS - cell) / CELLS for cell in range(1, TAIL_CELL))
     for half in range(halves):
         yield from (2.0 ** -(4 + half) * (1.0 - place / (2 * HALF_CELLS)) for place in range(HALF_CELLS))

@@ -1,6 +1,7 @@
 """How a closing becomes the rows of a capture, and how those of packets become messages in its file.
 
-`rows_of` is pure, so what the writer missed can be made again from a fold of the journal (`records.fold`).
+All rows are pure functions of closings, so what the writer missed can be made again from a fold of the journal
+(`records.fold`).
 Neighbours: `rows` (the types), `capture_file` (writes what is made here).
 """
 
@@ -62,21 +63,12 @@ def plan_of(deployment: Deployment) -> Plan:
     return Plan(deployment.tick_ns, deployment.capture.frames_every, build_layout(deployment))
 
 
-def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
-    """Return the rows of one closing, in the order in which they are written.
+def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
+    """Return the rows of one closing but for those of packets (`packet_entry`), which are written behind them.
 
     `known` is the frame of the closing before, None at the start. The last closing of a run may bring a frame that is
     known already: then its packets alone are new.
     """
-    entries = world_rows(closing, plan, known)
-    for flight in closing.fates:
-        sent_ns, stamp_ns = flight.sent_ns, flight.stamp_ns
-        entries.append((PACKETS, sent_ns, stamp_ns or sent_ns, flight.sequence & 0xFFFF_FFFF, packet_row(flight)))
-    return entries
-
-
-def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
-    """Return the rows of one closing but for those of packets, which come behind them."""
     frame = closing.frame
     at_ns = frame.tick * plan.tick_ns
     mark = frame.tick & 0xFFFF_FFFF
@@ -104,10 +96,14 @@ def add_packets(
     The hot path: see the bench before changing it.
     """
     for flight in flights:
-        row: Row = packet_row(flight)
-        data = encode(row if kept is None else kept(row))
-        sent_ns, stamp_ns = flight.sent_ns, flight.stamp_ns
-        mcap.add_message(channel, sent_ns, stamp_ns or sent_ns, flight.sequence & 0xFFFF_FFFF, data)
+        _, log_ns, publish_ns, sequence, row = packet_entry(flight)
+        mcap.add_message(channel, log_ns, publish_ns, sequence, encode(row if kept is None else kept(row)))
+
+
+def packet_entry(flight: Flight) -> Entry:
+    """Return the row of a packet, in its place."""
+    sent_ns, stamp_ns = flight.sent_ns, flight.stamp_ns
+    return PACKETS, sent_ns, stamp_ns or sent_ns, flight.sequence & 0xFFFF_FFFF, packet_row(flight)
 
 
 _FATES: Final[dict[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}

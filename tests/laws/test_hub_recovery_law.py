@@ -24,7 +24,7 @@ from foosim.rehearsal.system import Settings, System
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import RECOVERIES
-from foosim.vhub.to_rows import plan_of, rows_of
+from foosim.vhub.to_rows import packet_entry, plan_of, world_rows
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 240
@@ -60,7 +60,7 @@ class Seen:
         known = None
         plan = plan_of(DEPLOYMENT)
         for closing in self.closings:
-            for topic, at_ns, _, number, row in rows_of(closing, plan, known):
+            for topic, at_ns, _, number, row in (*world_rows(closing, plan, known), *map(packet_entry, closing.fates)):
                 fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
                 if topic != RECOVERIES:
                     rows.append((topic, at_ns, number, fields))

@@ -20,7 +20,7 @@ from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify_capture
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import EPOCHS, RECOVERIES
-from foosim.vhub.to_rows import plan_of, rows_of
+from foosim.vhub.to_rows import packet_entry, plan_of, world_rows
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 160
@@ -57,7 +57,7 @@ def rows_in(closings: Sequence[Closing]) -> list[Any]:
     rows: list[Any] = []
     known = None
     for closing in closings:
-        for topic, at_ns, _, number, row in rows_of(closing, PLAN, known):
+        for topic, at_ns, _, number, row in (*world_rows(closing, PLAN, known), *map(packet_entry, closing.fates)):
             fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
             if topic not in (RECOVERIES, EPOCHS):
                 rows.append((topic, at_ns, number, fields))

@@ -13,14 +13,14 @@ import pytest
 from foosim.protocol import limits
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, chain_next
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next
 from foosim.protocol.journal import Journal, journal_files, read_journal, read_records
 from foosim.protocol.messages import Deliveries, Down
 from foosim.vhub.keeping import Keep, KeepEpoch
-from foosim.vhub.records import HeadRecord, HubRecord, InputsRecord, TickRecord, fold
+from foosim.vhub.records import Closing, HeadRecord, HubRecord, InputsRecord, TickRecord, fold
 from foosim.vhub.resume import Captured, recall
 from foosim.vhub.state import HubState
-from foosim.vhub.to_rows import plan_of, rows_of
+from foosim.vhub.to_rows import Entry, Plan, packet_entry, plan_of, world_rows
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -37,6 +37,10 @@ def head_of(run: HubRun, tick: int) -> bytes:
     for closing in run.closings[1 : tick + 1]:
         chain = chain_next(chain, closing.digest)
     return encode(HeadRecord("run-1", run.snapshots[tick], added, record.commit, epoch, chain=chain))
+
+
+def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
+    return [*world_rows(closing, plan, known), *map(packet_entry, closing.fates)]
 
 
 def without_wall(row: msgspec.Struct) -> dict[str, object]:
