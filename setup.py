@@ -20,7 +20,7 @@ from setuptools.errors import BaseError
 
 COMPILED: Final = {
     "protocol": ("draws", "scene"),
-    "vhub": ("air", "budget", "fabric", "geometry", "links", "propagation", "rays", "setup", "world"),
+    "vhub": (*("air", "budget", "fabric", "geometry", "links", "propagation", "rays", "setup", "solids", "world"),),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss"),
         *("shadowing", "timings"),

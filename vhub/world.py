@@ -12,9 +12,9 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.network import Network
 from foosim.protocol.rovers import RoverRobot
-from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate, velocity
+from foosim.protocol.scene import ORIGIN, Body, Pose, Vector, forward_kinematics, rotate, velocity
 from foosim.protocol.scenes import build_scene
-from foosim.vhub.geometry import Crossing, LineOfSight, Sight
+from foosim.vhub.geometry import Crossing, LineOfSight, Sight, Trace
 
 
 class World:
@@ -30,7 +30,6 @@ class World:
         self._bodies: dict[str, Body] = {}
         self._poses: dict[str, Pose | None] = {}
         self._standing: dict[str, Vector] = {}
-        self._antennas: dict[tuple[str, Vector], Vector] = {}
         self._fixed: dict[tuple[str, Vector], Vector] = {}
         """Antennas of endpoints without a body, in all frames of a layout."""
         self._down: dict[str, bool] = {}
@@ -44,7 +43,6 @@ class World:
                 self._fixed.clear()
             self._frame, self._sight = frame, None
             self._poses.clear()
-            self._antennas.clear()
             self._down.clear()
             self.turns += 1
 
@@ -62,20 +60,20 @@ class World:
         return found
 
     def antenna(self, endpoint: str, mount: Vector) -> Vector:
-        """Return the place (m, world frame) of an antenna: `mount` beside its body's own antenna, in the body's frame.
-        """
+        """Return the place (m, world frame) of an antenna: `mount` beside its body's own one, in the body's frame."""
         key = endpoint, mount
-        found = self._antennas.get(key) or self._fixed.get(key)
+        found = self._fixed.get(key)
         if found is None:
             body = self.body(endpoint)
             pose = self._pose(body)
-            position, orientation, own = self._place(endpoint), UPRIGHT, ORIGIN
             if pose is not None:
-                _, position, orientation = pose
-                own = self._bodies[body].antenna
-            x, y, z = rotate(orientation, (own[0] + mount[0], own[1] + mount[1], own[2] + mount[2]))
-            found = position[0] + x, position[1] + y, position[2] + z
-            (self._fixed if pose is None else self._antennas)[key] = found
+                _, (px, py, pz), orientation = pose
+                (ox, oy, oz), (mx, my, mz) = self._bodies[body].antenna, mount
+                x, y, z = rotate(orientation, (ox + mx, oy + my, oz + mz))
+                return px + x, py + y, pz + z
+            px, py, pz = self._place(endpoint)
+            x, y, z = mount
+            found = self._fixed[key] = px + x, py + y, pz + z
         return found
 
     def velocity(self, endpoint: str) -> Vector:
@@ -114,12 +112,17 @@ class World:
             found = self._standing[endpoint] = x, y, z
         return found
 
-    def crossings(self, a: Vector, b: Vector, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
-        """Return what the line between two places crosses, some bodies aside."""
+    def crossings(
+        self, a: Vector, b: Vector, ignoring: frozenset[str], trace: Trace | None = None
+    ) -> tuple[Crossing, ...]:
+        """Return what the line between two places crosses, some bodies aside.
+
+        `trace` is what who asks remembers of the line, if it asks in each frame.
+        """
         if self._frame is None:
             return ()
         if self._sight is None:
             if self._sights is None:
                 self._sights = LineOfSight(self._deployment)
             self._sight = self._sights.at(self._frame)
-        return self._sight.look((a, b) if a <= b else (b, a), ignoring)
+        return self._sight.look((a, b) if a <= b else (b, a), ignoring, Trace() if trace is None else trace)
