@@ -39,11 +39,12 @@ from foosim.protocol.scenes import build_scene
 from foosim.vhub.rays import MARGIN_M, Pillar, Triangles, boxes_around, boxes_met_by, pillars_met_by
 from foosim.vhub.solids import BOX, CYLINDER, MESH, SPHERE, Line, Piece, Solid, chord_of, joined, ray_of
 
+REACH_M: Final = 0.5
+"""Of a line it is remembered what of the scenery may be there as long as no end has moved further along an axis."""
 CELL_M: Final = 1.0
-"""Of lines that begin in one cell of this size and end in another it is remembered what of the scenery may be there."""
+"""What is remembered of a line is found by the cells of this size that its ends are in."""
 PAIRS_KEPT: Final = 4096
-"""Pairs of ends, and of cells, of which it is remembered what of the scenery is between them, at least."""
-
+"""Pairs of cells of which it is remembered, at least."""
 UNKNOWN: Vector = (inf, inf, inf)
 """In place of a place: nothing is there."""
 
@@ -163,19 +164,34 @@ class _Memory(Generic[K, V]):
 
 
 class Trace:
-    """What is remembered of a line whose ends move now and then: the scenery near its cells, and what it crosses."""
+    """What is remembered of a line whose ends move: what of the scenery is near, and what of it the line crosses."""
 
-    __slots__ = ("cell_a", "cell_b", "crossed", "line", "near")
+    __slots__ = ("a", "b", "crossed", "line", "near", "still")
 
     def __init__(self) -> None:
-        self.cell_a = self.cell_b = UNKNOWN
+        self.still: Still | None = None
+        """The scenery that all of it is about."""
+        self.a = self.b = UNKNOWN
+        """Where the ends were when `near` was found."""
         self.near: list[Solid] = []
         self.line: Line = (UNKNOWN, UNKNOWN)
         self.crossed: tuple[Crossing, ...] = ()
 
+    def covers(self, line: Line) -> bool:
+        """Whether all of the scenery that a line may cross is in `near`."""
+        ((ax, ay, az), (bx, by, bz)), (x, y, z), (u, v, w) = line, self.a, self.b
+        return (
+            abs(ax - x) <= REACH_M
+            and abs(ay - y) <= REACH_M
+            and abs(az - z) <= REACH_M
+            and abs(bx - u) <= REACH_M
+            and abs(by - v) <= REACH_M
+            and abs(bz - w) <= REACH_M
+        )
+
 
 class Still:
-    """The scenery, and what of it lies between pairs of cells that were asked for lately."""
+    """The scenery, and what is remembered of lines through it that nobody else remembers."""
 
     def __init__(self, shapes: Sequence[Shape]) -> None:
         self.shapes = shapes
@@ -183,31 +199,26 @@ class Still:
         opaque = [shape for shape in shapes if not shape.radio.is_transparent]
         self.solids = self.groups.solids(opaque)
         boxes = [shape_box(shape) for shape in opaque]
-        # A line from cell to cell is within half a cell of the line between their middles.
-        self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes], CELL_M / 2 + MARGIN_M)
-        self.traces = _Memory[Line, Trace]()
-        """Of lines that nobody else remembers."""
-        self._near = _Memory[Line, list[Solid]]()
+        self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes], REACH_M + MARGIN_M)
+        self._traces = _Memory[Line, Trace]()
 
-    def _between(self, cells: Line) -> list[Solid]:
-        """Return what of the scenery lines from one cell to another may cross."""
-        found = self._near.known(cells)
+    def trace(self, line: Line) -> Trace:
+        """Return what is remembered of lines from cell to cell."""
+        (ax, ay, az), (bx, by, bz) = line
+        cells = (ax // CELL_M, ay // CELL_M, az // CELL_M), (bx // CELL_M, by // CELL_M, bz // CELL_M)
+        found = self._traces.known(cells)
         if found is None:
-            (ax, ay, az), (bx, by, bz) = cells
-            middle_a = (ax + 0.5) * CELL_M, (ay + 0.5) * CELL_M, (az + 0.5) * CELL_M
-            middle_b = (bx + 0.5) * CELL_M, (by + 0.5) * CELL_M, (bz + 0.5) * CELL_M
-            found = [self.solids[index] for index in boxes_met_by(self._boxes, (middle_a, middle_b))]
-            self._near.keep(cells, found)
+            found = Trace()
+            self._traces.keep(cells, found)
         return found
 
     def crossed(self, line: Line, trace: Trace) -> tuple[Crossing, ...]:
-        """Return what a line crosses of the scenery; `trace` is what is remembered of it."""
-        if trace.line != line:
-            (ax, ay, az), (bx, by, bz) = line
-            cell_a, cell_b = (ax // CELL_M, ay // CELL_M, az // CELL_M), (bx // CELL_M, by // CELL_M, bz // CELL_M)
-            if trace.cell_a != cell_a or trace.cell_b != cell_b:
-                trace.cell_a, trace.cell_b = cell_a, cell_b
-                trace.near = self._between((cell_a, cell_b))
+        """Return what a line crosses of the scenery; `trace` is what is remembered of it, or of one like it."""
+        if trace.still is not self or trace.line != line:
+            if trace.still is not self or not trace.covers(line):
+                trace.still = self
+                trace.a, trace.b = line
+                trace.near = [self.solids[index] for index in boxes_met_by(self._boxes, line)]
             trace.crossed = tuple(self.groups.crossings(line, trace.near)) if trace.near else ()
             trace.line = line
         return trace.crossed
@@ -309,11 +320,7 @@ class Sight:
         key = line, frozenset(ignoring)
         found = self._found.get(key)
         if found is None:
-            traces = self._geometry.still.traces
-            trace = traces.known(line)
-            if trace is None:
-                trace = Trace()
-                traces.keep(line, trace)
+            trace = self._geometry.still.trace(line)
             found = self._found[key] = self.look(line, key[1], trace)
         return found
 

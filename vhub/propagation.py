@@ -33,6 +33,8 @@ BLOCKED: Final = "blocked"
 OUT_OF_RANGE: Final = "out_of_range"
 NEVER_CDB: Final = 10**6
 """A loss that nothing gets over."""
+LOSS_MAX_DB: Final = 400
+"""More than this is not told from it, where it is asked whether no more is lost."""
 
 
 def _distance_m(a: Vector, b: Vector) -> float:
@@ -157,8 +159,9 @@ class Propagation:
         self._places: dict[str, Place] = {}
         """Of each endpoint, the newest that somebody has asked for."""
         self._ways: dict[tuple[str, str], _Way] = {}
-        self._reaches: dict[int, float] = {}
-        """The square of the distance (m2) within which walls and distance take no more than so many dB."""
+        self._reaches = [-1.0] * (LOSS_MAX_DB + 1)
+        """The square of the distance (m2) within which walls and distance take no more than so many dB; below 0 before
+        somebody has asked."""
 
     def place(self, endpoint: str) -> Place:
         """Return where an endpoint's antenna is."""
@@ -247,8 +250,11 @@ class Propagation:
     def _is_near(self, one: Place, other: Place, loss_cdb: int) -> bool:
         """Whether it is sure, by a bound that costs little, that no more is lost between two places than that."""
         left_db = int((loss_cdb - self._share_cdb(one) - self._share_cdb(other)) // 100.0)
-        square = self._reaches.get(left_db)
-        if square is None:
+        if left_db < 0:
+            return False
+        left_db = min(left_db, LOSS_MAX_DB)
+        square = self._reaches[left_db]
+        if square < 0.0:
             reach_m = range_m(self._environment, left_db, self._frequency_hz, 0.0, 0.0, nlos=True)
             square = self._reaches[left_db] = reach_m * reach_m
         (ax, ay, az), (bx, by, bz) = one.at, other.at
