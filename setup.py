@@ -23,15 +23,15 @@ COMPILED: Final = {
     "rehearsal": ("whatif", "whatif_reading"),
     "vhub": (
         *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "numbers", "packet"),
-        *("propagation", "rays", "room", "sendings", "setup", "state", "to_rows", "world"),
+        *("propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "world"),
     ),
     "vhub/radio": (
-        *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss"),
-        *("shadowing", "timings"),
+        *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss", "shadowing"),
+        *("timings",),
     ),
     "vhub/stages": (
-        *("__init__", "admit", "capacity", "channel", "delay", "duty", "mangle", "medium", "own", "policy"),
-        *("queue", "receiver", "residual", "stage"),
+        *("__init__", "admit", "capacity", "channel", "delay", "duty", "mangle", "medium", "own", "policy", "queue"),
+        *("receiver", "residual", "stage"),
     ),
 }
 """Modules by folder. Types of messages and rows stay as they are: those of msgspec are compiled already."""

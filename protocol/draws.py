@@ -8,13 +8,15 @@ are named and permanent (`Slot`): switching one impairment on shifts no other.
 
 import struct
 from enum import IntEnum
-from functools import lru_cache
 from hashlib import blake2b
 from statistics import NormalDist
 from typing import Final
 
-_WORDS = struct.Struct("<8Q")
-_COUNTERS = struct.Struct("<QQ")
+_AS_WORDS: Final = struct.Struct("<8Q").unpack
+_OF_COUNTERS: Final = struct.Struct("<QQ").pack
+_KEYED: Final[dict[bytes, blake2b]] = {}
+"""What has taken in a key: a copy of it costs half of what a new one does."""
+_KEYED_MAX: Final = 65_536
 _NORMAL = NormalDist()
 
 HALF_WORD: Final = 2**-53
@@ -43,17 +45,16 @@ def draw_key(seed: int, *purpose: str) -> bytes:
     return hasher.digest()
 
 
-@lru_cache(maxsize=65_536)
-def _keyed(key: bytes) -> blake2b:
-    """A hash that has taken in the key: a copy of it costs half of what a new one does."""
-    return blake2b(key=key)
-
-
 def draw_words(key: bytes, counter: int, copy: int = 0) -> tuple[int, ...]:
     """Return the eight 64-bit words of `counter` (and `copy`) under `key`."""
-    hasher = _keyed(key).copy()
-    hasher.update(_COUNTERS.pack(counter, copy))
-    return _WORDS.unpack(hasher.digest())
+    keyed = _KEYED.get(key)
+    if keyed is None:
+        if len(_KEYED) >= _KEYED_MAX:
+            _KEYED.clear()
+        keyed = _KEYED[key] = blake2b(key=key)
+    hasher = keyed.copy()
+    hasher.update(_OF_COUNTERS(counter, copy))
+    return _AS_WORDS(hasher.digest())
 
 
 def unit_interval(word: int) -> float:

@@ -21,7 +21,7 @@ from foosim.protocol.network import EVENTS_MAX
 from foosim.supervisor.requests import ANSWERS_KEPT
 from foosim.vhub.geometry import PAIRS_KEPT, Sight
 from foosim.vhub.memory import AirState, LinkState, RadioState
-from foosim.vhub.propagation import PLACES_KEPT
+from foosim.vhub.radio.shadowing import CELLS_KEPT
 
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {
@@ -34,8 +34,8 @@ BOUNDS: Final[Mapping[str, int]] = {
     "_Memory._newer": PAIRS_KEPT,
     "_Memory._older": PAIRS_KEPT,
     "Propagation._ways": limits.CLIENTS_MAX,  # a pair that talks, or hears
-    "Propagation._bounds": 2 * PLACES_KEPT,
-    "Propagation._shares": 2 * PLACES_KEPT,
+    "Propagation._places": limits.CLIENTS_MAX,
+    "_Lattice._cells": CELLS_KEPT,
     "Fabric.states": limits.CLIENTS_MAX,
     "Fabric._links": limits.CLIENTS_MAX,
     "Fabric.radios": limits.CLIENTS_MAX,

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from foosim.protocol.scene import Vector
 from foosim.vhub.memory import AirState, Transmission
 from foosim.vhub.packet import Flight
 from foosim.vhub.propagation import Propagation
@@ -71,7 +70,7 @@ class Air:
 
         It waits for all that it hears; who has something queued or on air when it is ready contends.
         """
-        place = of.antenna(source)
+        place = of.place(source)
         start_ns = ready_ns
         heard: set[str] = set()
         for known in self.state.on_air:
@@ -79,7 +78,7 @@ class Air:
             if until_ns <= ready_ns or other == source:
                 continue
             if other not in heard:
-                if not of.hears(known.position, place, other, source, known.power_cdbm):
+                if not of.hears(of.place_at(other, known.position), place, known.power_cdbm):
                     continue
                 heard.add(other)
             start_ns = max(start_ns, until_ns)
@@ -110,9 +109,9 @@ class Air:
         return self._heard[-1]
 
 
-def _power_cdbm(known: Transmission, at: str, place: Vector, of: Propagation) -> int:
+def _power_cdbm(known: Transmission, at: str, of: Propagation) -> int:
     """Return with which power an endpoint hears a transmission."""
-    path = of.path(known.position, place, known.source, at)
+    path = of.path(of.place_at(known.source, known.position), of.place(at))
     return NOTHING_CDBM if path.cause else known.power_cdbm + of.gain_cdb - path.loss_cdb
 
 
@@ -121,7 +120,7 @@ def _spoil(flight: Flight, known: Transmission, of: Propagation) -> None:
     if known.source == flight.destination:
         flight.interference = DEAF
         return
-    power_cdbm = _power_cdbm(known, flight.destination, of.antenna(flight.destination), of)
+    power_cdbm = _power_cdbm(known, flight.destination, of)
     if power_cdbm <= of.noise_cdbm - NEGLIGIBLE_CDB:
         return
     if flight.interference < DEAF:

@@ -34,19 +34,19 @@ class Budget:
         """Return the way between the ends as they are in the newest frame."""
         if self._turns != self._world.turns:
             of, source, destination = self.propagation, self._source, self._destination
-            self._path = of.path(of.antenna(source), of.antenna(destination), source, destination)
+            self._path = of.path(of.place(source), of.place(destination))
             self._turns = self._world.turns
         return self._path
 
     def measure(self, flight: Flight) -> str:
         """Write what the receiver gets; return why it gets nothing, or an empty string."""
-        distance_mm, walls, walls_cdb, loss_cdb, shadowing_cdb, cause = self.path()
-        flight.distance_mm, flight.walls, flight.walls_cdb = distance_mm, walls, walls_cdb
+        path, of = self.path(), self.propagation
+        distance_mm, loss_cdb = path.distance_mm, path.loss_cdb
+        flight.distance_mm, flight.walls, flight.walls_cdb = distance_mm, path.walls, path.walls_cdb
         flight.propagation_ns = int(distance_mm / self._speed_mm_ns)
-        if cause:
-            return cause
-        of = self.propagation
-        flight.shadowing_cdb = shadowing_cdb
+        if path.cause:
+            return path.cause
+        flight.shadowing_cdb = path.shadowing_cdb
         if self._fading is not None:
             flight.fading_cdb = self._fade(self._fading, flight.sent_ns, distance_mm)
             loss_cdb -= flight.fading_cdb

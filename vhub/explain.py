@@ -329,7 +329,7 @@ class _Story:
         self.fabric.turn_to(frame)
         of, world = budget.propagation, self.fabric.world
         ends = frozenset((world.body(row.source), world.body(row.destination)))
-        a, b = sorted((of.antenna(row.source), of.antenna(row.destination)))
+        a, b = sorted((of.place(row.source).at, of.place(row.destination).at))
         crossings = world.crossings(a, b, ends)
         known = [(crossing.name, of.taken_db(crossing, a, b, ends)) for crossing in crossings]
         total = round(sum(loss_db for _, loss_db in known) * 100.0)

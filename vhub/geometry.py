@@ -10,16 +10,16 @@ line is asked for. Neighbours: `rays` (lines and shapes), `protocol.scene` (what
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from math import sqrt
+from math import inf, sqrt
 from typing import Final, Generic, NamedTuple, TypeVar
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
+from foosim.protocol.mesh import Mesh
 from foosim.protocol.radio_materials import RadioMaterial
 from foosim.protocol.scene import (
     ORIGIN,
-    UPRIGHT,
     Body,
     Box,
     Cylinder,
@@ -31,39 +31,25 @@ from foosim.protocol.scene import (
     Vector,
     enclosing,
     forward_kinematics,
-    place,
     rotate,
     shape_box,
     swept_box,
 )
 from foosim.protocol.scenes import build_scene
-from foosim.vhub.rays import (
-    MARGIN_M,
-    Pillar,
-    Span,
-    Triangles,
-    box_span,
-    boxes_around,
-    boxes_met_by,
-    cylinder_span,
-    pillar_around,
-    pillars_met_by,
-    sphere_span,
-)
+from foosim.vhub.rays import MARGIN_M, Pillar, Triangles, boxes_around, boxes_met_by, pillars_met_by
+from foosim.vhub.solids import BOX, CYLINDER, MESH, SPHERE, Line, Piece, Solid, chord_of, joined, ray_of
 
-TOUCH_M: Final = 1e-9
-"""A way through something that is no longer than this is a touch; shapes of one thing this close are one."""
-CELL_M: Final = 0.5
-"""Of lines that begin in one cell of this size and end in another it is remembered what of the scenery may be there."""
+REACH_M: Final = 0.5
+"""Of a line it is remembered what of the scenery may be there as long as no end has moved further along an axis."""
+CELL_M: Final = 1.0
+"""What is remembered of a line is found by the cells of this size that its ends are in."""
 PAIRS_KEPT: Final = 4096
-"""Pairs of ends, and of cells, of which it is remembered what of the scenery is between them, at least."""
+"""Pairs of cells of which it is remembered, at least."""
+UNKNOWN: Vector = (inf, inf, inf)
+"""In place of a place: nothing is there."""
 
-Line = tuple[Vector, Vector]
-"""Two ends in the world frame (m)."""
 Key = tuple[Line, frozenset[str]]
 """A line from its lesser end, and the bodies that are ignored."""
-Piece = list[Span]
-"""Where a line is inside of something that counts as one, in order."""
 
 
 class Crossing(NamedTuple):
@@ -80,77 +66,6 @@ class Crossing(NamedTuple):
     exit_m: float = 0.0
 
 
-class _Ray(NamedTuple):
-    """A line from its lesser end: start, unit direction, length."""
-
-    start: Vector
-    way: Vector
-    length: float
-
-
-def _ray(line: Line) -> _Ray:
-    """Return a line as a ray; one without a length has no direction."""
-    (ax, ay, az), (bx, by, bz) = line
-    x, y, z = bx - ax, by - ay, bz - az
-    length = sqrt(x * x + y * y + z * z)
-    way = (x / length, y / length, z / length) if length > 0.0 else ORIGIN
-    return _Ray(line[0], way, length)
-
-
-class _Solid:
-    """A shape as rays meet it, in the world or in its link; `group` is the number of its name and material."""
-
-    __slots__ = ("back", "group", "position", "shape", "triangles")
-
-    def __init__(
-        self, shape: Shape, group: int, triangles: Triangles | None, position: Vector, orientation: Quaternion
-    ) -> None:
-        self.shape, self.group, self.triangles, self.position = shape, group, triangles, position
-        x, y, z, w = orientation
-        self.back = None if orientation == UPRIGHT else (-x, -y, -z, w)
-
-    def placed(self, position: Vector, orientation: Quaternion) -> _Solid:
-        """Return it in the world, where its link has this pose."""
-        return _Solid(self.shape, self.group, self.triangles, *place(self.shape, position, orientation))
-
-    def pieces(self, ray: _Ray) -> Sequence[Piece]:
-        """Return where a ray is inside of it; of a mesh that is not closed, each wall that it passes is a piece."""
-        (x, y, z), way, length = ray
-        px, py, pz = self.position
-        start = (x - px, y - py, z - pz)
-        if self.back is not None:
-            start, way = rotate(self.back, start), rotate(self.back, way)
-        if self.triangles is not None:
-            return self._through_mesh(self.triangles, start, way, length)
-        geometry = self.shape.geometry
-        span: Span | None
-        if isinstance(geometry, Box):
-            span = box_span(start, way, geometry.half)
-        elif isinstance(geometry, Cylinder):
-            span = cylinder_span(start, way, geometry.radius, geometry.length / 2)
-        else:
-            assert isinstance(geometry, Sphere), geometry
-            span = sphere_span(start, way, geometry.radius)
-        inside = None if span is None else _within(span, length)
-        return () if inside is None else ([inside],)
-
-    @staticmethod
-    def _through_mesh(triangles: Triangles, start: Vector, way: Vector, length: float) -> list[Piece]:
-        hits = triangles.hits(start, way)
-        if not triangles.is_closed:
-            return [[(hit, hit)] for hit in hits if 0.0 < hit < length]
-        spans = (_within(span, length) for span in zip(hits[::2], hits[1::2], strict=False))
-        inside = [span for span in spans if span is not None]
-        return [inside] if inside else []
-
-
-def _within(span: Span, length: float) -> Span | None:
-    """Return the part of a span that lies between the two ends."""
-    enter = span[0] if span[0] > 0.0 else 0.0  # three times as fast as max
-    leave = span[1] if span[1] < length else length
-    return (enter, leave) if leave - enter > TOUCH_M else None
-
-
 class _Groups:
     """Names and materials of which shapes that overlap count as one."""
 
@@ -159,13 +74,21 @@ class _Groups:
         self._named: list[tuple[str, RadioMaterial]] = []
         self._meshes: dict[bytes, Triangles] = {}
 
-    def solids(self, shapes: Iterable[Shape], body: str | None = None) -> list[_Solid]:
-        """Return shapes of a body, or of the scenery, as solids; what is transparent is none."""
-        return [
-            _Solid(shape, self._number(shape, body), self._prepared(shape), shape.position, shape.orientation)
-            for shape in shapes
-            if not shape.radio.is_transparent
-        ]
+    def solids(self, shapes: Iterable[Shape], body: str | None = None) -> list[Solid]:
+        """Return shapes of a body, or of the scenery, as solids."""
+        return [self._solid(shape, self._number(shape, body)) for shape in shapes]
+
+    def _solid(self, shape: Shape, group: int) -> Solid:
+        geometry, position, orientation = shape.geometry, shape.position, shape.orientation
+        if isinstance(geometry, Box):
+            return Solid(BOX, geometry.half, None, group, position, orientation)
+        if isinstance(geometry, Cylinder):
+            half = geometry.radius, geometry.radius, geometry.length / 2
+            return Solid(CYLINDER, half, None, group, position, orientation)
+        if isinstance(geometry, Sphere):
+            half = geometry.radius, geometry.radius, geometry.radius
+            return Solid(SPHERE, half, None, group, position, orientation)
+        return Solid(MESH, ORIGIN, self._prepared(geometry), group, position, orientation)
 
     def _number(self, shape: Shape, body: str | None) -> int:
         key = shape.name if body is None else body, shape.radio
@@ -174,64 +97,43 @@ class _Groups:
             self._named.append(key)
         return number
 
-    def _prepared(self, shape: Shape) -> Triangles | None:
+    def _prepared(self, mesh: Mesh) -> Triangles:
         """Return the triangles of a mesh, those of equal ones once."""
-        mesh = shape.geometry
-        if isinstance(mesh, Box | Sphere | Cylinder):
-            return None
         if mesh.digest not in self._meshes:
             self._meshes[mesh.digest] = Triangles(mesh)
         return self._meshes[mesh.digest]
 
-    def crossings(self, ray: _Ray, solids: Iterable[_Solid]) -> list[Crossing]:
-        """Return what a ray crosses of some solids, in no order that matters."""
-        if ray.length == 0.0:
+    def crossings(self, line: Line, solids: list[Solid]) -> list[Crossing]:
+        """Return what a line crosses of some solids, in their order."""
+        ray = ray_of(line)
+        if not ray[2] > 0.0:
             return []
-        found: dict[int, Sequence[Piece]] = {}
+        found: dict[int, list[Piece]] = {}
         for solid in solids:
             pieces = solid.pieces(ray)
             if pieces:
                 before = found.get(solid.group)
-                found[solid.group] = pieces if before is None else (*before, *pieces)
-        crossings = []
+                if before is None:
+                    found[solid.group] = pieces
+                else:
+                    before.extend(pieces)
+        crossings: list[Crossing] = []
         for group, pieces in found.items():
             name, material = self._named[group]
-            for piece in _joined(pieces) if len(pieces) > 1 else pieces:
+            for piece in joined(pieces) if len(pieces) > 1 else pieces:
                 enter, leave = piece[0][0], piece[-1][1]
-                chord = leave - enter if len(piece) == 1 else _chord(piece)
+                chord = leave - enter if len(piece) == 1 else chord_of(piece)
                 crossings.append(Crossing(name, material, chord, enter, leave))
-        return crossings
+        return _in_order(crossings)
 
 
-def _joined(pieces: Iterable[Piece]) -> list[Piece]:
-    """Return pieces that do not overlap: those that do, or touch, as one."""
-    joined: list[Piece] = []
-    end = 0.0
-    for piece in sorted(pieces):
-        if joined and piece[0][0] <= end + TOUCH_M:
-            joined[-1] = _united([*joined[-1], *piece])
-        else:
-            joined.append(piece)
-        end = joined[-1][-1][1]
-    return joined
+def _in_order(crossings: list[Crossing]) -> list[Crossing]:
+    """Return crossings in the order of their distance from the lesser end, then of their names."""
+    return sorted(crossings, key=_by_distance) if len(crossings) > 1 else crossings
 
 
-def _united(spans: Iterable[Span]) -> Piece:
-    """Return spans that cover the same and do not overlap."""
-    united: list[Span] = []
-    for enter, leave in sorted(spans):
-        if united and enter <= united[-1][1]:
-            united[-1] = (united[-1][0], max(united[-1][1], leave))
-        else:
-            united.append((enter, leave))
-    return united
-
-
-def _chord(piece: Piece) -> float:
-    chord = 0.0
-    for enter, leave in piece:
-        chord += leave - enter
-    return chord
+def _by_distance(crossing: Crossing) -> tuple[float, str]:
+    return crossing.entry_m, crossing.name
 
 
 K = TypeVar("K")
@@ -261,38 +163,65 @@ class _Memory(Generic[K, V]):
         self._newer[key] = value
 
 
+class Trace:
+    """What is remembered of a line whose ends move: what of the scenery is near, and what of it the line crosses."""
+
+    __slots__ = ("a", "b", "crossed", "line", "near", "still")
+
+    def __init__(self) -> None:
+        self.still: Still | None = None
+        """The scenery that all of it is about."""
+        self.a = self.b = UNKNOWN
+        """Where the ends were when `near` was found."""
+        self.near: list[Solid] = []
+        self.line: Line = (UNKNOWN, UNKNOWN)
+        self.crossed: tuple[Crossing, ...] = ()
+
+    def covers(self, line: Line) -> bool:
+        """Whether all of the scenery that a line may cross is in `near`."""
+        ((ax, ay, az), (bx, by, bz)), (x, y, z), (u, v, w) = line, self.a, self.b
+        return (
+            abs(ax - x) <= REACH_M
+            and abs(ay - y) <= REACH_M
+            and abs(az - z) <= REACH_M
+            and abs(bx - u) <= REACH_M
+            and abs(by - v) <= REACH_M
+            and abs(bz - w) <= REACH_M
+        )
+
+
 class Still:
-    """The scenery, and what of it lies between pairs of ends that were asked for lately."""
+    """The scenery, and what is remembered of lines through it that nobody else remembers."""
 
     def __init__(self, shapes: Sequence[Shape]) -> None:
         self.shapes = shapes
         self.groups = _Groups()
-        self.solids = self.groups.solids(shapes)
-        boxes = [shape_box(solid.shape) for solid in self.solids]
-        # A line from cell to cell is within half a cell of the line between their middles.
-        self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes], CELL_M / 2 + MARGIN_M)
-        self._crossed = _Memory[Line, tuple[Crossing, ...]]()
-        self._near = _Memory[tuple[float, ...], list[_Solid]]()
+        opaque = [shape for shape in shapes if not shape.radio.is_transparent]
+        self.solids = self.groups.solids(opaque)
+        boxes = [shape_box(shape) for shape in opaque]
+        self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes], REACH_M + MARGIN_M)
+        self._traces = _Memory[Line, Trace]()
 
-    def near(self, line: Line) -> list[_Solid]:
-        """Return what of the scenery a line may cross."""
+    def trace(self, line: Line) -> Trace:
+        """Return what is remembered of lines from cell to cell."""
         (ax, ay, az), (bx, by, bz) = line
-        cells = ax // CELL_M, ay // CELL_M, az // CELL_M, bx // CELL_M, by // CELL_M, bz // CELL_M
-        found = self._near.known(cells)
+        cells = (ax // CELL_M, ay // CELL_M, az // CELL_M), (bx // CELL_M, by // CELL_M, bz // CELL_M)
+        found = self._traces.known(cells)
         if found is None:
-            ax, ay, az, bx, by, bz = ((cell + 0.5) * CELL_M for cell in cells)
-            found = [self.solids[index] for index in boxes_met_by(self._boxes, ((ax, ay, az), (bx, by, bz)))]
-            self._near.keep(cells, found)
+            found = Trace()
+            self._traces.keep(cells, found)
         return found
 
-    def crossed(self, line: Line) -> tuple[Crossing, ...]:
-        """Return what a line crosses of the scenery."""
-        found = self._crossed.known(line)
-        if found is None:
-            near = self.near(line)
-            found = tuple(sorted(self.groups.crossings(_ray(line), near), key=_by_distance)) if near else ()
-            self._crossed.keep(line, found)
-        return found
+    def crossed(self, line: Line, trace: Trace) -> tuple[Crossing, ...]:
+        """Return what a line crosses of the scenery; `trace` is what is remembered of it, or of one like it."""
+        if trace.still is not self or trace.line != line:
+            if trace.still is not self or not trace.covers(line):
+                trace.still = self
+                trace.a, trace.b = line
+                trace.near = [self.solids[index] for index in boxes_met_by(self._boxes, line)]
+            trace.crossed = tuple(self.groups.crossings(line, trace.near)) if trace.near else ()
+            trace.line = line
+        return trace.crossed
 
 
 class _Limb:
@@ -301,8 +230,9 @@ class _Limb:
     __slots__ = ("middle", "radius", "solids")
 
     def __init__(self, body: str, link: Link, groups: _Groups) -> None:
-        self.solids = groups.solids(link.shapes, body)
-        low, high = enclosing([shape_box(solid.shape) for solid in self.solids] or [(ORIGIN, ORIGIN)])
+        opaque = [shape for shape in link.shapes if not shape.radio.is_transparent]
+        self.solids = groups.solids(opaque, body)
+        low, high = enclosing([shape_box(shape) for shape in opaque] or [(ORIGIN, ORIGIN)])
         x, y, z = high[0] - low[0], high[1] - low[1], high[2] - low[2]
         self.middle = (low[0] + x / 2, low[1] + y / 2, low[2] + z / 2)
         self.radius = sqrt(x * x + y * y + z * z) / 2
@@ -313,7 +243,7 @@ def _reach(body: Body) -> float | Pillar:
     (lx, ly, lz), (hx, hy, hz) = swept_box(body)
     if body.links[0].joint != "free":
         x, y = hx - lx, hy - ly
-        return pillar_around(body.name, lx + x / 2, ly + y / 2, sqrt(x * x + y * y) / 2, lz, hz)
+        return Pillar(body.name, lx + x / 2, ly + y / 2, sqrt(x * x + y * y) / 2, lz, hz)
     x, y, z = body.position
     x, y, z = max(abs(lx - x), abs(hx - x)), max(abs(ly - y), abs(hy - y)), max(abs(lz - z), abs(hz - z))
     return sqrt(x * x + y * y + z * z)
@@ -346,7 +276,7 @@ class _Placed:
         self._limb, self._position, self._orientation = limb, position, orientation
         x, y, z = rotate(orientation, limb.middle)
         self._middle = x + position[0], y + position[1], z + position[2]
-        self._solids: list[_Solid] | None = None
+        self._solids: list[Solid] | None = None
 
     def is_near(self, line: Line) -> bool:
         """Whether a line comes as near as the sphere around the link, or nearly so."""
@@ -361,7 +291,7 @@ class _Placed:
         reach = self._limb.radius + MARGIN_M
         return px * px + py * py + pz * pz <= reach * reach
 
-    def in_world(self) -> list[_Solid]:
+    def in_world(self) -> list[Solid]:
         if self._solids is None:
             self._solids = [solid.placed(self._position, self._orientation) for solid in self._limb.solids]
         return self._solids
@@ -390,20 +320,29 @@ class Sight:
         key = line, frozenset(ignoring)
         found = self._found.get(key)
         if found is None:
-            found = self._found[key] = self.look(line, key[1])
+            trace = self._geometry.still.trace(line)
+            found = self._found[key] = self.look(line, key[1], trace)
         return found
 
-    def look(self, line: Line, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
-        """Work out what a line from its lesser end crosses, for who remembers it: `between` says what that is."""
-        standing = self._geometry.still.crossed(line)
+    def look(self, line: Line, ignoring: frozenset[str], trace: Trace) -> tuple[Crossing, ...]:
+        """Work out what a line from its lesser end crosses, for who remembers it: `between` says what that is.
+
+        `trace` is what who asks remembers of the same line in frames before.
+        """
+        standing = self._geometry.still.crossed(line, trace)
         if self._around is None:
             self._around = self._pillars()
         near = pillars_met_by(self._around, line)
-        moving = [solid for name in near if name not in ignoring for solid in self._solids(name, line)]
+        moving: list[Solid] = []
+        for name in near:
+            if name not in ignoring:
+                moving.extend(self._solids(name, line))
         if not moving:
             return standing
-        crossed = self._geometry.groups.crossings(_ray(line), moving)
-        return tuple(sorted((*standing, *crossed), key=_by_distance)) if crossed else standing
+        crossed = self._geometry.groups.crossings(line, moving)
+        if not standing or not crossed:
+            return tuple(crossed) or standing
+        return tuple(_in_order([*standing, *crossed]))
 
     def _pillars(self) -> list[Pillar]:
         """Return a pillar around each body: however a free one is turned, wherever another one's joints are."""
@@ -412,12 +351,12 @@ class Sight:
             if isinstance(reach, float):
                 start = self._layout[name].offsets["position"]
                 x, y, z = self._numbers[start : start + 3]
-                pillars.append(pillar_around(name, x, y, reach, z - reach, z + reach))
+                pillars.append(Pillar(name, x, y, reach, z - reach, z + reach))
             else:
                 pillars.append(reach)
         return pillars
 
-    def _solids(self, name: str, line: Line) -> list[_Solid]:
+    def _solids(self, name: str, line: Line) -> list[Solid]:
         """Return the solids of a body's links that a line comes near to."""
         placed = self._placed.get(name)
         if placed is None:
@@ -433,10 +372,6 @@ class Sight:
             for limb, (_, position, orientation) in zip(geometry.limbs[name], poses, strict=True)
             if limb.solids
         ]
-
-
-def _by_distance(crossing: Crossing) -> tuple[float, str]:
-    return crossing.entry_m, crossing.name
 
 
 class LineOfSight:

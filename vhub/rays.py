@@ -12,7 +12,7 @@ into the world.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import inf, sqrt
 from typing import Final
 
@@ -39,21 +39,34 @@ _EDGES: Final = ((1, 2), (2, 0), (0, 1))
 
 def box_span(start: Vector, way: Vector, half: Vector) -> Span | None:
     """Return where a line is inside of a box, centred, with half of its lengths."""
+    (x, y, z), (dx, dy, dz), (side_x, side_y, side_z) = start, way, half
+    # Written out for each axis, as a loop over them costs several times as much.
     enter, leave = -inf, inf
-    for at, step, side in ((start[0], way[0], half[0]), (start[1], way[1], half[1]), (start[2], way[2], half[2])):
-        if step > 0.0:
-            one, other = (-side - at) / step, (side - at) / step
-        elif step < 0.0:
-            one, other = (side - at) / step, (-side - at) / step
-        elif -side < at < side:
-            continue
-        else:
-            return None
+    if dx != 0.0:
+        enter, leave = (-side_x - x) / dx, (side_x - x) / dx
+        if dx < 0.0:
+            enter, leave = leave, enter
+    elif not -side_x < x < side_x:
+        return None
+    if dy != 0.0:
+        one, other = (-side_y - y) / dy, (side_y - y) / dy
+        if dy < 0.0:
+            one, other = other, one
         enter = one if one > enter else enter  # three times as fast as max
         leave = other if other < leave else leave
-        if enter >= leave:
-            return None
-    return enter, leave
+    elif not -side_y < y < side_y:
+        return None
+    if enter >= leave:
+        return None
+    if dz != 0.0:
+        one, other = (-side_z - z) / dz, (side_z - z) / dz
+        if dz < 0.0:
+            one, other = other, one
+        enter = one if one > enter else enter
+        leave = other if other < leave else leave
+    elif not -side_z < z < side_z:
+        return None
+    return (enter, leave) if enter < leave else None
 
 
 def sphere_span(start: Vector, way: Vector, radius: float) -> Span | None:
@@ -95,29 +108,32 @@ def cylinder_span(start: Vector, way: Vector, radius: float, half_length: float)
     return (enter, leave) if enter < leave else None
 
 
-Pillar = tuple[float, float, float, float, float, str]
-"""An upright cylinder around a body: its x and y, the square of its radius, its least and greatest z (m); its name."""
+class Pillar:
+    """An upright cylinder around a body: its x and y, the square of its radius, its least and greatest z (m); its name.
+
+    It is a little larger than what is given.
+    """
+
+    __slots__ = ("high_z", "low_z", "name", "reach", "x", "y")
+
+    def __init__(self, name: str, x: float, y: float, radius: float, low_z: float, high_z: float) -> None:
+        radius += MARGIN_M
+        self.name, self.x, self.y, self.reach = name, x, y, radius * radius
+        self.low_z, self.high_z = low_z - MARGIN_M, high_z + MARGIN_M
 
 
-def pillar_around(name: str, x: float, y: float, radius: float, low_z: float, high_z: float) -> Pillar:
-    """Return a pillar with a margin."""
-    radius += MARGIN_M
-    return x, y, radius * radius, low_z - MARGIN_M, high_z + MARGIN_M, name
-
-
-def pillars_met_by(pillars: Iterable[Pillar], line: tuple[Vector, Vector]) -> list[str]:
+def pillars_met_by(pillars: list[Pillar], line: tuple[Vector, Vector]) -> list[str]:
     """Return the names whose pillars a line may pass, seen from above as if it had no ends: it says where to look."""
     (ax, ay, az), (bx, by, bz) = line
     way_x, way_y = bx - ax, by - ay
     square = way_x * way_x + way_y * way_y
     low_z, high_z = (az, bz) if az <= bz else (bz, az)
-    return [
-        name
-        for x, y, reach, low, high, name in pillars
-        if high >= low_z
-        and low <= high_z
-        and (aside := (x - ax) * way_y - (y - ay) * way_x) * aside <= reach * square
-    ]
+    met = []
+    for pillar in pillars:
+        aside = (pillar.x - ax) * way_y - (pillar.y - ay) * way_x
+        if aside * aside <= pillar.reach * square and pillar.high_z >= low_z and pillar.low_z <= high_z:
+            met.append(pillar.name)
+    return met
 
 
 def boxes_around(

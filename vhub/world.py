@@ -5,16 +5,38 @@ Neighbours: `geometry` (rays), `propagation` asks, `state` turns it to the frame
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout
+from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.network import Network
 from foosim.protocol.rovers import RoverRobot
-from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Pose, Vector, forward_kinematics, rotate, velocity
+from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Quaternion, Vector, forward_kinematics, rotate, velocity
 from foosim.protocol.scenes import build_scene
-from foosim.vhub.geometry import Crossing, LineOfSight, Sight
+from foosim.vhub.geometry import Crossing, LineOfSight, Sight, Trace
+
+
+class _Robot:
+    """A robot, or an endpoint that is on none, in the frames of one layout."""
+
+    __slots__ = ("antenna", "body", "down", "entity", "orientation", "position", "turns")
+
+    def __init__(self, name: str, body: Body | None, layout: Layout | None) -> None:
+        self.body = body
+        self.entity: Entity | None = None
+        self.down = -1
+        """The slot of its flag, -1 where it has none."""
+        if layout is not None and name in layout:
+            self.entity = layout[name]
+            self.down = self.entity.offsets.get("down", -1)
+        self.antenna: Vector = ORIGIN if body is None else body.antenna
+        self.turns = -1
+        """The number of the frame of the pose."""
+        self.position: Vector = ORIGIN
+        self.orientation: Quaternion = UPRIGHT
+        """The pose of the last link of its body."""
 
 
 class World:
@@ -26,14 +48,11 @@ class World:
         self._sights: LineOfSight | None = None
         self._sight: Sight | None = None
         self._frame: Frame | None = None
-        self._layout: Layout | None = None
-        self._bodies: dict[str, Body] = {}
-        self._poses: dict[str, Pose | None] = {}
+        self._numbers: list[float] | None = None
+        self._bodies: Mapping[str, Body] | None = None
+        self._robots: dict[str, _Robot] = {}
+        """By endpoint, in the frames of a layout."""
         self._standing: dict[str, Vector] = {}
-        self._antennas: dict[tuple[str, Vector], Vector] = {}
-        self._fixed: dict[tuple[str, Vector], Vector] = {}
-        """Antennas of endpoints without a body, in all frames of a layout."""
-        self._down: dict[str, bool] = {}
         self.turns = 0
         """Grows with every frame."""
 
@@ -41,11 +60,9 @@ class World:
         """Take the newest committed frame."""
         if frame is not self._frame:
             if self._frame is None or frame.layout is not self._frame.layout:
-                self._fixed.clear()
-            self._frame, self._sight = frame, None
-            self._poses.clear()
-            self._antennas.clear()
-            self._down.clear()
+                self._bodies = None
+                self._robots.clear()
+            self._frame, self._sight, self._numbers = frame, None, None
             self.turns += 1
 
     def body(self, endpoint: str) -> str:
@@ -54,36 +71,30 @@ class World:
 
     def is_down(self, endpoint: str) -> bool:
         """Whether the robot that an endpoint is, or is on board of, is out of service."""
-        found = self._down.get(endpoint)
-        if found is None:
-            frame, body = self._frame, self.body(endpoint)
-            found = frame is not None and body in frame.layout and frame.at(body, "down") != 0.0
-            self._down[endpoint] = found
-        return found
+        down = self._robot(endpoint).down
+        return down >= 0 and self._values()[down] != 0.0
 
     def antenna(self, endpoint: str, mount: Vector) -> Vector:
-        """Return the place (m, world frame) of an antenna: `mount` beside its body's own antenna, in the body's frame.
-        """
-        key = endpoint, mount
-        found = self._antennas.get(key) or self._fixed.get(key)
-        if found is None:
-            body = self.body(endpoint)
-            pose = self._pose(body)
-            position, orientation, own = self._place(endpoint), UPRIGHT, ORIGIN
-            if pose is not None:
-                _, position, orientation = pose
-                own = self._bodies[body].antenna
-            x, y, z = rotate(orientation, (own[0] + mount[0], own[1] + mount[1], own[2] + mount[2]))
-            found = position[0] + x, position[1] + y, position[2] + z
-            (self._fixed if pose is None else self._antennas)[key] = found
-        return found
+        """Return the place (m, world frame) of an antenna: `mount` beside its body's own one, in the body's frame."""
+        robot, (mx, my, mz) = self._robot(endpoint), mount
+        if robot.body is None:
+            px, py, pz = self._place(endpoint)
+            return px + mx, py + my, pz + mz
+        if robot.turns != self.turns:
+            assert robot.entity is not None
+            _, robot.position, robot.orientation = forward_kinematics(robot.body, robot.entity, self._values())[-1]
+            robot.turns = self.turns
+        (px, py, pz), (ox, oy, oz) = robot.position, robot.antenna
+        x, y, z = rotate(robot.orientation, (ox + mx, oy + my, oz + mz))
+        return px + x, py + y, pz + z
 
     def velocity(self, endpoint: str) -> Vector:
         """Return how fast the body moves that an endpoint is, or is on board of (m/s, world frame); 0 without one."""
-        robot, frame = self.body(endpoint), self._frame
-        if frame is None or self._pose(robot) is None:
+        robot = self._robot(endpoint)
+        if robot.body is None:
             return ORIGIN
-        return velocity(self._bodies[robot], frame.layout[robot], frame.numbers)
+        assert robot.entity is not None
+        return velocity(robot.body, robot.entity, self._values())
 
     def vehicle_height_m(self, name: str) -> float | None:
         """Return how high the hull of a rover is; None for what is no vehicle."""
@@ -91,19 +102,23 @@ class World:
         is_rover = deployment.is_hall and isinstance(deployment.robots.get(name), RoverRobot)
         return deployment.hall.rover.height if is_rover else None
 
-    def _pose(self, robot: str) -> Pose | None:
-        """Return the pose of a robot's last link; None for what has no body."""
-        frame = self._frame
-        if frame is None:
-            return None
-        if frame.layout is not self._layout:
-            self._layout, self._bodies = frame.layout, dict(build_scene(self._deployment, frame.layout).bodies)
-        if robot not in self._poses:
-            body = self._bodies.get(robot)
-            self._poses[robot] = (
-                None if body is None else forward_kinematics(body, frame.layout[robot], frame.numbers)[-1]
-            )
-        return self._poses[robot]
+    def _robot(self, endpoint: str) -> _Robot:
+        """Return the robot that an endpoint is or is on board of, as the newest frame's layout has it."""
+        found = self._robots.get(endpoint)
+        if found is None:
+            layout = None if self._frame is None else self._frame.layout
+            if self._bodies is None:
+                self._bodies = {} if layout is None else build_scene(self._deployment, layout).bodies
+            name = self.body(endpoint)
+            found = self._robots[endpoint] = _Robot(name, self._bodies.get(name), layout)
+        return found
+
+    def _values(self) -> list[float]:
+        """Return the numbers of the newest frame; there is one."""
+        if self._numbers is None:
+            assert self._frame is not None
+            self._numbers = self._frame.numbers
+        return self._numbers
 
     def _place(self, endpoint: str) -> Vector:
         """Return where the deployment says that an endpoint without a body is."""
@@ -114,12 +129,17 @@ class World:
             found = self._standing[endpoint] = x, y, z
         return found
 
-    def crossings(self, a: Vector, b: Vector, ignoring: frozenset[str]) -> tuple[Crossing, ...]:
-        """Return what the line between two places crosses, some bodies aside."""
+    def crossings(
+        self, a: Vector, b: Vector, ignoring: frozenset[str], trace: Trace | None = None
+    ) -> tuple[Crossing, ...]:
+        """Return what the line between two places crosses, some bodies aside.
+
+        `trace` is what who asks in many frames remembers of the line.
+        """
         if self._frame is None:
             return ()
         if self._sight is None:
             if self._sights is None:
                 self._sights = LineOfSight(self._deployment)
             self._sight = self._sights.at(self._frame)
-        return self._sight.look((a, b) if a <= b else (b, a), ignoring)
+        return self._sight.look((a, b) if a <= b else (b, a), ignoring, Trace() if trace is None else trace)

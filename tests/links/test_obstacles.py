@@ -16,6 +16,7 @@ from foosim.protocol.scene import Vector
 from foosim.protocol.start import initial_frame, place_ball
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
+from foosim.vhub.propagation import Place
 from foosim.vhub.radio.materials import slab_loss_db
 from tests.links.offered import deployment_of, uniforms
 from tests.links.proof import Proof
@@ -166,10 +167,11 @@ def test_a_station_senses_what_the_path_says(path_loss: str) -> None:
     places = iter(uniforms(600, 7, "places"))
     for ax, ay, bx, by in zip(places, places, places, places, strict=True):
         a, b = (30.0 * ax - 10.0, 8.0 * ay - 4.0, HIGH), (90.0 * bx - 30.0, 8.0 * by - 4.0, 1.4)
-        path = of.path(a, b, "a", "b")
+        one, other = Place("a", a), Place("b", b)
+        path = of.path(one, other)
         for power_cdbm in (-9000, *range(-2500, 3000, 500)):
             senses = not path.cause and path.loss_cdb <= power_cdbm + of.gain_cdb - of.sense_cdbm
-            assert of.hears(a, b, "a", "b", power_cdbm) == senses
-            assert of.hears(b, a, "b", "a", power_cdbm) == senses
+            assert of.hears(one, other, power_cdbm) == senses
+            assert of.hears(other, one, power_cdbm) == senses
             heard_by[senses] += 1
     assert min(heard_by) > 60

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from math import cos, exp, pi, sin, sqrt
+from collections.abc import Sequence
+from functools import lru_cache
+from math import cos, exp, hypot, pi, sin, sqrt
 
 import pytest
 from hypothesis import given
@@ -10,12 +12,27 @@ from hypothesis import strategies as st
 
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.vhub.radio import shadowing
-from foosim.vhub.radio.shadowing import field, shadowing_db, shadowing_max_db
+from foosim.vhub.radio.shadowing import Shadowing
 from tests.links.statistics import ALPHA, Z_ALPHA, correlation, ks_normal, mean_and_deviation
 
 KEY = draw_key(1, "shadowing")
 D_CORR = 10.0
 SITES = 10_000
+
+
+@lru_cache
+def made(key: bytes, sigma_db: float, d_corr_m: float) -> Shadowing:
+    return Shadowing(key, sigma_db, d_corr_m)
+
+
+def shadowing_db(key: bytes, a: Sequence[float], b: Sequence[float], sigma_db: float, d_corr_m: float) -> float:
+    """Between two places in m, of which x and y count."""
+    of = made(key, sigma_db, d_corr_m)
+    return of.between_db(of.field(*a[:2]), of.field(*b[:2]), hypot(a[0] - b[0], a[1] - b[1]))
+
+
+def field(key: bytes, x_m: float, y_m: float, d_corr_m: float) -> float:
+    return made(key, 1.0, d_corr_m).field(x_m, y_m)
 
 
 def places(count: int, span_m: float, seed: int = 1) -> list[tuple[float, float]]:
@@ -78,7 +95,7 @@ def test_it_is_the_same_both_ways_to_the_last_bit(
     assert there == shadowing_db(KEY, b, a, sigma, d_corr)
     assert there == shadowing_db(KEY, (a[0], a[1], 0.0), b, sigma, d_corr), "the height does not enter"
     assert abs(there) < 12 * sigma
-    shares = (shadowing_max_db(KEY, place, sigma, d_corr) for place in (a, b))
+    shares = (made(KEY, sigma, d_corr).most_db(field(KEY, *place[:2], d_corr)) for place in (a, b))
     assert there <= sum(shares) + 1e-9, "no more than the shares of both ends"
 
 
@@ -86,7 +103,7 @@ def test_it_is_the_same_on_every_visit_in_any_order() -> None:
     links = [(a, b) for a in places(15, 60.0) for b in places(15, 60.0, 2)]
 
     def asked(order: list[int]) -> list[float]:
-        for cache in (shadowing.field, shadowing._cell, shadowing._node):
+        for cache in (made, shadowing._node):
             cache.cache_clear()
         found = {n: shadowing_db(KEY, *links[n], 8.03, 6.0) for n in order}
         return [found[n] for n in sorted(found)]

@@ -13,6 +13,7 @@ from foosim.protocol.scene import Box, Scene, Shape, Vector
 from foosim.vhub import geometry
 from foosim.vhub.geometry import Geometry
 from foosim.vhub.rays import box_span
+from foosim.vhub.solids import TOUCH_M
 
 GREY: Final = (0.5, 0.5, 0.5, 1.0)
 HALF: Final = (0.12, 0.08, 0.16)
@@ -32,7 +33,7 @@ def crossed(boxes: dict[str, Vector], start: Vector, end: Vector) -> set[str]:
     found = set()
     for name, (x, y, z) in boxes.items():
         span = box_span((start[0] - x, start[1] - y, start[2] - z), unit, HALF)
-        if span is not None and min(span[1], length) - max(span[0], 0.0) > geometry.TOUCH_M:
+        if span is not None and min(span[1], length) - max(span[0], 0.0) > TOUCH_M:
             found.add(name)
     return found
 

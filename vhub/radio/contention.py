@@ -16,6 +16,7 @@ Source: Bianchi, "Performance analysis of the IEEE 802.11 distributed coordinati
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from math import exp
 from typing import Final, Literal, NamedTuple
@@ -46,7 +47,8 @@ class Access(NamedTuple):
     """`ok`, or why the last attempt failed; `busy`: the channel was never free."""
 
 
-class Contention(NamedTuple):
+@dataclass(frozen=True)
+class Contention:
     """Bianchi's fixed point for n saturated stations."""
 
     tau: float

@@ -6,7 +6,8 @@ What is asked for each packet is looked up by the payload's size, in bytes. Neig
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from dataclasses import dataclass
+from typing import Final
 
 from foosim.vhub.radio.airtime import WIFI_OVERHEAD_BYTES, wifi_ack_ns, wifi_airtime_ns
 from foosim.vhub.radio.errors import MODES, snr_needed
@@ -15,7 +16,8 @@ from foosim.vhub.radio.timings import WifiTiming
 SIZES_KEPT: Final = 4_096
 
 
-class WifiFrame(NamedTuple):
+@dataclass(frozen=True)
+class WifiFrame:
     """A payload in one modulation. `size_bytes` is with headers; `ack_ns` is the duration of the acknowledgement."""
 
     mode: str

@@ -166,7 +166,7 @@ class OnAir(Stage):
         sender.waiting.append((until_ns, len(flight.payload)))
         of = self._budget.propagation
         what = source, flight.sequence, flight.copy, end_ns - air_ns, end_ns, until_ns
-        air.register(Transmission(*what, of.antenna(source), of.power_cdbm, self._factor))
+        air.register(Transmission(*what, of.place(source).at, of.power_cdbm, self._factor))
 
     # --- what media differ in ----------------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from msgspec import msgpack
 
 from foosim.protocol import limits
 from foosim.protocol.errors import show
+from foosim.vhub.geometry import Trace
 from foosim.vhub.link_models import End, Judged, LinkModel, Passage, Wall
 from foosim.vhub.packet import Flight
 from foosim.vhub.propagation import crossing_db
@@ -41,6 +42,7 @@ class Own(Stage):
         self._mount = x, y, z
         self._frequency_hz = settings.frequency_hz
         self._bodies = frozenset((world.body(setup.source), world.body(setup.destination)))
+        self._trace = Trace()
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Own | None:
@@ -67,7 +69,7 @@ class Own(Stage):
         dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
         walls = tuple(
             Wall(crossing.name, crossing.chord_m, crossing_db(crossing, self._frequency_hz))
-            for crossing in self._setup.world.crossings(a, b, self._bodies)
+            for crossing in self._setup.world.crossings(a, b, self._bodies, self._trace)
         )
         return Passage(
             source,
