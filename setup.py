@@ -19,7 +19,21 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError
 
 COMPILED: Final = {
-    "protocol": ("draws", "scene"),
+    "protocol": (
+        *("actions", "assign", "barrier", "channels", "codec", "draws", "errors", "frame", "layout", "limits"),
+        *("member", "obstacles", "patience", "refusals", "sampling", "scene", "start"),
+    ),
+    "node": ("core", "edits", "hall_world", "held", "inputs", "rules", "solver", "step", "table_world", "world"),
+    "node/actuators": ("__init__", "drive", "position"),
+    "node/engines": ("pure", "pure_bodies", "pure_shapes"),
+    "supervisor": (
+        *("absence", "arrivals", "balance", "branches", "core", "handshake", "head", "issued", "pacing", "recovery"),
+        *("requests", "roster", "take_over", "watch"),
+    ),
+    "rehearsal": (
+        *("bounds", "bus", "clock", "faults", "hub_journal", "laws", "machines", "packet_laws", "replica", "settings"),
+        *("swarm", "system", "world_bounds"),
+    ),
     "vhub": ("air", "budget", "fabric", "geometry", "links", "propagation", "rays", "setup", "world"),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss"),

@@ -63,7 +63,7 @@ class NodeStatistics:
     held: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Term:
     """Everything that changes with an epoch or a layout: who computes and writes what."""
 

@@ -53,9 +53,9 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers of something else than ticks."""
-CONSTANT: Final = (Deployment, Layout, Frame, msgspec.Struct, Sight)
+CONSTANT: Final[tuple[type[Any], ...]] = (Deployment, Layout, Frame, msgspec.Struct, Sight)
 """What does not grow, or is of one frame."""
-REMEMBERED: Final = (LinkState, RadioState, AirState)
+REMEMBERED: Final[tuple[type[Any], ...]] = (LinkState, RadioState, AirState)
 """Messages do not grow; these are structs that do."""
 
 
@@ -90,6 +90,6 @@ def _attributes(value: object) -> Iterator[tuple[str, Any]]:
     for name in getattr(value, "__struct_fields__", ()):
         yield name, getattr(value, name)
     for kind in type(value).__mro__:
-        for name in getattr(kind, "__slots__", ()):
+        for name in (*getattr(kind, "__slots__", ()), *getattr(kind, "__mypyc_attrs__", ())):
             if hasattr(value, name):
                 yield name, getattr(value, name)

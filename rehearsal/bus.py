@@ -16,7 +16,7 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Weather:
     """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`.
 
@@ -34,7 +34,7 @@ CALM: Final = Weather()
 LATE_NS: Final = 2_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Traced:
     """One thing that a process did, as a test wants to see it: `what` is journal, publish or receive."""
 

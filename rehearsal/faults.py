@@ -14,6 +14,7 @@ from typing import Final, TypeVar
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
+from foosim.protocol.frame import Frame
 from foosim.rehearsal.hub_journal import ENDINGS
 from foosim.rehearsal.machines import lose_hub
 from foosim.rehearsal.system import System
@@ -145,10 +146,8 @@ def _flip(dice: Dice, names: Sequence[str]) -> Fault:
             frame = core.frame
             values = frame.values.copy()
             values[int(place * len(values))] += 1.0
-            frame.values = values
+            Frame.__init__(frame, frame.tick, frame.layout, values, frame.outboxes)  # wherever the node keeps it
             system.flipped.add(name)
-            for cached in ("digest", "numbers"):
-                frame.__dict__.pop(cached, None)
 
     return Fault(_tick(dice), "flip", f"a number of {name}'s frame changes", _here(name, do))
 
@@ -224,7 +223,7 @@ def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
 # --- people ----------------------------------------------------------------------------------------------------------
 
 
-OF_TABLE: Final = ("red.goal", "red.attack", "blue.defence", "camera")
+OF_TABLE: Final[tuple[str, ...]] = ("red.goal", "red.attack", "blue.defence", "camera")
 
 
 def _move(dice: Dice, names: Sequence[str]) -> Fault:
@@ -337,5 +336,5 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
 KINDS: Final = list(FAULT_OF)
 CHANGES_THE_WORLD: Final = frozenset({"add", "push", "machine"})
 """Kinds after which the world is another one. After all others it is the one that would have been."""
-ONCE: Final = ("flip",)
+ONCE: Final[tuple[str, ...]] = ("flip",)
 """Kinds of which one a seed is enough: if all nodes had other frames, none would be right."""

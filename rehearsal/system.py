@@ -24,6 +24,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import Bus, Message, Traced
 from foosim.rehearsal.clock import Clock
+from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.hub_journal import Ending, HubJournal
 from foosim.rehearsal.settings import Process, Settings
 from foosim.supervisor.plan import RunSettings
@@ -39,10 +40,6 @@ IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
 HUB_BACK_NS: Final = 300_000_000
 """After how long a vHub that ended is there again, as a launcher starts it."""
-
-
-class Stuck(AssertionError):
-    """No commit for too long on the virtual clock."""
 
 
 class System:
