@@ -19,20 +19,20 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
 COMPILED: Final = {
-    "protocol": (
-        *("actions", "assign", "barrier", "channels", "codec", "draws", "errors", "frame", "layout", "limits"),
-        *("member", "obstacles", "patience", "refusals", "sampling", "scene", "start"),
-    ),
     "node": ("core", "edits", "hall_world", "held", "inputs", "rules", "solver", "step", "table_world", "world"),
     "node/actuators": ("__init__", "drive", "position"),
     "node/engines": ("pure", "pure_bodies", "pure_shapes"),
+    "protocol": (
+        *("actions", "assign", "barrier", "channels", "codec", "draws", "frame", "layout", "limits", "member"),
+        *("obstacles", "patience", "refusals", "sampling", "scene", "start"),
+    ),
+    "rehearsal": (
+        *("bounds", "bus", "clock", "hub_journal", "laws", "machines", "packet_laws", "replica", "settings", "system"),
+        "world_bounds",
+    ),
     "supervisor": (
         *("absence", "arrivals", "balance", "branches", "core", "handshake", "head", "issued", "pacing", "recovery"),
         *("requests", "roster", "take_over", "watch"),
-    ),
-    "rehearsal": (
-        *("bounds", "bus", "clock", "faults", "hub_journal", "laws", "machines", "packet_laws", "replica", "settings"),
-        *("swarm", "system", "world_bounds"),
     ),
     "vhub": ("air", "budget", "fabric", "geometry", "links", "propagation", "rays", "setup", "world"),
     "vhub/radio": (

@@ -44,6 +44,10 @@ class Frame:
         self.outboxes: dict[int, bytes] = dict(sorted(outboxes.items())) if outboxes else {}
         self._digest = b""
 
+    def take(self, values: NDArray[np.float64]) -> None:
+        """Be of other values from here on, wherever it is kept: what a fault in a process's memory does."""
+        self.values, self.numbers, self._digest = values, values.tolist(), b""
+
     @property
     def digest(self) -> bytes:
         """D(tick): BLAKE2b, 32 bytes, of tick, layout and the bytes as they are."""

@@ -14,7 +14,6 @@ from typing import Final, TypeVar
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
-from foosim.protocol.frame import Frame
 from foosim.rehearsal.hub_journal import ENDINGS
 from foosim.rehearsal.machines import lose_hub
 from foosim.rehearsal.system import System
@@ -146,7 +145,7 @@ def _flip(dice: Dice, names: Sequence[str]) -> Fault:
             frame = core.frame
             values = frame.values.copy()
             values[int(place * len(values))] += 1.0
-            Frame.__init__(frame, frame.tick, frame.layout, values, frame.outboxes)  # wherever the node keeps it
+            frame.take(values)
             system.flipped.add(name)
 
     return Fault(_tick(dice), "flip", f"a number of {name}'s frame changes", _here(name, do))

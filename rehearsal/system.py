@@ -12,6 +12,8 @@ from dataclasses import replace
 from heapq import heappop, heappush
 from typing import Any, Final
 
+from mypy_extensions import mypyc_attr
+
 from foosim.client.core import ClientCore
 from foosim.client.player import PlayerLoop, load_player
 from foosim.node.solver import Solver
@@ -42,6 +44,7 @@ HUB_BACK_NS: Final = 300_000_000
 """After how long a vHub that ended is there again, as a launcher starts it."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class System:
     """All processes of one deployment. Build it, then `run`."""
 
