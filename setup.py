@@ -19,8 +19,21 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
 COMPILED: Final = {
-    "protocol": ("draws", "scene"),
-    "rehearsal": ("whatif", "whatif_reading"),
+    "node": ("core", "edits", "hall_world", "held", "inputs", "rules", "solver", "step", "table_world", "world"),
+    "node/actuators": ("__init__", "drive", "position"),
+    "node/engines": ("pure", "pure_bodies", "pure_shapes"),
+    "protocol": (
+        *("actions", "assign", "barrier", "channels", "codec", "draws", "frame", "layout", "limits", "member"),
+        *("obstacles", "patience", "refusals", "sampling", "scene", "start"),
+    ),
+    "rehearsal": (
+        *("bounds", "bus", "clock", "hub_journal", "laws", "machines", "packet_laws", "replica", "settings"),
+        *("system", "whatif", "whatif_reading", "world_bounds"),
+    ),
+    "supervisor": (
+        *("absence", "arrivals", "balance", "branches", "core", "handshake", "head", "issued", "pacing", "recovery"),
+        *("requests", "roster", "take_over", "watch"),
+    ),
     "vhub": (
         *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "numbers", "packet"),
         *("propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "world"),

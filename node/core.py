@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from mypy_extensions import mypyc_attr
 
 from foosim.node.held import Held
 from foosim.node.inputs import Inputs, check_near
@@ -63,7 +64,7 @@ class NodeStatistics:
     held: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Term:
     """Everything that changes with an epoch or a layout: who computes and writes what."""
 
@@ -73,6 +74,7 @@ class _Term:
     mine: tuple[Entity, ...]
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class NodeCore:
     """One node's state machine. `actions` is what the shell performs next; `work` what it solves next."""
 
@@ -224,10 +226,9 @@ class NodeCore:
         """What the current tick lacks, for people and for the supervisor."""
         if self.frame is None:
             return "epoch" if self.member.is_ready else "start"
-        tick = self.frame.tick
         if self._barrier is not None:
             return "" if self.work is not None else f"part of {', '.join(self._barrier.missing)}"
-        return " and ".join(channel.name for channel in self._inputs.missing(tick))
+        return " and ".join(channel.name for channel in self._inputs.missing(self.frame.tick))
 
     # --- one tick ----------------------------------------------------------------------------------------------------
 
@@ -309,9 +310,8 @@ class NodeCore:
         self._sensed = False
         assert self.deployment is not None
         self._patience.progress(self.deployment.tick_ns, now_ns)
-        self._history[frame.tick] = frame
-        self._history.pop(frame.tick - limits.KEPT_TICKS, None)
-        old = frame.tick - limits.KEPT_TICKS
+        self._history[frame.tick], old = frame, frame.tick - limits.KEPT_TICKS
+        self._history.pop(old, None)
         self._inputs.forget(old)
         self._sent_parts.pop(old, None)
 

@@ -14,7 +14,7 @@ from foosim.protocol.layout import WORLD, Entity, Layout
 from foosim.protocol.start import kickoff_spot, kickoff_ticks, place_ball
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TableRules:
     """The rules' numbers for one deployment, in metres and ticks."""
 

@@ -30,7 +30,7 @@ _outbox_decoder = msgspec.msgpack.Decoder(list[OutboxPacket])
 _outbox_encoder = msgspec.msgpack.Encoder()
 
 
-@dataclass(slots=True)
+@dataclass
 class Work:
     """What the engine has to do for one tick. `numbers` is the edited frame and is written by `solve`."""
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from foosim.protocol.channels import Channel
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Publish:
     """Put `payload` on a channel; `name` fills the key (the sender, or the one addressed)."""
 
@@ -20,14 +20,14 @@ class Publish:
     payload: bytes
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Journal:
     """Append one record to the process's journal, before anything that comes after."""
 
     record: bytes
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Say:
     """Something for people: a line of the log. `level` is info, warning or error."""
 

@@ -21,7 +21,7 @@ MARGIN_M = 0.001
 """Added to every bounding volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Reach:
     """Bounding volumes. `ball_m` is the radius of a grown ball; `rods` are (index, name, x of the axis) in order of x,
     with one half width and one band of z; `balls` are (index, start of the position); `alone` are (index, name) of what
@@ -37,7 +37,7 @@ class Reach:
     alone: tuple[tuple[int, str], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Island:
     """Indices of its entities, ascending, and the robot (its name) whose owner solves it; empty without one."""
 
@@ -45,7 +45,7 @@ class Island:
     nearest: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Share:
     """What one node computes in a tick: its islands and, ascending, every entity index in its part."""
 

@@ -15,10 +15,16 @@ from foosim.protocol import asset_messages, hub_messages, limits, messages, repl
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import Malformed
 
-Plane = Enum("Plane", ["SIMULATION", "RADIO", "REPLAY"])
+
+class Plane(Enum):
+    """A session's worth of channels: what is said on one is never heard on another."""
+
+    SIMULATION = 1
+    RADIO = 2
+    REPLAY = 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Channel:
     """One row of the table. `express` channels are sent at once, unbatched; all block rather than drop."""
 
@@ -168,27 +174,30 @@ def read(channel: Channel, name: str, payload: bytes) -> Any:
     return message
 
 
-NODE_READS: Final = ((BUILD, True), (PIECE, True), (REFUSAL, True), (COMMIT, True), *((channel, False) for channel in (
+Reads = tuple[tuple[Channel, bool], ...]
+NODE_READS: Final[Reads] = (*((channel, True) for channel in (
+    BUILD, PIECE, REFUSAL, COMMIT
+)), *((channel, False) for channel in (
     RECALL, PREPARE, EPOCH, ORDER, PART, DELIVERIES, WANT, END
 )))  # fmt: skip
-VHUB_READS: Final = (*((channel, True) for channel in (
+VHUB_READS: Final[Reads] = (*((channel, True) for channel in (
     BUILD, PIECE, REFUSAL, PROCEED, COMMIT
 )), *((channel, False) for channel in (
     RECALL, EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
 )))  # fmt: skip
-SUPERVISOR_READS: Final = tuple((channel, False) for channel in (
+SUPERVISOR_READS: Final[Reads] = tuple((channel, False) for channel in (
     HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
 ))  # fmt: skip
-CLIENT_READS: Final = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
-OPERATOR_READS: Final = ((ANSWER, True),)
-REPLAY_READS: Final = ((REPLAY_REQUEST, False),)
-LISTENER_READS: Final = ((PLAYED, False), (REPLAY_ANSWER, True))
+CLIENT_READS: Final[Reads] = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
+OPERATOR_READS: Final[Reads] = ((ANSWER, True),)
+REPLAY_READS: Final[Reads] = ((REPLAY_REQUEST, False),)
+LISTENER_READS: Final[Reads] = ((PLAYED, False), (REPLAY_ANSWER, True))
 """What each role reads: (channel, whether only what is addressed to it by name)."""
 
-NODE_WAITS: Final = (ORDER, PART, DELIVERIES)
-SUPERVISOR_WAITS: Final = (PART, DELIVERIES)
-VHUB_WAITS: Final = (COMMIT, SAMPLES, UP)
-CLIENT_WAITS: Final = (DOWN,)
+NODE_WAITS: Final[tuple[Channel, ...]] = (ORDER, PART, DELIVERIES)
+SUPERVISOR_WAITS: Final[tuple[Channel, ...]] = (PART, DELIVERIES)
+VHUB_WAITS: Final[tuple[Channel, ...]] = (COMMIT, SAMPLES, UP)
+CLIENT_WAITS: Final[tuple[Channel, ...]] = (DOWN,)
 """What every tick brings to each role: it waits for these itself, in the queue of the one that it lacks."""
 
 ALIVE: Final = {

@@ -44,8 +44,9 @@ from foosim.protocol.yaml_tree import (
 
 PROBLEMS_MAX: Final = 100
 """How many problems are looked for and shown: a hostile file may hold many thousands, each with names to compare."""
-DEPLOYMENTS_KEPT: Final = 16
-"""Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time."""
+DEPLOYMENTS_KEPT: Final = 32
+"""Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time.
+The swarm's worlds are 25 texts."""
 
 
 @lru_cache(maxsize=DEPLOYMENTS_KEPT)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import struct
 import sys
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from hashlib import blake2b
 from typing import Final
 
@@ -40,23 +39,26 @@ class Frame:
         self.tick = tick
         self.layout = layout
         self.values = values
+        self.numbers: list[float] = values.tolist()
+        """The values as Python floats; whoever edits copies the list first."""
         self.outboxes: dict[int, bytes] = dict(sorted(outboxes.items())) if outboxes else {}
+        self._digest = b""
 
-    @cached_property
+    def take(self, values: NDArray[np.float64]) -> None:
+        """Be of other values from here on, wherever it is kept: what a fault in a process's memory does."""
+        self.values, self.numbers, self._digest = values, values.tolist(), b""
+
+    @property
     def digest(self) -> bytes:
         """D(tick): BLAKE2b, 32 bytes, of tick, layout and the bytes as they are."""
-        hasher = blake2b(_TICK.pack(self.tick), digest_size=32)
-        hasher.update(self.layout.digest)
-        hasher.update(self.values.data)
-        for index, packets in self.outboxes.items():
-            hasher.update(_OUTBOX.pack(index, len(packets)) + packets)
-        return hasher.digest()
-
-    @cached_property
-    def numbers(self) -> list[float]:
-        """The values as Python floats; whoever edits copies the list first."""
-        numbers: list[float] = self.values.tolist()
-        return numbers
+        if not self._digest:
+            hasher = blake2b(_TICK.pack(self.tick), digest_size=32)
+            hasher.update(self.layout.digest)
+            hasher.update(self.values.data)
+            for index, packets in self.outboxes.items():
+                hasher.update(_OUTBOX.pack(index, len(packets)) + packets)
+            self._digest = hasher.digest()
+        return self._digest
 
     def at(self, entity: str, field: str, offset: int = 0) -> float:
         """Return one number, by names."""

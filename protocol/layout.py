@@ -11,7 +11,6 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from hashlib import blake2b
 from typing import Final
 
@@ -67,7 +66,7 @@ BALL: Final = "ball"
 """Name of the ball that every table has, and no hall; further ones have other names and can be removed again."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Entity:
     """One entry of a layout. `start` to `split` are the solver's slots, `split` to `stop` the owner's."""
 
@@ -112,6 +111,13 @@ class Layout:
         self.models = dict(models)
         self.sensors = {name: tuple(sorted(channels)) for name, channels in sensors.items()}
         self._index = {entity.name: entity for entity in entities}
+        self.robots = tuple([entity for entity in entities if entity.is_robot])
+        """Entities that have an owner, in name order."""
+        self.balls, self.rods, self.rovers = self._of("ball"), self._of("rod"), self._of("rover")
+        self._digest = b""
+
+    def _of(self, model: str) -> tuple[Entity, ...]:
+        return tuple([entity for entity in self.entities if entity.model == model])
 
     def __getitem__(self, name: str) -> Entity:
         return self._index[name]
@@ -123,33 +129,18 @@ class Layout:
     def names(self) -> tuple[str, ...]:
         return tuple(entity.name for entity in self.entities)
 
-    @cached_property
-    def robots(self) -> tuple[Entity, ...]:
-        """Entities that have an owner, in name order."""
-        return tuple(entity for entity in self.entities if entity.is_robot)
-
-    @cached_property
-    def balls(self) -> tuple[Entity, ...]:
-        return tuple(entity for entity in self.entities if entity.model == "ball")
-
-    @cached_property
-    def rods(self) -> tuple[Entity, ...]:
-        return tuple(entity for entity in self.entities if entity.model == "rod")
-
-    @cached_property
-    def rovers(self) -> tuple[Entity, ...]:
-        return tuple(entity for entity in self.entities if entity.model == "rover")
-
-    @cached_property
+    @property
     def digest(self) -> bytes:
         """BLAKE2b, 32 bytes, of every entity's name, model and slots."""
-        hasher = blake2b(digest_size=32)
-        for entity in self.entities:
-            for text in (entity.name, entity.model, *entity.offsets):
-                raw = text.encode()
-                hasher.update(struct.pack("<I", len(raw)) + raw)
-            hasher.update(struct.pack("<3Q", entity.start, entity.split, entity.stop))
-        return hasher.digest()
+        if not self._digest:
+            hasher = blake2b(digest_size=32)
+            for entity in self.entities:
+                for text in (entity.name, entity.model, *entity.offsets):
+                    raw = text.encode()
+                    hasher.update(struct.pack("<I", len(raw)) + raw)
+                hasher.update(struct.pack("<3Q", entity.start, entity.split, entity.stop))
+            self._digest = hasher.digest()
+        return self._digest
 
 
 def build_layout(deployment: Deployment, added: Iterable[tuple[str, str]] = ()) -> Layout:

@@ -96,7 +96,8 @@ class Refusals:
         if sender.count <= REFUSALS_MAX or deployment is None:
             return
         much = f"more than {REFUSALS_MAX} messages of {show_name(name)} were refused within a second"
-        if name not in (SUPERVISOR, VHUB, *deployment.nodes, *deployment.players, *deployment.clients):
+        known = {SUPERVISOR, VHUB, *deployment.nodes, *deployment.players, *deployment.clients}
+        if name not in known:
             sender.until_ns = now_ns + QUARANTINE_NS
             much += f": it is in quarantine for {QUARANTINE_NS // 10**9} s"
         if not sender.is_named:

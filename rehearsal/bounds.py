@@ -53,9 +53,11 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
 }
 """By class and attribute: containers of something else than ticks."""
-CONSTANT: Final = (Deployment, Layout, Frame, msgspec.Struct, Sight)
+CONSTANT: Final[tuple[type[Any], ...]] = (Deployment, Layout, Frame, msgspec.Struct, Sight)
 """What does not grow, or is of one frame."""
-REMEMBERED: Final = (LinkState, RadioState, AirState)
+SIMPLE: Final = frozenset({bool, bytes, float, int, str, type(None)})
+"""What holds nothing."""
+REMEMBERED: Final[tuple[type[Any], ...]] = (LinkState, RadioState, AirState)
 """Messages do not grow; these are structs that do."""
 
 
@@ -68,21 +70,24 @@ def too_large(core: object) -> list[str]:
     ]
 
 
-def sizes(core: object) -> Iterator[tuple[str, int]]:
-    """Yield the size of every container that a core holds, however deep, by class and attribute."""
+def sizes(core: object) -> list[tuple[str, int]]:
+    """Return the size of every container that a core holds, however deep, by class and attribute."""
+    found: list[tuple[str, int]] = []
     seen: set[int] = set()
     todo: list[tuple[str, Any]] = [("", core)]
     while todo:
         where, value = todo.pop()
-        if id(value) in seen or (isinstance(value, CONSTANT) and not isinstance(value, REMEMBERED)):
+        kind = type(value)
+        if kind in SIMPLE or id(value) in seen or (isinstance(value, CONSTANT) and not isinstance(value, REMEMBERED)):
             continue
         seen.add(id(value))
-        if isinstance(value, dict | list | set | deque):
-            yield where, len(value)
-            todo += [(where, item) for item in (value.values() if isinstance(value, dict) else value)]
-        elif type(value).__module__.startswith("foosim."):
-            name = type(value).__name__
-            todo += [(f"{name}.{attribute}", found) for attribute, found in _attributes(value)]
+        if isinstance(value, (dict, list, set, deque)):
+            found.append((where, len(value)))
+            inside = value.values() if isinstance(value, dict) else value
+            todo += [(where, item) for item in inside if type(item) not in SIMPLE]
+        elif kind.__module__.startswith("foosim."):
+            todo += [(f"{kind.__name__}.{name}", held) for name, held in _attributes(value) if type(held) not in SIMPLE]
+    return found
 
 
 def _attributes(value: object) -> Iterator[tuple[str, Any]]:
@@ -90,6 +95,6 @@ def _attributes(value: object) -> Iterator[tuple[str, Any]]:
     for name in getattr(value, "__struct_fields__", ()):
         yield name, getattr(value, name)
     for kind in type(value).__mro__:
-        for name in getattr(kind, "__slots__", ()):
+        for name in (*getattr(kind, "__slots__", ()), *getattr(kind, "__mypyc_attrs__", ())):
             if hasattr(value, name):
                 yield name, getattr(value, name)

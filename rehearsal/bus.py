@@ -16,7 +16,7 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Weather:
     """What the bus does to messages: each takes `delay_ns` plus up to `spread_ns`, and is lost with `loss`.
 
@@ -34,7 +34,7 @@ CALM: Final = Weather()
 LATE_NS: Final = 2_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Traced:
     """One thing that a process did, as a test wants to see it: `what` is journal, publish or receive."""
 
@@ -60,6 +60,7 @@ class Bus:
         self._key = draw_key(weather.seed, "bus")
         self._heap: list[Message] = []
         self._readers: dict[tuple[str, str], list[str]] = {}
+        """By the channel's key and whom it names, empty for those who read all that comes on it."""
         self._mute: dict[str, int] = {}
         self._deaf: dict[str, int] = {}
         self._repeat_until_ns = 0
@@ -69,7 +70,7 @@ class Bus:
     def subscribe(self, process: str, reads: Iterable[tuple[Channel, bool]]) -> None:
         """Let a process read channels: all that comes on them, or only what is addressed to it."""
         for channel, own in reads:
-            readers = self._readers.setdefault((channel.name, channel.plane.name + (process if own else "")), [])
+            readers = self._readers.setdefault((channel.key, process if own else ""), [])
             if process not in readers:
                 readers.append(process)
 
@@ -100,9 +101,8 @@ class Bus:
             return
         if self._clogged:
             at_ns = max(at_ns, self._clogged.get(sender, 0))
-        plane = channel.plane.name
-        for key in ((channel.name, plane), (channel.name, plane + name)):
-            for reader in self._readers.get(key, ()):
+        for named in ("", name):
+            for reader in self._readers.get((channel.key, named), ()):
                 if reader == sender or (self._deaf and at_ns < self._deaf.get(reader, 0)):
                     continue
                 arrives_ns = max(at_ns, self._clogged.get(reader, 0)) if self._clogged else at_ns

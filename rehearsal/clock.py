@@ -11,7 +11,7 @@ from dataclasses import dataclass
 MILLION = 1_000_000
 
 
-@dataclass(slots=True)
+@dataclass
 class Clock:
     """One process's clock: what it shows at virtual time 0, and how much faster it goes."""
 

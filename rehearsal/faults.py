@@ -145,10 +145,8 @@ def _flip(dice: Dice, names: Sequence[str]) -> Fault:
             frame = core.frame
             values = frame.values.copy()
             values[int(place * len(values))] += 1.0
-            frame.values = values
+            frame.take(values)
             system.flipped.add(name)
-            for cached in ("digest", "numbers"):
-                frame.__dict__.pop(cached, None)
 
     return Fault(_tick(dice), "flip", f"a number of {name}'s frame changes", _here(name, do))
 
@@ -224,7 +222,7 @@ def _echo_of_old(dice: Dice, names: Sequence[str]) -> Fault:
 # --- people ----------------------------------------------------------------------------------------------------------
 
 
-OF_TABLE: Final = ("red.goal", "red.attack", "blue.defence", "camera")
+OF_TABLE: Final[tuple[str, ...]] = ("red.goal", "red.attack", "blue.defence", "camera")
 
 
 def _move(dice: Dice, names: Sequence[str]) -> Fault:
@@ -337,5 +335,5 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
 KINDS: Final = list(FAULT_OF)
 CHANGES_THE_WORLD: Final = frozenset({"add", "push", "machine"})
 """Kinds after which the world is another one. After all others it is the one that would have been."""
-ONCE: Final = ("flip",)
+ONCE: Final[tuple[str, ...]] = ("flip",)
 """Kinds of which one a seed is enough: if all nodes had other frames, none would be right."""

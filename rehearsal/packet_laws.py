@@ -17,6 +17,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Commit, Delivered, Deliveries, Done, Down, Go, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
+from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import System
 from foosim.vhub.naming import in_branch
@@ -28,12 +29,8 @@ Key = tuple[str, str, int, int]
 """A packet: source, destination, sequence number, copy."""
 LOST_TICKS_MAX: Final = 1000
 """More than a machine that is lost takes with it: what led to fates that come again is kept for so long."""
-OPEN: Final = ("", IN_FLIGHT)
+OPEN: Final[tuple[str, ...]] = ("", IN_FLIGHT)
 """What stands for a cause where a packet was not dropped."""
-
-
-class Broken(AssertionError):
-    """A law does not hold."""
 
 
 def hold(law: bool, what: str) -> None:

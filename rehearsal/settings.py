@@ -22,7 +22,7 @@ from foosim.vhub.core import HubCore
 from foosim.vhub.records import Closing
 
 
-@dataclass(slots=True)
+@dataclass
 class Process:
     """One process of the rehearsal: its core, and what a shell would know."""
 
@@ -41,7 +41,7 @@ class Process:
     clock: Clock = field(default_factory=Clock)
 
 
-@dataclass(slots=True)
+@dataclass
 class Settings:
     """How to rehearse: everything beside the deployment. `slow_ns` is by process name."""
 

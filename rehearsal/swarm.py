@@ -23,6 +23,7 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.bounds import too_large
 from foosim.rehearsal.bus import CALM, Traced, Weather
 from foosim.rehearsal.clock import Clock
+from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.faults import (
     CHANGES_THE_WORLD,
     FAULT_OF,
@@ -39,14 +40,14 @@ from foosim.rehearsal.faults import (
     when_answered,
 )
 from foosim.rehearsal.laws import Laws
-from foosim.rehearsal.packet_laws import Broken, hold
+from foosim.rehearsal.packet_laws import hold
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
 
-FAULTS: Final = (8, 20)
-NODES: Final = (3, 3, 3, 4, 4, 5)
+FAULTS: Final[tuple[int, ...]] = (8, 20)
+NODES: Final[tuple[int, ...]] = (3, 3, 3, 4, 4, 5)
 HEALED_PACE: Final = "0.02x"
 """100 ms a tick: slow enough that all are back before the end."""
 PROGRESS_NS: Final = 10_000_000_000
@@ -58,15 +59,15 @@ IDLE_NS: Final = 60_000_000_000
 WORLDS: Final = 4
 """How many worlds there are: seeds differ in what happens to the processes, and take the next of these in turn."""
 PROBER: Final = "prober"
-SMALL: Final = (
+SMALL: Final[tuple[str, ...]] = (
     "engine=pure",
     "substeps=1",
     f"clients={{{PROBER}: {{lockstep: true, rate: 50 Hz}}}}",
 )
 """What is computed is the same, with fewer steps to it, and robots are asked for echoes."""
-OF_TABLE: Final = ("table.rules.kickoff_delay=20 ms",)
+OF_TABLE: Final[tuple[str, ...]] = ("table.rules.kickoff_delay=20 ms",)
 """The ball of a table rolls from the start."""
-PATIENT: Final = (
+PATIENT: Final[tuple[str, ...]] = (
     "deadlines.tick_lost=5 s",
     "deadlines.lockstep_fast=24 h",
     "deadlines.lockstep_realtime=24 h",
@@ -131,7 +132,7 @@ def _later(fault: Fault, ticks: int) -> Fault:
 class Prober:
     """A lockstep client that asks robots for echoes, each with a number of its own, and counts what comes back."""
 
-    OF_TABLE: Final = ("blue.goal", "camera", "red.midfield")
+    OF_TABLE: Final[tuple[str, ...]] = ("blue.goal", "camera", "red.midfield")
 
     def __init__(self, core: ClientCore) -> None:
         self._core = core

@@ -12,6 +12,8 @@ from dataclasses import replace
 from heapq import heappop, heappush
 from typing import Any, Final
 
+from mypy_extensions import mypyc_attr
+
 from foosim.client.core import ClientCore
 from foosim.client.player import PlayerLoop, load_player
 from foosim.node.solver import Solver
@@ -24,6 +26,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import Bus, Message, Traced
 from foosim.rehearsal.clock import Clock
+from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.hub_journal import Ending, HubJournal
 from foosim.rehearsal.settings import Process, Settings
 from foosim.supervisor.plan import RunSettings
@@ -41,10 +44,7 @@ HUB_BACK_NS: Final = 300_000_000
 """After how long a vHub that ended is there again, as a launcher starts it."""
 
 
-class Stuck(AssertionError):
-    """No commit for too long on the virtual clock."""
-
-
+@mypyc_attr(allow_interpreted_subclasses=True)
 class System:
     """All processes of one deployment. Build it, then `run`."""
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
+from mypy_extensions import mypyc_attr
+
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.asset_messages import Fetch
@@ -67,6 +69,7 @@ PREPARE_NS: Final = 200_000_000
 """How often a layout that nodes have not built yet is asked for again."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class SupervisorCore:
     """The supervisor's state machine. `actions` is what the shell performs next."""
 

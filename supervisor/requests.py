@@ -42,7 +42,7 @@ IMPULSE_MAX = 10.0
 """N s on a free body: more than any kick, less than what leaves the world at once."""
 
 
-@dataclass(slots=True)
+@dataclass
 class _Waiting:
     """A change of layout that waits for every node's engine."""
 

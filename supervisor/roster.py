@@ -16,10 +16,10 @@ from foosim.protocol.errors import show
 from foosim.protocol.messages import Heartbeat, Hello, Ready
 from foosim.protocol.names import nearest_name
 
-ROLES: Final = ("node", "vhub")
+ROLES: Final[tuple[str, ...]] = ("node", "vhub")
 
 
-@dataclass(slots=True)
+@dataclass
 class Process:
     """One process that takes part."""
 

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from math import cos, sin, sqrt
 from typing import Final
 
+from mypy_extensions import mypyc_attr
+
 from foosim.node.engines.pure_bodies import Ball, Log, Pair, Rod, meet_ball, meet_rod, meet_scenery, yield_rod
 from foosim.node.engines.pure_shapes import Contact, Figures, Scenery
 from foosim.protocol.deployment import Deployment
@@ -27,6 +29,7 @@ DEPTH_MIN: Final = 1e-12
 """Overlaps below this (m) are rounding."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class PureEngine:
     """The bodies of one layout."""
 

@@ -23,7 +23,7 @@ REST_SPEED: Final = 1e-9
 """A ball that rolling friction has slowed to this (m/s) stands still."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Pair:
     """What a ball feels of a surface: restitution, friction, rolling friction (m); `silent` ones are not logged."""
 

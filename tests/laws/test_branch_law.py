@@ -17,10 +17,10 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.hub_messages import Standing
 from foosim.protocol.messages import Add, ClientWelcome, Epoch, Push
 from foosim.rehearsal.bus import CALM, Weather
+from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.faults import TICKS, Fault, ask
 from foosim.rehearsal.laws import Laws
 from foosim.rehearsal.machines import lose_hub, lose_supervisor
-from foosim.rehearsal.packet_laws import Broken
 from foosim.rehearsal.settings import Settings
 from foosim.rehearsal.swarm import Flight, Plan
 from foosim.rehearsal.system import System
