@@ -26,8 +26,8 @@ COMPILED: Final = {
         *("shadowing", "timings"),
     ),
     "vhub/stages": (
-        *("__init__", "admit", "channel", "delay", "mangle", "medium", "policy", "queue", "receiver"),
-        *("residual", "stage"),
+        *("__init__", "admit", "capacity", "channel", "delay", "duty", "mangle", "medium", "own", "policy"),
+        *("queue", "receiver", "residual", "stage"),
     ),
 }
 """Modules by folder. Types of messages and rows stay as they are: those of msgspec are compiled already."""
