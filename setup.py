@@ -19,6 +19,12 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError
 
 COMPILED: Final = {
+    "client": (
+        *("beacons", "core", "crew", "dispatch", "packets", "patrol", "payloads", "player", "players", "roadmap"),
+        *("steering", "tracking"),
+    ),
+    "node/engines": ("rovers",),
+    "node/sensors": ("__init__", "ball", "battery", "encoder", "fitting", "odometry", "pose", "proximity"),
     "protocol": ("draws", "scene"),
     "vhub": ("air", "budget", "fabric", "geometry", "links", "propagation", "rays", "setup", "world"),
     "vhub/radio": (
