@@ -16,7 +16,7 @@ from typing import Final
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
-from setuptools.errors import BaseError
+from setuptools.errors import BaseError, CCompilerError
 
 COMPILED: Final = {
     "client": (
@@ -62,11 +62,13 @@ class CompileOrLeave(build_ext):
         """Build the extensions; raises what setuptools raises where they must be and cannot."""
         try:
             super().run()
-        except BaseError as error:
+        except (BaseError, CCompilerError) as error:
             if choice() == "always":
                 raise
-            print(f"foosim is installed without its compiled modules, so it is slower: {error}", file=sys.stderr)
-            shutil.rmtree(self.build_lib, ignore_errors=True)
+            why = str(error)[:200]
+            print(f"foosim gets no compiled modules, so it is slower; a C compiler is missing or fails: {why}")
+            for path in self.get_outputs():
+                Path(path).unlink(missing_ok=True)
             self.extensions = []
 
 
@@ -91,7 +93,7 @@ def extensions() -> list[Extension]:
     files = [str(TYPED / "foosim" / folder / f"{name}.py") for folder, names in COMPILED.items() for name in names]
     made = mypycify([*MYPY, *files], multi_file=True, target_dir="build/c", group_name="foosim")
     for extension in made:
-        extension.extra_compile_args.extend(EXACT)
+        extension.extra_compile_args = [*extension.extra_compile_args, *EXACT]
     return made
 
 

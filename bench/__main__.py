@@ -124,8 +124,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"no bench {', '.join(unknown)}; there are {', '.join(names)}")
     people = sys.stderr if chosen.json else sys.stdout
     here = machine.this_machine()
+    how = "compiled" if here.is_compiled else "interpreted"
     print(
-        f"{here.cores} cores, {here.cpu}, Python {here.python}, load {here.load:.2f} before the bench",
+        f"{here.cores} cores, {here.cpu}, Python {here.python}, {how}, load {here.load:.2f} before the bench",
         file=people,
         flush=True,
     )

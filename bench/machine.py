@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from foosim.protocol.fingerprint import is_compiled
+
 PROC: Final = Path("/proc")
 TICKS_PER_S: Final = os.sysconf("SC_CLK_TCK")
 PAGE_BYTES: Final = os.sysconf("SC_PAGE_SIZE")
@@ -19,11 +21,15 @@ PAGE_BYTES: Final = os.sysconf("SC_PAGE_SIZE")
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What was measured on. `load` is the average over the last minute, before the bench began."""
+    """What was measured on, and whether the hot path is compiled.
+
+    `load` is the average over the last minute, before the bench began.
+    """
 
     cores: int
     cpu: str
     python: str
+    is_compiled: bool
     system: str
     load: float
 
@@ -39,7 +45,12 @@ class Use:
 def this_machine() -> Machine:
     """Return what there is to know of this machine."""
     return Machine(
-        len(os.sched_getaffinity(0)), _cpu_model(), platform.python_version(), platform.platform(), os.getloadavg()[0]
+        len(os.sched_getaffinity(0)),
+        _cpu_model(),
+        platform.python_version(),
+        is_compiled(),
+        platform.platform(),
+        os.getloadavg()[0],
     )
 
 

@@ -12,6 +12,8 @@ import struct
 from functools import cache
 from hashlib import blake2b
 
+from foosim.protocol import draws
+
 
 @cache
 def library_fingerprint() -> bytes:
@@ -25,3 +27,8 @@ def library_fingerprint() -> bytes:
             )
         )
     return hasher.digest()
+
+
+def is_compiled() -> bool:
+    """Whether the hot path runs compiled (setup.py) on this machine: it computes the same bits, sooner."""
+    return not draws.__file__.endswith(".py")

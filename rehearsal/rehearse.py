@@ -26,6 +26,7 @@ from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import result
 from foosim.vhub.capture_file import origin_metadata
+from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import CaptureError
@@ -112,7 +113,7 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     rehearsed.json = result(system.supervisor)
     simulated = rehearsed.json["ticks"] - rehearsed.json["first_tick"]
     rehearsed.json["rtf"] = round(simulated * rehearsed.json["tick_ns"] / wall_ns, 3)
-    rehearsed.json["capture"] = None if capture is None else str(capture)
+    rehearsed.json["capture"] = None if capture is None else str(first_there(capture))
     rehearsed.answers = system.answers
     return rehearsed
 

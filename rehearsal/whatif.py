@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import msgspec
@@ -21,7 +21,7 @@ import numpy as np
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import Sent
-from foosim.rehearsal.whatif_reading import Offers, frames_for, world_of
+from foosim.rehearsal.whatif_reading import Frames, Offers, caveats, frames_for, world_of
 from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.profiles import Profiles
@@ -90,6 +90,10 @@ class WhatIf:
     new_causes: dict[str, int]
     changes: tuple[PacketChange, ...]
     """The first of the packets that changed."""
+    earlier: int = 0
+    """How many were sent before the capture begins, and are not judged again."""
+    caveats: tuple[str, ...] = ()
+    """Why fates may not be the captured ones even without another network."""
 
 
 @dataclass(slots=True)
@@ -141,9 +145,12 @@ def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatI
     Raises CaptureError for what the capture lacks.
     """
     compared = _Compared(capture)
-    for flight in _judged(capture, deployment or capture.deployment, compared.keep):
+    deployment = deployment or capture.deployment
+    frames = frames_for(capture, on_radio=Profiles(deployment, deployment.network).on_radio)
+    offers = Offers(capture, frames, compared.keep)
+    for flight in _judged(capture, deployment, offers, frames):
         compared.take(flight)
-    return compared.result()
+    return replace(compared.result(), earlier=offers.earlier, caveats=caveats(capture))
 
 
 class _Compared:
@@ -222,13 +229,8 @@ def _verdict(row: PacketRow) -> tuple[str, str, int, int, bytes]:
     return row.fate, row.cause, row.due_ns, row.arrival_tick, row.payload
 
 
-def _judged(capture: CaptureData, deployment: Deployment, take: Callable[[PacketRow], None]) -> Iterator[Flight]:
-    """Close the ticks of a capture again; yield the packets as their fates become final, the rest at the end.
-
-    `take` is given the captured rows, each before its packet is yielded.
-    """
-    frames = frames_for(capture, on_radio=Profiles(deployment, deployment.network).on_radio)
-    offers = Offers(capture, frames, take)
+def _judged(capture: CaptureData, deployment: Deployment, offers: Offers, frames: Frames) -> Iterator[Flight]:
+    """Close the ticks of a capture again; yield the packets as their fates become final, the rest at the end."""
     state = HubState(deployment, offers.first)
     with world_of(capture, frames) as frame_of:
         for offered in offers.ticks():

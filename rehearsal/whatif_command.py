@@ -51,13 +51,16 @@ def whatif(
         for line in differing_models(deployment.network, opened.about.versions):
             typer.echo(f"warning: {line}", err=True)
         found = what_if(opened, deployment)
+    for line in found.caveats:
+        typer.echo(f"warning: {capture}: {line}", err=True)
     if drawing is not None:
         _draw(drawing, found, capture.name)
     if json:
         content = asdict(found)
         typer.echo(encode_json(content if packets else {**content, "changes": []}).decode())
         return
-    typer.echo(f"{found.packets} packets, {found.changed} changed")
+    earlier = f", {found.earlier} sent before it begins" if found.earlier else ""
+    typer.echo(f"{found.packets} packets, {found.changed} changed{earlier}")
     _show_links(found)
     if packets:
         for change in found.changes:

@@ -20,6 +20,7 @@ from foosim.protocol.messages import RobotPacket, Sent
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick
+from foosim.vhub.capture_split import CUT_TICK
 from foosim.vhub.payload_hash import check_payloads
 from foosim.vhub.rows import CLIENTS, PACKETS, TICK, CaptureError, ClientRow, EditRow, PacketRow, TickRow
 from foosim.vhub.state import OUTBOX_SHIFT
@@ -54,6 +55,17 @@ def frames_for(capture: CaptureData, *, on_radio: bool) -> Frames:
     return "captured" if set(judged_ticks(capture)) <= set(capture.frame_ticks.tolist()) else "computed"
 
 
+def caveats(capture: CaptureData) -> tuple[str, ...]:
+    """Return why fates may not be the captured ones without another network: what of the run the capture lacks."""
+    found = []
+    if CUT_TICK in capture.about.metadata:
+        found.append("it begins within its run: what links remembered, and events asked for before, are not known")
+    end = capture.about.end
+    if not capture.finished or "problem" in end or end.get("reason") == "cut":
+        found.append("it does not have the end of its run: packets in flight there may lack, and take no part")
+    return tuple(found)
+
+
 def judged_ticks(capture: CaptureData) -> list[int]:
     """Return the ticks that are closed again: behind the last frame of a run that has its end nothing was sent."""
     ticks: list[int] = capture.ticks.tolist()
@@ -72,6 +84,8 @@ class Offers:
         self.first, self._stop = (ticks[0], ticks[-1] + 1) if ticks else (0, 0)
         self._next = self.first
         """The first tick that is not yielded yet."""
+        self.earlier = 0
+        """How many rows are of packets that were sent before the capture begins, and are not judged again."""
         self._offered: dict[int, Offered] = {}
         self._waiting: deque[int] = deque()
         """Ticks of which all is read but packets, perhaps, whose fates became final later."""
@@ -99,7 +113,7 @@ class Offers:
                 self._take_tick(scan.decode(self._ticks, message))
             elif topic == CLIENTS:
                 client = scan.decode(DECODERS[CLIENTS], message)
-                self._at(client.tick).came.append(client)
+                self._at(max(client.tick, self.first)).came.append(client)  # or before a cut begins
             else:
                 frame = reader.frame(message)
                 if frame is not None:
@@ -119,15 +133,16 @@ class Offers:
             self._waiting.append(row.tick)
 
     def _take_packet(self, row: PacketRow) -> None:
+        tick, source, sequence = row.sent_ns // self._tick_ns, row.source, row.sequence
+        if tick < self.first:
+            self.earlier += 1
+            return
         self._take(row)
         if row.copy:
             return
-        tick, source, sequence = row.sent_ns // self._tick_ns, row.source, row.sequence
         if tick < self._next:
-            if tick >= self.first:
-                what = f"a packet of {source} that was sent at tick {tick} stands behind what was sent later"
-                raise CaptureError(f"{self._capture.path}: {what}")
-            return  # before a cut begins
+            what = f"a packet of {source} that was sent at tick {tick} stands behind what was sent later"
+            raise CaptureError(f"{self._capture.path}: {what}")
         to = "" if row.published else row.destination
         payload = row.payload or bytes(row.size)  # of one that is hashed the size is all that a fate depends on
         offered = self._at(tick)

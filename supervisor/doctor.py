@@ -45,7 +45,7 @@ from foosim.protocol.certificates import (
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Refused
-from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.fingerprint import is_compiled, library_fingerprint
 from foosim.protocol.hosts import places
 from foosim.supervisor.guard import hosted_folder
 from foosim.supervisor.install import SYSTEM_FOLDER, USER_FOLDER
@@ -135,7 +135,7 @@ _Said = tuple[str, State, str, str]
 
 
 def _versions(case: Case) -> Iterator[_Said]:
-    """foosim, Python and each library against what this foosim asks for."""
+    """foosim, Python and each library against what this foosim asks for; whether the hot path is compiled."""
     yield "foosim", "fine", f"{importlib.metadata.version('foosim')}, protocol {limits.PROTOCOL_VERSION}", ""
     python = platform.python_version()
     if sys.version_info[:2] == PYTHON_TESTED:
@@ -143,6 +143,8 @@ def _versions(case: Case) -> Iterator[_Said]:
     else:
         tested = ".".join(map(str, PYTHON_TESTED))
         yield "python", "warning", f"{python}; foosim is tested with {tested}", f"install Python {tested}"
+    slower = "interpreted: the same bits, more slowly; installed by pip, where there is a C compiler, it is compiled"
+    yield "hot path", "fine", "compiled" if is_compiled() else slower, ""
     for line in importlib.metadata.requires("foosim") or ():
         wanted = Requirement(line)
         if wanted.marker is None or wanted.marker.evaluate({"extra": ""}):

@@ -33,7 +33,7 @@ from foosim.supervisor.remote import CAPTURE
 from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
-from foosim.vhub.capture_parts import parts_at
+from foosim.vhub.capture_parts import first_there, parts_at
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 
@@ -432,7 +432,7 @@ class Up:
             reason = f"lost {self._lost.name}: it {self._lost.ending}"  # the supervisor never knew it
             result = {**result, "reason": reason, "failed": True}
         if result is not None and VHUB in self._launcher.remotes and self.capture is not None:
-            result = {**result, "capture": str(self.capture) if parts_at(self.capture) else None}
+            result = {**result, "capture": str(first_there(self.capture)) if parts_at(self.capture) else None}
         reason = "the run did not end in order" if result is None else f"the run has ended: {result['reason']}"
         recoveries = [] if result is None else result["recoveries"][self._told :]
         lines = [*map(recovery_text, recoveries), reason, *self._lost_lines(), *self._capture_lines()]
@@ -455,7 +455,8 @@ class Up:
         result = self.folder.result()
         wrong = "" if result is None else recording_text(result)
         count = f", {len(files)} files" if len(files) > 1 else ""
-        lines = [f"capture {self.capture}{count}" if finished else f"capture {self.capture}{count} (unfinished)"]
+        first = next(iter(files.values()))
+        lines = [f"capture {first}{count}" if finished else f"capture {first}{count} (unfinished)"]
         return [*lines, wrong] if wrong else lines
 
     @contextmanager

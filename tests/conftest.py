@@ -70,11 +70,17 @@ def fleet_text() -> Callable[..., str]:
     return text
 
 
+TOGETHER = ("tests/wire/", "tests/test_wheel.py")
+
+
 class WireTogether(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
-    """Spreads tests one by one, but gives tests/wire to one worker: its runs would starve one another of cores."""
+    """Spreads tests one by one, but gives tests/wire to one worker: its runs would starve one another of cores.
+
+    So it does with the tests of the wheel, which is built once.
+    """
 
     def _split_scope(self, nodeid: str) -> str:
-        return "tests/wire" if nodeid.startswith("tests/wire/") else nodeid
+        return next((place for place in TOGETHER if nodeid.startswith(place)), nodeid)
 
 
 @pytest.hookimpl(optionalhook=True)  # optional, so that pytest also runs with `-p no:xdist`

@@ -1,21 +1,17 @@
-"""The rules of the house, as tests: who may import whom, what stays pure, how long things get, what a wheel holds.
+"""The rules of the house, as tests: who may import whom, what stays pure, how long things get.
 
-They read the source as text and syntax trees, and import nothing of it, apart from the last two, which install it.
+They read the source as text and syntax trees, and import nothing of it, apart from the last one.
 A rule that is in the way is changed here, in one place, with its reason.
 """
 
 import ast
 import importlib
 import re
-import subprocess
-import sys
 import tomllib
-import venv
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from shutil import copytree, ignore_patterns
 from typing import Any
 
 import pytest
@@ -293,6 +289,69 @@ def test_tests_are_no_package() -> None:
     assert not list((ROOT / "tests").rglob("__init__.py"))
 
 
+def compiled() -> dict[str, ast.Module]:
+    """The modules that setup.py compiles, by dotted name, as syntax trees."""
+    (value,) = (
+        node.value
+        for node in tree_of(ROOT / "setup.py").body
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "COMPILED" and node.value is not None
+    )
+    named: dict[str, tuple[str, ...]] = eval(ast.unparse(value))
+    assert all(list(names) == sorted(set(names)) for names in (*named.values(), named)), "in order, each once"
+    paths = [ROOT / folder / f"{name}.py" for folder, names in named.items() for name in names]
+    return {".".join(("foosim", *path.relative_to(ROOT).with_suffix("").parts)): tree_of(path) for path in paths}
+
+
+def test_what_derives_from_a_compiled_class_is_compiled() -> None:
+    """An interpreted class cannot: it fails when it is made."""
+    modules = compiled()
+    wrong = []
+    for path in ALL_FILES:
+        named = {
+            alias.asname or alias.name: node.module
+            for node in ast.walk(tree_of(path))
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        if tree_of(path) in modules.values():
+            continue
+        wrong += [
+            f"{name_of(path)}:{node.lineno}: {node.name} derives from a class of {named[base.id]}"
+            for node in ast.walk(tree_of(path))
+            if isinstance(node, ast.ClassDef)
+            for base in node.bases
+            if isinstance(base, ast.Name) and named.get(base.id) in modules
+            if not is_open(modules[str(named[base.id])], base.id)
+        ]
+    assert not wrong, "\n".join(wrong)
+
+
+def is_open(tree: ast.Module, name: str) -> bool:
+    """Whether a compiled class says that interpreted ones may derive from it."""
+    (found,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == name)
+    return "allow_interpreted_subclasses" in ast.dump(found)
+
+
+def test_no_compiled_constant_is_a_tuple_of_floats_of_a_fixed_length() -> None:
+    """Those of mypyc 2.4 count as not set."""
+    fixed = re.compile(r"Final(?!.*\.\.\.).*")
+    wrong = [
+        f"{module}:{node.lineno}: {ast.unparse(node.target)}"
+        for module, tree in compiled().items()
+        for node in tree.body
+        if isinstance(node, ast.AnnAssign) and isinstance(node.value, ast.Tuple)
+        if fixed.fullmatch(ast.unparse(node.annotation)) and are_floats(node.value.elts)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def are_floats(values: list[ast.expr]) -> bool:
+    """Whether all look like numbers of which one is no whole one."""
+    whole = [isinstance(value, ast.Constant) and not isinstance(value.value, float) for value in values]
+    nested = any(isinstance(value, ast.Tuple | ast.Starred) for value in values)
+    return not all(whole) and not nested
+
+
 def test_every_package_folder_is_in_the_wheel() -> None:
     folders = sorted({path.parent.relative_to(ROOT) for path in SOURCES})
     setuptools = PYPROJECT["tool"]["setuptools"]
@@ -312,39 +371,3 @@ def test_the_makefile_links_every_package_for_the_type_checker() -> None:
 def test_each_command_has_its_function(script: str) -> None:
     module, _, function = PYPROJECT["project"]["scripts"][script].partition(":")
     assert callable(getattr(importlib.import_module(module), function))
-
-
-def run(*arguments: str | Path, cwd: Path) -> str:
-    """Standard output of a command, which must succeed."""
-    done = subprocess.run([*map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{arguments}:\n{done.stdout}\n{done.stderr}"
-    return done.stdout
-
-
-def test_the_wheel_of_the_sdist_holds_every_module(tmp_path: Path) -> None:
-    """Build in a copy (a stale build/ would ship deleted modules), install in a clean environment, import all of it."""
-    source = tmp_path / "source"
-    source.mkdir()
-    for package in PACKAGES:
-        copytree(ROOT / package, source / package, ignore=ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
-        (source / name).write_bytes((ROOT / name).read_bytes())
-    # Without --wheel or --sdist, build makes the sdist, and the wheel from what is in the sdist.
-    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", cwd=source)
-    (wheel,) = (tmp_path / "dist").glob("*.whl")
-
-    environment = tmp_path / "environment"
-    venv.create(environment, symlinks=True)
-    python = environment / "bin" / "python"
-    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=tmp_path)
-    # Our dependencies, by a path file: it adds a folder without running what the folder's own path files ask for, so
-    # the editable install beside them stays out of sight.
-    (site_packages,) = environment.glob("lib/python*/site-packages")
-    (site_packages / "dependencies.pth").write_text("\n".join(path for path in sys.path if path.endswith("-packages")))
-
-    program = "from importlib import import_module as get; import sys\n"
-    program += "for name in sys.argv[1:]: assert get(name).__file__.startswith(sys.prefix), get(name)"
-    run(python, "-I", "-W", "error", "-c", program, *modules(), cwd=tmp_path)
-    assert len(list(site_packages.glob("foosim/*/py.typed"))) == len(PACKAGES)
-    for script in PYPROJECT["project"]["scripts"]:
-        assert "Usage" in run(environment / "bin" / script, "--help", cwd=tmp_path)

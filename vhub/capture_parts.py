@@ -64,6 +64,11 @@ def parts_at(path: Path) -> dict[int, Path]:
     return dict(sorted(found.items()))
 
 
+def first_there(path: Path) -> Path:
+    """Return the first file of the capture that begins at `path`; one that keeps its last alone lets files go."""
+    return next(iter(parts_at(path).values()), path)
+
+
 def head_of(path: Path) -> dict[str, str]:
     """Return what a file says of itself at its beginning; nothing when it does not. Raises CaptureError."""
     try:

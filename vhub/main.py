@@ -43,6 +43,7 @@ from foosim.protocol.process import Stop, die_with_parent, machine_start, new_bo
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.vhub.capture_file import check_new, origin_metadata
+from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
@@ -303,6 +304,7 @@ class HubProcess:
             end = self.core.ended
             reason = "not ended in order" if end is None else end.reason
             self._capture.finish({"reason": reason, "ended": wall.now_text()})
+            self.core.capture = str(first_there(Path(self.core.capture)))
         if self._room is not None:
             self.core.recording = self._room.recording
         if self._journal is not None:

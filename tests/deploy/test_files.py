@@ -135,7 +135,7 @@ def test_the_image_is_made_of_what_there_is_and_of_all_packages() -> None:
     sources = {source for words in copied for source in words}
     assert not [source for source in sources if not (ROOT / source).exists()]
     packages = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-dir"].values()
-    assert sources >= {*packages, "pyproject.toml", "README.md", "LICENSE"}
+    assert sources >= {*packages, "pyproject.toml", "setup.py", "README.md", "LICENSE"}
     let_in = {line[1:] for line in (DEPLOY / "Dockerfile.dockerignore").read_text().splitlines() if line[:1] == "!"}
     assert let_in == sources
     instructions = {line.split()[0] for line in lines if line and not line.startswith(("#", " "))}

@@ -21,7 +21,8 @@ from tests.replay.conftest import TABLE, TICKS, disturb, replay
 
 def captured(path: Path, *sets: str) -> Path:
     sets = ("engine=pure", "capture.split_time=100 ms", *sets)
-    rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, sets, prepare=disturb, capture=path)
+    rehearsed = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, sets, prepare=disturb, capture=path)
+    assert rehearsed.json["capture"] == str(files_from(path)[0]), "a file that is there"
     return path
 
 

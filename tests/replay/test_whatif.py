@@ -165,3 +165,18 @@ def test_an_unfinished_capture_is_judged_as_far_as_it_goes(tmp_path: Path) -> No
     torn.write_bytes(whole.read_bytes()[: whole.stat().st_size * 2 // 3])
     found = what_if(open_capture(torn))
     assert found.packets > 0
+    assert "does not have the end of its run" in replay("whatif", torn).err
+
+
+def test_a_part_is_judged_by_what_it_has(tmp_path: Path) -> None:
+    """Who took part before it began takes part; what was sent before that is not judged."""
+    whole, part = captured(tmp_path / "run.mcap", "wifi"), tmp_path / "part.mcap"
+    assert replay("cut", whole, "--from", "0.2 s", "-o", part).code == 0
+    found, all_of_it = what_if(open_capture(part)), what_if(open_capture(whole))
+    assert found.earlier > 0 and found.packets > all_of_it.packets * 2 // 5
+    assert found.changed <= found.packets // 50, "what links remembered alone is missing"
+    assert [caveat.partition(":")[0] for caveat in found.caveats] == [
+        "it begins within its run",
+        "it does not have the end of its run",
+    ]
+    assert all_of_it.caveats == ()

@@ -69,7 +69,10 @@ _OFDM: Final = (
 )
 _HT: Final = ((2, "1/2"), (4, "1/2"), (4, "3/4"), (16, "1/2"), (16, "3/4"), (64, "2/3"), (64, "3/4"), (64, "5/6"))
 _HT_BITS: Final = (26, 52, 78, 104, 156, 208, 234, 260)
-_BINOMIALS: Final = (120, -560, 1820, -4368, 8008, -11440, 12870, -11440, 8008, -4368, 1820, -560, 120, -16, 1)
+_BINOMIALS: Final[tuple[int, ...]] = (
+    *(120, -560, 1820, -4368, 8008, -11440, 12870, -11440),
+    *(8008, -4368, 1820, -560, 120, -16, 1),
+)
 """(-1)^k C(16, k) for k = 2 to 16."""
 
 
@@ -208,7 +211,7 @@ LTE_MAX_BPS_HZ: Final = {"down": 4.4, "up": 2.0}
 """Share of Shannon's capacity, and its upper end. Source: 3GPP TR 36.942 A.2, recalled, unverified."""
 HARQ_ROUND_NS: Final = 8_000_000
 HARQ_ATTEMPTS: Final = 4
-_HARQ: Final = (UNIT // 10, UNIT // 100, UNIT // 1_000, UNIT // 10_000)
+_HARQ: Final[tuple[int, ...]] = (UNIT // 10, UNIT // 100, UNIT // 1_000, UNIT // 10_000)
 """The first transmission fails with 10 %, and so does each repetition. Recalled, unverified."""
 
 

@@ -1,0 +1,121 @@
+"""The wheel that pip builds from the sdist: it holds every module; what is compiled in it computes the same bits."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import venv
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGES = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
+INTERPRETED = Path(sys.executable).parent
+COMPILERS = ("cc", "gcc", "clang")
+AIR = "radios: {air: {preset: wifi_5_indoor}}, robots: {'*': [air]}, places: {'*': [0 m, 0 m, 1 m]}"
+RUNS = {
+    "table": ("table.yaml", "--for", "500ms"),
+    "table, shared air": (
+        "table.yaml",
+        *("--for", "500ms", "--engine", "pure"),
+        *("--set", f"network={{{AIR}}}"),
+    ),
+    "warehouse": ("warehouse.yaml", "--for", "1s"),
+}
+pytestmark = pytest.mark.timeout(900)  # the compiler alone takes a minute of a core that others use as well
+
+
+def run(*arguments: str | Path, cwd: Path, **environment: str) -> str:
+    """Standard output of a command, which must succeed."""
+    done = subprocess.run(
+        [*map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False, env={**os.environ, **environment}
+    )
+    assert done.returncode == 0, f"{arguments}:\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def copy_source(to: Path) -> None:
+    """Builds are made in a copy: a stale build/ would ship deleted modules."""
+    to.mkdir()
+    for package in PACKAGES:
+        shutil.copytree(ROOT / package, to / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, to)
+
+
+@dataclass
+class Installed:
+    """A clean environment with the wheel; our dependencies are seen from there."""
+
+    environment: Path
+    packages: Path
+
+    @property
+    def commands(self) -> Path:
+        return self.environment / "bin"
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
+    folder = tmp_path_factory.mktemp("wheel")
+    copy_source(folder / "source")
+    # Without --wheel or --sdist, build makes the sdist, and the wheel from what is in the sdist.
+    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, cwd=folder / "source")
+    (wheel,) = folder.glob("*.whl")
+    environment = folder / "environment"
+    venv.create(environment, symlinks=True)
+    python = environment / "bin" / "python"
+    run(sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=folder)
+    # Our dependencies, by a path file: it adds a folder without running what the folder's own path files ask for, so
+    # the editable install beside them stays out of sight.
+    (packages,) = environment.glob("lib/python*/site-packages")
+    (packages / "dependencies.pth").write_text("\n".join(path for path in sys.path if path.endswith("-packages")))
+    return Installed(environment, packages)
+
+
+def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
+    files = [path.relative_to(ROOT) for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    modules = [".".join(("foosim", *file.with_suffix("").parts)).removesuffix(".__init__") for file in files]
+    program = "from importlib import import_module as get; import sys\n"
+    program += "for name in sys.argv[1:]: assert get(name).__file__.startswith(sys.prefix), get(name)"
+    run(installed.commands / "python", "-I", "-W", "error", "-c", program, *modules, cwd=tmp_path)
+    assert len(list(installed.packages.glob("foosim/*/py.typed"))) == len(PACKAGES)
+    scripts = re.findall(r"^(foosim-\w+) = ", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    assert "foosim-supervisor" in scripts
+    for script in scripts:
+        assert "Usage" in run(installed.commands / script, "--help", cwd=tmp_path)
+
+
+@pytest.mark.skipif(not any(map(shutil.which, COMPILERS)), reason="no C compiler here")
+@pytest.mark.parametrize("name", RUNS)
+def test_compiled_and_interpreted_are_one_world(installed: Installed, tmp_path: Path, name: str) -> None:
+    """Equal frames, fates and rows, to the last bit."""
+    assert list(installed.packages.glob("foosim/vhub/rays.*.so"))
+    file, *options = RUNS[name]
+    for commands in (installed.commands, INTERPRETED):
+        capture = tmp_path / f"{commands.parent.name}.mcap"
+        run(commands / "foosim-rehearse", ROOT / "deploy" / file, *options, "--capture", capture, cwd=tmp_path)
+    run(INTERPRETED / "foosim-replay", "diff", *sorted(tmp_path.glob("*.mcap")), cwd=tmp_path)
+
+
+def test_without_a_c_compiler_the_source_is_installed_alone(tmp_path: Path) -> None:
+    """Half of the compiled modules would not import. Few are tried here, so that mypyc is done soon."""
+    source = tmp_path / "source"
+    copy_source(source)
+    setup = source / "setup.py"
+    few = 'COMPILED = {"protocol": ("draws",)}\n'
+    text, count = re.subn(r"(?s)COMPILED: Final = \{.*?\n\}\n", few, setup.read_text())
+    assert count == 1
+    setup.write_text(text)
+    build = sys.executable, "-m", "build", "--no-isolation", "--wheel", "--outdir", tmp_path
+    assert "foosim gets no compiled modules" in run(*build, cwd=source, CC="/nowhere/cc", FOOSIM_COMPILE="auto")
+    (wheel,) = tmp_path.glob("*.whl")
+    names = run(sys.executable, "-m", "zipfile", "--list", wheel, cwd=tmp_path)
+    assert "foosim/protocol/draws.py" in names and ".so" not in names
+    for choice, says in {"always": "/nowhere/cc", "perhaps": "it can be auto, always, never"}.items():
+        environment = {**os.environ, "CC": "/nowhere/cc", "FOOSIM_COMPILE": choice}
+        done = subprocess.run(build, cwd=source, capture_output=True, text=True, check=False, env=environment)
+        assert done.returncode and says in done.stdout + done.stderr
