@@ -19,9 +19,14 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
 COMPILED: Final = {
+    "client": (
+        *("beacons", "core", "crew", "dispatch", "packets", "patrol", "payloads", "player", "players", "roadmap"),
+        *("steering", "tracking"),
+    ),
     "node": ("core", "edits", "hall_world", "held", "inputs", "rules", "solver", "step", "table_world", "world"),
     "node/actuators": ("__init__", "drive", "position"),
-    "node/engines": ("pure", "pure_bodies", "pure_shapes"),
+    "node/engines": ("pure", "pure_bodies", "pure_shapes", "rovers"),
+    "node/sensors": ("__init__", "ball", "battery", "encoder", "fitting", "odometry", "pose", "proximity"),
     "protocol": (
         *("actions", "assign", "barrier", "channels", "codec", "draws", "frame", "layout", "limits", "member"),
         *("obstacles", "patience", "refusals", "sampling", "scene", "start"),

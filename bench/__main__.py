@@ -27,6 +27,7 @@ from bench import (
     table_one_process,
     verdict,
     vhub_loss,
+    warehouse,
     whatif,
 )
 from bench.runs import BenchError
@@ -71,6 +72,12 @@ BENCHES: Final = (
         "two nodes, vHub recording, supervisor, two lockstep players, as fast as it goes",
         with_default(distributed.distributed),
         distributed.lines,
+    ),
+    Bench(
+        "warehouse",
+        "twenty rovers with their controllers and a recording vHub, as fast as it goes",
+        with_default(warehouse.warehouse),
+        warehouse.lines,
     ),
     Bench(
         "certificates",

@@ -7,6 +7,7 @@ Neighbours: `distributed`, `realtime` and `echo` measure by it.
 from __future__ import annotations
 
 import io
+import os
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,7 @@ from foosim.supervisor.up import Up
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 TABLE: Final = ROOT / "deploy" / "table.yaml"
+LAUNCHER: Final = "launcher"
 ANSWER_S: Final = 30.0
 EAGER_S: Final = 0.02
 """How often the status is asked for until the first tick is there."""
@@ -105,12 +107,14 @@ class Watch(Display):
             computed_s = 0.0 if status["pace"] != "realtime" else status["ticks"] * status["tick_ns"] / 1e9
             self.first_tick_s = seen_s - computed_s
             self.every_s = self._later_every_s
-        self.looks.append(Look(seen_s, status["ticks"], uses_of_children()))
+        self.looks.append(Look(seen_s, status["ticks"], uses_of_run()))
 
 
-def uses_of_children() -> dict[str, Use]:
-    """Return what the processes of the run have used, by their names in the run."""
-    found = {}
+def uses_of_run() -> dict[str, Use]:
+    """Return what the processes of the run have used, by their names in the run; this one is its launcher."""
+    own = use_of(os.getpid())
+    assert own is not None, "this process is there"
+    found = {LAUNCHER: own}
     for pid, command in children().items():
         name, use = name_of(command), use_of(pid)
         if name and use is not None:
@@ -134,8 +138,9 @@ def watch(
     helpers: Helpers | None = None,
     pki: Path | None = None,
     read: Callable[[Path], Any] | None = None,
+    deployment: Path = TABLE,
 ) -> Watched:
-    """Run the table with a capture, with the helpers beside it, with certificates where `pki` has them.
+    """Run a deployment with a capture, with the helpers beside it, with certificates where `pki` has them.
 
     `read` is given the finished capture.
 
@@ -143,7 +148,7 @@ def watch(
     """
     port = free_ports()
     options = RunOptions(
-        TABLE, pace, f"{round(duration_s * 1000)} ms", None, tuple(sets), listen=f"127.0.0.1:{port}", pki=pki
+        deployment, pace, f"{round(duration_s * 1000)} ms", None, tuple(sets), listen=f"127.0.0.1:{port}", pki=pki
     )
     begun_s = time.monotonic()
     plan = make_plan(options)

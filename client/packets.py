@@ -7,8 +7,7 @@ The vHub refuses and counts what does not fit; here the sender is told. Neighbou
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from foosim.client.errors import PacketError, UnknownName
 from foosim.protocol import limits
@@ -20,8 +19,7 @@ PACKET_OVERHEAD_BYTES: Final = 128
 """No packet takes more in a message beside its payload: two names and two numbers."""
 
 
-@dataclass(frozen=True, slots=True)
-class Outgoing:
+class Outgoing(NamedTuple):
     """A packet to send: opaque `payload` to a robot's (or another client's) `channel`.
 
     An empty `destination` is a broadcast: it goes to all who have subscribed to this client's `channel`.

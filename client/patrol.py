@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import atan2, cos, hypot, pi, sin
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from foosim.client.beacons import (
     BEACON,
@@ -102,8 +102,7 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     return settings
 
 
-@dataclass(slots=True)
-class Heard:
+class Heard(NamedTuple):
     """What is known of another rover, and when (s) it was told that."""
 
     at_s: float

@@ -168,7 +168,7 @@ def encode_payload(kind: str, value: Value) -> bytes:
     for field, number in zip(make._fields, value, strict=True):
         if not isinstance(number, int | float):
             raise BadValue(f"{kind}.{field} is not a number", number)
-        if not abs(number) <= FLOAT_MAX:
+        if not -FLOAT_MAX <= number <= FLOAT_MAX:
             raise BadValue(f"{kind}.{field} is not finite", number)
     return packed.pack(*value)
 

@@ -11,7 +11,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final, NamedTuple, Protocol, cast
 
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PacketError, PlayerError, UnknownName
@@ -25,8 +25,7 @@ from foosim.protocol.messages import Received
 NS_PER_S: Final = 1_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
+class Sample(NamedTuple):
     """One packet of an endpoint's channel: its value, and when it was sent and due (simulated ns)."""
 
     source: str

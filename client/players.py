@@ -43,7 +43,7 @@ KICKED_RAD: Final = 1.6
 """Where a kick aims; it is over before, at THROUGH_RAD."""
 THROUGH_RAD: Final = 0.6
 KICK_S: Final = 0.06
-REACH_M: Final = (-0.012, 0.06)
+REACH_M: Final[tuple[float, ...]] = (-0.012, 0.06)
 """A ball this far in front of a rod's axis can be struck."""
 UNDER_M: Final = 0.035
 """A ball nearer to the axis than this stands between the figures' feet: sliding would push it aside."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection
-from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, hypot
 from typing import Final
@@ -21,12 +20,12 @@ STEP_M: Final = 0.15
 """How far apart a way is looked at."""
 
 
-@dataclass(frozen=True, slots=True)
 class Roadmap:
     """Spots (x, y in m), by their number, and the spots that a straight, free way of one cell leads to from each."""
 
-    spots: tuple[tuple[float, float], ...]
-    neighbours: tuple[tuple[int, ...], ...]
+    def __init__(self, spots: tuple[tuple[float, float], ...], neighbours: tuple[tuple[int, ...], ...]) -> None:
+        self.spots: Final = spots
+        self.neighbours: Final = neighbours
 
     def nearest(self, x: float, y: float) -> int:
         """Return the spot that is nearest to a place."""

@@ -56,7 +56,7 @@ from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closings
 from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
-from foosim.vhub.report import HubStatistics, report, statistics
+from foosim.vhub.report import HubStatistics, LinksTold, report, statistics
 from foosim.vhub.resume import Past
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
@@ -92,6 +92,7 @@ class HubCore:
         self.finished = False
         self.lost = self.failure = self.capture = self.capture_file = self.radio_address = ""
         self.recording: dict[str, Any] = {}
+        self.links_told = LinksTold()
         self.speak: Callable[[int], int] = lambda now_ns: now_ns
         """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
@@ -496,4 +497,4 @@ class HubCore:
 
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""
-        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, report(self))))
+        return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, report(self, is_last=True))))

@@ -55,8 +55,9 @@ from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_capt
 from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
-SWITCH_S = 0.0005
-"""For how long the capture's thread may keep the interpreter from the loop; Python's own 5 ms would hold up ticks."""
+SWITCH_S = 0.0001
+"""For how long the capture's thread may keep the interpreter from the loop. Python's own 5 ms would hold up ticks: at
+each of the loop's calls into journal and network, some a tick, that thread may come in between."""
 FORGET_EVERY_NS = 1_000_000_000
 LOOK_EVERY_NS = 50_000_000
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+import msgspec
+
 from foosim.protocol.codec import encode_json
 from foosim.vhub.state import HubState
 
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
 
 
 LINKS_TOLD_MAX: Final = 200
+LINKS_TOLD_EVERY: Final = 5
+"""Heartbeats, which are half a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +44,25 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
     return HubStatistics(state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated)
 
 
-def report(core: HubCore) -> bytes:
+class LinksTold:
+    """The lines about links, which several heartbeats share: of hundreds of links they cost as much as a few ticks."""
+
+    def __init__(self) -> None:
+        self._lines = msgspec.Raw(b"[]")
+        self._heartbeats = 0
+
+    def lines(self, state: HubState, *, anew: bool) -> msgspec.Raw:
+        """Return the lines as JSON for one more heartbeat, made anew when it is their turn."""
+        if anew or self._heartbeats % LINKS_TOLD_EVERY == 0:
+            self._lines = msgspec.Raw(encode_json(_links(state)))
+        self._heartbeats += 1
+        return self._lines
+
+
+def report(core: HubCore, *, is_last: bool = False) -> bytes:
     """Return the account so far, where the radio plane and the capture are, and how the capture does.
+
+    Only the last report has everything as it is at this moment.
 
     `links` are those with the most traffic: [from, to, offered, delivered, dropped, mean delay in ns, rule, how long
     its queue is in ns, dropped by cause], and `links_in_all` how many there are. `refused` counts messages by channel
@@ -62,7 +83,7 @@ def report(core: HubCore) -> bytes:
             },
             "refused": refused,
             "refusals": state.refusals,
-            "links": _links(state),
+            "links": core.links_told.lines(state, anew=is_last),
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
             "capture": core.capture,

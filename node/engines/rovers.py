@@ -15,7 +15,6 @@ Neighbours: `interface`, `protocol.obstacles`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import cos, floor, pi, sin, sqrt
 from typing import Final
 
@@ -32,24 +31,19 @@ GAP_M: Final = 1e-6
 """Half of what stays between two rovers: far above rounding."""
 
 
-@dataclass(slots=True)
 class Loaded:
-    """One rover that is solved in this tick; everything but `slips` and `entity` changes with it."""
+    """One rover that is solved in this tick; everything but `slips` changes with it."""
 
-    entity: Entity
-    slips: tuple[float, float]
-    x: float = 0.0
-    y: float = 0.0
-    heading: float = 0.0
-    left: float = 0.0
-    right: float = 0.0
-    left_travel: float = 0.0
-    right_travel: float = 0.0
-    charge: float = 0.0
-    blocked: bool = False
-    wanted: tuple[tuple[float, float], ...] = ((0.0, 0.0), (0.0, 0.0))
-    cell: tuple[tuple[float, float, float], ...] = ()
-    """Half-planes that it stays in: x and y of a unit vector, and the greatest x * position along it."""
+    def __init__(self, slips: tuple[float, float]) -> None:
+        self.slips: Final = slips
+        self.x = self.y = self.heading = 0.0
+        self.left = self.right = 0.0
+        self.left_travel = self.right_travel = 0.0
+        self.charge = 0.0
+        self.blocked = False
+        self.wanted: tuple[tuple[float, float], ...] = ((0.0, 0.0), (0.0, 0.0))
+        self.cell: list[tuple[float, float, float]] = []
+        """Half-planes that it stays in: x and y of a unit vector, and the greatest x * position along it."""
 
 
 class RoverEngine:
@@ -59,7 +53,10 @@ class RoverEngine:
         hall = deployment.hall
         self._dt = deployment.tick_ns / 1e9 / deployment.substeps
         self._substeps = deployment.substeps
-        self._rover, self._station = hall.rover, hall.station
+        self._radius, self._track = hall.rover.radius, hall.rover.drive.track
+        battery, station = hall.rover.battery, hall.station
+        self._idle, self._drag, self._capacity = battery.idle, battery.drag, battery.capacity
+        self._charge_radius, self._charge_power = station.charge_radius, station.charge_power
         self._obstacles = obstacles_of(deployment)
         robots = [robot for _, robot in sorted(deployment.robots.items())]
         self._chargers = [(robot.x, robot.y) for robot in robots if robot.model == "station"]
@@ -75,7 +72,7 @@ class RoverEngine:
         places = [(index, state[at], state[at + 1]) for index, at in self._places]
         self._loaded = {}
         for entity in entities:
-            rover = self._loaded[entity.index] = Loaded(entity, self._slips[entity.index])
+            rover = self._loaded[entity.index] = Loaded(self._slips[entity.index])
             at, speeds, travel = (entity.offsets[name] for name in ("position", "wheel_speeds", "wheel_travel"))
             rover.x, rover.y, rover.heading = state[at], state[at + 1], state[entity.offsets["heading"]]
             rover.left, rover.right = state[speeds], state[speeds + 1]
@@ -85,9 +82,9 @@ class RoverEngine:
 
     def _cell(
         self, own: int, x: float, y: float, places: Sequence[tuple[int, float, float]]
-    ) -> tuple[tuple[float, float, float], ...]:
+    ) -> list[tuple[float, float, float]]:
         """Return the half-planes that keep a rover on its side of the line half-way to each other one that is near."""
-        near, room = self._near_m, self._rover.radius + GAP_M
+        near, room = self._near_m, self._radius + GAP_M
         cell = []
         for index, there_x, there_y in places:
             dx, dy = there_x - x, there_y - y
@@ -97,7 +94,7 @@ class RoverEngine:
             if 0.0 < distance < near:
                 nx, ny = dx / distance, dy / distance
                 cell.append((nx, ny, x * nx + y * ny + distance / 2.0 - room))
-        return tuple(cell)
+        return cell
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
         """Set the wheels of these rovers: for each the wanted speed (m/s) and the greatest acceleration (m/s2)."""
@@ -127,7 +124,7 @@ class RoverEngine:
     def _roll(self, rover: Loaded, left: float, right: float) -> None:
         """Move along the arc of these wheels' speeds on the ground, as far as nothing is in the way."""
         dt = self._dt
-        half_turn = (right - left) / self._rover.drive.track * dt / 2.0
+        half_turn = (right - left) / self._track * dt / 2.0
         chord = (left + right) / 2.0 * dt
         if half_turn != 0.0:
             chord *= sin(half_turn) / half_turn
@@ -149,7 +146,7 @@ class RoverEngine:
         for nx, ny, most in rover.cell:
             if x * nx + y * ny > most and x * nx + y * ny > rover.x * nx + rover.y * ny:
                 return False
-        radius = self._rover.radius
+        radius = self._radius
         return all(obstacle.is_clear(x, y, radius) for obstacle in self._around(x, y))
 
     def _around(self, x: float, y: float) -> tuple[Obstacle, ...]:
@@ -157,7 +154,7 @@ class RoverEngine:
         square = floor(x), floor(y)
         found = self._squares.get(square)
         if found is None:
-            reach = self._rover.radius + SQUARE_REACH_M
+            reach = self._radius + SQUARE_REACH_M
             middle = square[0] + 0.5, square[1] + 0.5
             found = tuple(obstacle for obstacle in self._obstacles if not obstacle.is_clear(*middle, reach))
             self._squares[square] = found
@@ -165,15 +162,14 @@ class RoverEngine:
 
     def _discharge(self, rover: Loaded) -> None:
         """Take what standing and rolling cost, and give what a station beside it gives."""
-        dt, battery = self._dt, self._rover.battery
+        dt, reach = self._dt, self._charge_radius
         way = (abs(rover.left) + abs(rover.right)) / 2.0 * dt
-        charge = rover.charge - battery.idle * dt - battery.drag * way
-        reach = self._station.charge_radius
+        charge = rover.charge - self._idle * dt - self._drag * way
         for x, y in self._chargers:
             dx, dy = rover.x - x, rover.y - y
             if dx * dx + dy * dy <= reach * reach:
-                charge += self._station.charge_power * dt
-        rover.charge = min(max(charge, 0.0), battery.capacity)
+                charge += self._charge_power * dt
+        rover.charge = min(max(charge, 0.0), self._capacity)
 
     def read(self, entities: Sequence[Entity], state: list[float]) -> None:
         """Write the rovers' new state."""
