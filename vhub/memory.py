@@ -16,7 +16,7 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
     last_due_ns: int = -1
     chain: int = 0
-    """The state of its packet-wise model of bursts; 0 is good."""
+    """The state of its packet-wise model of bursts: 0 good, 1 a burst, and further ones where it has four."""
     offered: int = 0
     delivered: int = 0
     dropped: int = 0

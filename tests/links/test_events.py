@@ -130,6 +130,27 @@ def test_changes_are_over_one_another_and_heal_at_once() -> None:
     assert [(f.due_ns - f.sent_ns) // MS for f in found if not f.cause] == [1] * 10 + [2] * 10 + [1] * 10
 
 
+@pytest.mark.parametrize(
+    ("chain", "is_burst"),
+    [
+        ("p13: 100 %, p31: 0 %", True),
+        ("p13: 100 %, p31: 0 %, p32: 100 %", False),
+        ("p13: 0 %, p31: 0 %, p14: 100 %", False),
+    ],
+    ids=["burst", "delivery within a burst", "single loss"],
+)
+def test_a_burst_goes_on_in_another_model_of_bursts(chain: str, is_burst: bool) -> None:
+    """Of the four states only the burst is the bad one of two, and the other way round; singles are over."""
+    to_two = events("{at: 9 ms, set: {link: tried, gilbert_elliott: {p: 0.0001 %, r: 0.0001 %}}}")
+    found = [bool(f.cause) for f in fates(fabric_of(f"markov4: {{{chain}}}", 1, to_two), every(MS, 30))]
+    assert found[9:] == [is_burst] * 21
+    to_runs = events("{at: 9 ms, set: {link: tried, burst: {loss: 0.0001 %, mean_burst: 1000000}}}")
+    assert [bool(f.cause) for f in fates(fabric_of(f"markov4: {{{chain}}}", 1, to_runs), every(MS, 30))] == found
+    to_four = events("{at: 9 ms, set: {link: tried, markov4: {p13: 0.0001 %, p31: 0.0001 %}}}")
+    two = "gilbert_elliott: {p: 99 %, r: 0.0001 %}" if is_burst else "gilbert_elliott: {p: 0.0001 %, r: 100 %}"
+    assert [bool(f.cause) for f in fates(fabric_of(two, 1, to_four), every(MS, 30))] == [is_burst] * 30
+
+
 def test_chaos_comes_and_goes(proof: Proof) -> None:
     """Between its times everything is as it was; within, every kind of trouble comes, by its own seed."""
     lines = ("{at: 1 s, chaos: {among: [a, b, c]}, until: 60 s}", "{at: 30 s, heal: chaos}")

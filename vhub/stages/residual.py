@@ -22,6 +22,12 @@ RANDOM_LOSS: Final = "random_loss"
 BURST_LOSS: Final = "burst_loss"
 CHAIN_BLOCK: Final = 1
 """The block of a packet's draws of which the first word moves a chain on."""
+GOOD: Final = 0
+BAD: Final = 1
+"""The states of two; of four they are the good one and a burst, so that an event may change one model to the other."""
+BETWEEN: Final = 2
+SINGLE: Final = 3
+"""Of four states: a delivery within a burst, and a single loss. Of two these are good."""
 
 
 class Residual(Stage):
@@ -75,22 +81,24 @@ class ByPacket(Residual):
 
     def is_bad(self, flight: Flight) -> bool:
         memory = self._memory
-        if self._setup.words(flight, CHAIN_BLOCK)[0] < self._leaves[memory.chain]:
-            memory.chain = 1 - memory.chain
-        return memory.chain == 1
+        state = BAD if memory.chain == BAD else GOOD
+        if self._setup.words(flight, CHAIN_BLOCK)[0] < self._leaves[state]:
+            state = BAD - state
+        memory.chain = state
+        return state == BAD
 
 
 class FourStates(Residual):
-    """States 0 good, 1 a delivery within a burst, 2 a burst, 3 a single loss: lost are 2 and 3."""
+    """Good, a burst, a delivery within a burst, a single loss: lost is what meets the second or the last."""
 
     def __init__(self, setup: LinkSetup, chain: Markov4) -> None:
         super().__init__(setup, 0.0, 1.0)
         self._memory: LinkState = setup.memory
         self._steps: tuple[tuple[tuple[float, int], ...], ...] = (
-            ((chain.p14, 3), (chain.p13, 2)),
-            ((chain.p23, 2),),
-            ((chain.p31, 0), (chain.p32, 1)),
-            ((1.0, 0),),
+            ((chain.p14, SINGLE), (chain.p13, BAD)),
+            ((chain.p31, GOOD), (chain.p32, BETWEEN)),
+            ((chain.p23, BAD),),
+            ((1.0, GOOD),),
         )
 
     def is_bad(self, flight: Flight) -> bool:
@@ -101,7 +109,7 @@ class FourStates(Residual):
             if word < chance_threshold(min(1.0, below)):
                 memory.chain = state
                 break
-        return memory.chain >= 2
+        return memory.chain in {BAD, SINGLE}
 
 
 def chain_of_burst(burst: Burst) -> GilbertElliott:
