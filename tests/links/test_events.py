@@ -7,14 +7,15 @@ from math import expm1
 
 import pytest
 
-from foosim.protocol.messages import Disrupt
+from foosim.protocol.messages import Disrupt, Sent
 from foosim.protocol.network import event_of
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
-from tests.links.offered import ENDS, MS, S, deployment_of, every, fabric_of, fates, rule
+from tests.links.offered import ENDS, MS, Hub, S, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
 from tests.links.statistics import ks
 
+TICK_NS = 2 * MS
 PAIRS = [(one, other) for one in ENDS for other in ENDS if one != other]
 
 
@@ -149,6 +150,18 @@ def test_a_burst_goes_on_in_another_model_of_bursts(chain: str, is_burst: bool) 
     to_four = events("{at: 9 ms, set: {link: tried, markov4: {p13: 0.0001 %, p31: 0.0001 %}}}")
     two = "gilbert_elliott: {p: 99 %, r: 0.0001 %}" if is_burst else "gilbert_elliott: {p: 0.0001 %, r: 100 %}"
     assert [bool(f.cause) for f in fates(fabric_of(two, 1, to_four), every(MS, 30))] == [is_burst] * 30
+
+
+def test_a_clog_behind_new_reordering_moves_what_was_sent_before() -> None:
+    """What was sent before links reordered keeps its order: it has drawn nothing for it."""
+    reorder = {"set": {"link": "tried", "reorder": {"probability": "100 %", "extra": "5 ms"}}}
+    clog = {"clog": {"from": "a", "to": "b"}, "for": "60 ms"}
+    hub = Hub(deployment_of(rule("delay: 50 ms")))
+    for tick in range(4):
+        hub.close({"a": [Sent(tick + 1, "b", "data", 0, b"x")]}, edits=[Disrupt(json.dumps(reorder))] * (tick == 3))
+    hub.close({}, edits=[Disrupt(json.dumps(clog))])
+    held = {flight.sequence: flight.due_ns for flight in hub.state.in_flight()}
+    assert held == {n: 4 * TICK_NS + 60 * MS + (n - 1) * (n < 4) for n in (1, 2, 3, 4)}
 
 
 def test_chaos_comes_and_goes(proof: Proof) -> None:

@@ -83,7 +83,8 @@ class Delay(Stage):
 
     def _is_late(self, flight: Flight) -> bool:
         """Whether those behind it overtake it."""
-        return self._extra_ns > 0 and flight.words[Slot.REORDER] < self._reordered
+        is_drawn = flight.slots >> Slot.REORDER & 1
+        return self._extra_ns > 0 and is_drawn > 0 and flight.words[Slot.REORDER] < self._reordered
 
     def _held_ns(self, due_ns: int) -> int:
         """Return when what would be due now is, for clogs."""
