@@ -60,6 +60,7 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     first_above_ns: int = 0
     drop_next_ns: int = 0
     drop_count: int = 0
+    last_count: int = 0
     is_dropping: bool = False
     """CoDel's variables, by the names of RFC 8289."""
     tokens_ns: int = -1

@@ -81,8 +81,9 @@ class Queue(Stage):
         if not above:
             return False
         sender.is_dropping = True
-        recent = now_ns - sender.drop_next_ns < 16 * self._interval_ns and sender.drop_count > 2
-        sender.drop_count = sender.drop_count - 2 if recent else 1
+        gained = sender.drop_count - sender.last_count
+        is_recent = now_ns - sender.drop_next_ns < 16 * self._interval_ns
+        sender.drop_count = sender.last_count = gained if is_recent and gained > 1 else 1
         sender.drop_next_ns = self._law(now_ns)
         return True
 
