@@ -295,7 +295,8 @@ class LrWpan(OnAir):
             threshold = errors.per_threshold(LRWPAN_MODE, flight.snr_cdb, size + LRWPAN_OVERHEAD_BYTES)
             flight.error_threshold = threshold
         words = self._words(flight, broadcast)
-        return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
+        access = csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing)
+        return access, min(airtime_ns, access.delay_ns)  # not before its turn; never where it found no free channel
 
 
 class LoRa(OnAir):
