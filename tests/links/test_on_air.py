@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
+import pytest
+
 from foosim.protocol.start import initial_frame
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
-from tests.links.offered import ENDS, MS, deployment_of, play
+from foosim.vhub.radio.airtime import lora_airtime_ns
+from tests.links.offered import ENDS, MS, S, deployment_of, play
 
 PLACES: Final = "{a: [0 m, 0 m, 1 m], b: [3 m, 0 m, 1 m], c: [0 m, 3 m, 1 m], '*': [3 m, 3 m, 1 m]}"
 
@@ -34,3 +37,17 @@ def test_802154_that_never_finds_the_channel_free_spoils_nobody() -> None:
     given_up = [flight for flight in flights if flight.outcome == "collision" and not flight.airtime_ns]
     assert given_up and all(flight.air_start_ns == flight.air_end_ns for flight in given_up)
     assert not any(flight.interference for flight in flights)
+
+
+@pytest.mark.parametrize("published", [False, True])
+def test_what_the_queue_drops_costs_no_duty_cycle(published: bool) -> None:
+    """Of a hundred packets at once the queue takes two: two are on air, and paid for; and so is a third one."""
+    fabric = near("{preset: lora_eu868, duty_cycle: 10 %, duty_window: 60 s, queue: {packets: 2}}")
+    link, radio = fabric.link("a", "b", "news"), fabric.radios
+    flights = [Flight("a", "b", "news", number, 0, 0, bytes(20), published) for number in range(1, 101)]
+    assert [link.send(flight) for flight in flights] == [True] * 2 + [False] * 98
+    assert {flight.cause for flight in flights} == {"", "queue_full"}
+    airtime_ns = lora_airtime_ns(7, 20)
+    assert radio["a", "r"].tokens_ns == 6 * S - 2 * airtime_ns
+    assert link.send(Flight("a", "b", "news", 101, S, 0, bytes(20), published))
+    assert radio["a", "r"].tokens_ns == 6 * S - 3 * airtime_ns + S // 10, "of a second it gets a tenth"

@@ -14,7 +14,7 @@ DUTY_CYCLE: Final = "duty_cycle"
 
 
 class Duty(Stage):
-    """Takes a packet's airtime out of its sender's bucket, or drops it."""
+    """Drops a packet for which its sender's bucket has too little; the medium takes out what is sent of the others."""
 
     def __init__(self, setup: LinkSetup) -> None:
         self._settings, self._sender = setup.settings, setup.sender
@@ -43,7 +43,6 @@ class Duty(Stage):
             if broadcast:
                 sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
             return DUTY_CYCLE
-        sender.tokens_ns -= airtime_ns
         return ""
 
     def _airtime_ns(self, size: int) -> int:

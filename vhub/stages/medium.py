@@ -116,6 +116,7 @@ class OnAir(Stage):
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
         self._once, self._factor = setup.sends_once, setup.settings.spreading_factor
+        self._is_limited = setup.settings.duty_cycle < 1.0
 
     def at_sending(self, flight: Flight) -> str:
         cause = self._budget.measure(flight)
@@ -152,7 +153,8 @@ class OnAir(Stage):
         ready_ns = flight.sent_ns + flight.phase_ns
         ready_ns = max(ready_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
-        (delay_ns, occupancy_ns, retries, _, outcome), air_ns = self.access(flight, broadcast, UNIT if cause else None)
+        access, air_ns = self.access(flight, broadcast, UNIT if cause else None)
+        delay_ns, occupancy_ns, retries, paid_ns, outcome = access
         end_ns, until_ns = start_ns + delay_ns, start_ns + occupancy_ns
         flight.air_start_ns, flight.air_end_ns = end_ns - air_ns, end_ns
         flight.airtime_ns = airtime_ns = air_ns if air_ns < delay_ns else delay_ns
@@ -164,6 +166,8 @@ class OnAir(Stage):
             flight.outcome = COLLISION if outcome in ("collision", "busy") else SNR
         sender.free_ns = until_ns
         sender.waiting.append((until_ns, len(flight.payload)))
+        if self._is_limited:
+            sender.tokens_ns = max(0, sender.tokens_ns - paid_ns)
         of = self._budget.propagation
         what = source, flight.sequence, flight.copy, end_ns - air_ns, end_ns, until_ns
         air.register(Transmission(*what, of.place(source).at, of.power_cdbm, self._factor))
