@@ -10,7 +10,7 @@ from foosim.protocol.start import initial_frame
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns
-from tests.links.offered import ENDS, MS, S, deployment_of, play
+from tests.links.offered import ENDS, MS, S, deployment_of, fabric_of, play
 
 PLACES: Final = "{a: [0 m, 0 m, 1 m], b: [3 m, 0 m, 1 m], c: [0 m, 3 m, 1 m], '*': [3 m, 3 m, 1 m]}"
 
@@ -51,3 +51,14 @@ def test_what_the_queue_drops_costs_no_duty_cycle(published: bool) -> None:
     assert radio["a", "r"].tokens_ns == 6 * S - 2 * airtime_ns
     assert link.send(Flight("a", "b", "news", 101, S, 0, bytes(20), published))
     assert radio["a", "r"].tokens_ns == 6 * S - 3 * airtime_ns + S // 10, "of a second it gets a tenth"
+
+
+def test_what_waits_before_a_radio_counts_as_before_a_wire() -> None:
+    """Payload and overhead: of 5000 B four packets of 1100 B have room."""
+    settings = "rate: 1 Mbit/s, overhead: 1000 B, queue: {bytes: 5000 B}"
+    on_air, on_wire = near(f"{{preset: wifi_5_indoor, {settings}}}"), fabric_of(settings)
+    found = []
+    for fabric in (on_air, on_wire):
+        flights = [Flight("a", "b", "data", number, 0, 0, bytes(100)) for number in range(1, 8)]
+        found.append([(fabric.link("a", "b", "data").send(flight), flight.queue_bytes) for flight in flights])
+    assert found[0] == found[1] == [(n < 4, 1100 * min(n, 4)) for n in range(7)]

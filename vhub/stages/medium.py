@@ -165,7 +165,7 @@ class OnAir(Stage):
         else:
             flight.outcome = COLLISION if outcome in ("collision", "busy") else SNR
         sender.free_ns = until_ns
-        sender.waiting.append((until_ns, len(flight.payload)))
+        sender.waiting.append((until_ns, len(flight.payload) + self._settings.overhead_bytes))
         if self._is_limited:
             sender.tokens_ns = max(0, sender.tokens_ns - paid_ns)
         of = self._budget.propagation
