@@ -164,6 +164,18 @@ def test_a_clog_behind_new_reordering_moves_what_was_sent_before() -> None:
     assert held == {n: 4 * TICK_NS + 60 * MS + (n - 1) * (n < 4) for n in (1, 2, 3, 4)}
 
 
+def test_what_is_fast_again_does_not_overtake() -> None:
+    """A perfect link that was slow for a time: what is sent then comes behind it, and at once when that is through."""
+    lines = events("{at: 10 ms, set: {link: tried, delay: 50 ms}}", "{at: 30 ms, heal: settings}")
+    times = [n // 2 * MS for n in range(200)]
+    due = [f.due_ns for f in fates(fabric_of("order: fifo", 1, lines), times)]
+    assert due[:20] == times[:20] and due[160:] == times[160:]
+    assert due[20:60] == [times[n] + 50 * MS + n % 2 for n in range(20, 60)]
+    assert due[60:160] == [79 * MS + 2 + n for n in range(100)]
+    free = [f.due_ns for f in fates(fabric_of("order: free", 1, lines), times)]
+    assert free == [at_ns + 50 * MS * (10 <= n // 2 < 30) for n, at_ns in enumerate(times)]
+
+
 def test_chaos_comes_and_goes(proof: Proof) -> None:
     """Between its times everything is as it was; within, every kind of trouble comes, by its own seed."""
     lines = ("{at: 1 s, chaos: {among: [a, b, c]}, until: 60 s}", "{at: 30 s, heal: chaos}")

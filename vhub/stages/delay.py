@@ -36,11 +36,13 @@ class Delay(Stage):
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Delay | None:
-        """Return the stage, or None where nothing takes time: such a link is fifo by itself."""
+        """Return the stage, or None where nothing takes time, or ever has: such a link is fifo by itself."""
         settings = setup.settings
         timed = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
         late = settings.jitter is not None or settings.reorder is not None or settings.burst is not None
-        return cls(setup) if timed or late or settings.delay_ns or setup.holds or setup.model is not None else None
+        if timed or late or settings.delay_ns or setup.holds or setup.model is not None:
+            return cls(setup)
+        return Behind(setup) if settings.order == "fifo" and setup.memory.last_due_ns >= 0 else None
 
     def at_sending(self, flight: Flight) -> str:
         spent_ns = flight.phase_ns + flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
@@ -95,3 +97,14 @@ class Delay(Stage):
 
     def _in_order(self, due_ns: int, last_ns: int) -> int:
         return max(due_ns, last_ns + 1) if self._fifo else due_ns
+
+
+class Behind(Delay):
+    """Nothing takes time any more: what is sent comes behind what was sent when something did, and else at once."""
+
+    def at_sending(self, flight: Flight) -> str:
+        memory, due_ns = self._memory, flight.sent_ns
+        if due_ns <= memory.last_due_ns:
+            due_ns = memory.last_due_ns = memory.last_due_ns + 1
+        flight.due_ns = due_ns
+        return ""
