@@ -59,6 +59,8 @@ class Fabric:
         self._models: dict[str, LinkModel] = {}
         self._links: dict[tuple[str, str, str], Link] = {}
         """By source, destination and what of the channel decides."""
+        self._by_rule: dict[LinkKey, Link] = {}
+        """The same ones by the rule that matches: channels of one rule are one link."""
         self._phases: dict[str, int] = {}
         self._propagations: dict[str, Propagation] = {}
         for rule in (*self.network.links, *self.network.radios.values()):
@@ -90,9 +92,14 @@ class Fabric:
         kind = self.profiles.kind(channel)
         link = self._links.get((source, destination, kind))
         if link is None:
-            profile = self.profiles.find(source, destination, channel)
-            state = self.states.setdefault((source, destination, _name(profile)), LinkState())
-            link = self._links[source, destination, kind] = Link(source, destination, profile, self, state)
+            rule = self.network.rule_for(source, destination, channel)
+            key = source, destination, "" if rule is None else rule.id
+            link = self._by_rule.get(key)
+            if link is None:
+                profile = self.profiles.of_rule(rule, source, destination)
+                state = self.states.setdefault((source, destination, _name(profile)), LinkState())
+                link = self._by_rule[key] = Link(source, destination, profile, self, state)
+            self._links[source, destination, kind] = link
         return link
 
     def restore(

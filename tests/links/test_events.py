@@ -176,6 +176,21 @@ def test_what_is_fast_again_does_not_overtake() -> None:
     assert free == [at_ns + 50 * MS * (10 <= n // 2 < 30) for n, at_ns in enumerate(times)]
 
 
+def test_channels_of_one_link_keep_their_order_behind_a_clog() -> None:
+    """Whether or not a rule of others names channels, a clog that is asked for and healed lets go in order."""
+    lines = {5: {"clog": {"from": "a", "to": "b"}, "for": "90 ms"}, 20: {"heal": "clogs"}}
+    found = []
+    for others in ("", "{id: other, from: c, to: d, channels: [z]}, "):
+        hub = Hub(deployment_of(f"network.links=[{others}{{id: tried, from: a, to: b, delay: 3 ms}}]"))
+        for tick in range(30):
+            sent = [Sent(3 * tick + n, "b", channel, 0, b"x") for n, channel in enumerate("xyx", 1)]
+            edits = [Disrupt(json.dumps(lines[tick]))] if tick in lines else []
+            hub.close({"a": sent}, edits=edits)
+        due = {f.sequence: f.due_ns for f in (*hub.fates, *hub.state.in_flight())}
+        found.append([due[number] for number in range(1, 91)])
+    assert found[0] == found[1] == sorted(set(found[0]))
+
+
 def test_chaos_comes_and_goes(proof: Proof) -> None:
     """Between its times everything is as it was; within, every kind of trouble comes, by its own seed."""
     lines = ("{at: 1 s, chaos: {among: [a, b, c]}, until: 60 s}", "{at: 30 s, heal: chaos}")
