@@ -18,6 +18,7 @@ from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
+from foosim.vhub.episodes import Times
 from foosim.vhub.events import Timeline
 from foosim.vhub.jitter import quantiles_ns
 from foosim.vhub.link_models import LinkModel, make_model
@@ -124,7 +125,14 @@ class Fabric:
             self._air(name, settings).restore(flight, self._propagation(name, settings))
 
     def setup(
-        self, source: str, destination: str, profile: Profile, settings: Radio, key: bytes, memory: LinkState
+        self,
+        source: str,
+        destination: str,
+        profile: Profile,
+        settings: Radio,
+        key: bytes,
+        memory: LinkState,
+        times: Times,
     ) -> LinkSetup:
         """Return what the stages of a link are made from, for some time."""
         timeline = self.timeline
@@ -146,6 +154,7 @@ class Fabric:
             key,
             draw_key(self.seed, "sending", *radio),
             memory,
+            times,
             sender,
             self.world,
             profile.rule != NO_RADIO,

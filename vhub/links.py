@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
 from foosim.protocol.radios import Radio
+from foosim.vhub.episodes import Times
 from foosim.vhub.events import FOREVER_NS
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
@@ -27,6 +28,11 @@ from foosim.vhub.stages.stage import Stage, arrival_hooks, sending_hooks
 if TYPE_CHECKING:
     from foosim.vhub.fabric import Fabric
 
+Sending = Callable[[Flight], str]
+Arrival = Callable[[Flight, str], str]
+Settled = tuple[int, int, int, list[Stage], list[Sending], list[Arrival], int, int, bool]
+"""Of one version of the time line, from when, until when: a link's stages, their hooks, draws, phase, being apart."""
+
 
 class Link:
     """One directed pair with its stages."""
@@ -41,10 +47,13 @@ class Link:
         self._version = -1
         self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
-        self._at_sending: list[Callable[[Flight], str]] = []
-        self._at_arrival: list[Callable[[Flight, str], str]] = []
+        self._at_sending: list[Sending] = []
+        self._at_arrival: list[Arrival] = []
         self._is_apart = False
         self._slots = self._phase_ns = 0
+        self._times = Times()
+        self._other: Settled | None = None
+        """What holds in another time: packets arrive by the settings of when they were sent."""
 
     @property
     def rule(self) -> str:
@@ -68,20 +77,32 @@ class Link:
         return self._setup(self.settings_at(time_ns)[0])
 
     def _setup(self, settings: Radio) -> LinkSetup:
-        return self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
+        source, destination, profile = self.source, self.destination, self.profile
+        return self._fabric.setup(source, destination, profile, settings, self._key, self.state, self._times)
 
     def _settle(self, time_ns: int) -> None:
         """Have the stages of a time: made anew where settings have changed, or what is known of them."""
-        if self._version == self._fabric.timeline.version and self._since_ns <= time_ns < self._until_ns:
+        version, other = self._fabric.timeline.version, self._other
+        if self._version == version and self._since_ns <= time_ns < self._until_ns:
+            return
+        self._other = self._settled()
+        if other is not None and other[0] == version and other[1] <= time_ns < other[2]:
+            self._version, self._since_ns, self._until_ns, self._stages, self._at_sending, self._at_arrival = other[:6]
+            self._slots, self._phase_ns, self._is_apart = other[6:]
             return
         settings, self._since_ns, self._until_ns = self.settings_at(time_ns)
-        self._version = self._fabric.timeline.version
+        self._version = version
         setup = self._setup(settings)
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
         self._at_sending, self._at_arrival = sending_hooks(self._stages), arrival_hooks(self._stages)
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
         self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self._stages))
+
+    def _settled(self) -> Settled:
+        times = self._version, self._since_ns, self._until_ns
+        stages = self._stages, self._at_sending, self._at_arrival
+        return *times, *stages, self._slots, self._phase_ns, self._is_apart
 
     def is_apart(self, time_ns: int) -> bool:
         """Whether what is sent at a time shares no radio, queue or air with other links, and no model of one's own."""

@@ -11,6 +11,7 @@ from foosim.protocol.draws import draw_words
 from foosim.protocol.radios import Radio
 from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
+from foosim.vhub.episodes import Times
 from foosim.vhub.link_models import LinkModel
 from foosim.vhub.memory import LinkState, RadioState
 from foosim.vhub.packet import Flight
@@ -33,6 +34,8 @@ class LinkSetup:
     sending_key: bytes
     """Of the draws of what its sender's radio sends once for several receivers."""
     memory: LinkState
+    times: Times
+    """Its bursts and outages in seconds."""
     sender: RadioState
     """The radio, or the port of a wire, that its packets leave by."""
     world: World

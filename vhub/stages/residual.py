@@ -11,7 +11,7 @@ from typing import Final
 
 from foosim.protocol.draws import Slot, chance_threshold, draw_key
 from foosim.protocol.impairments import Burst, GilbertElliott, Markov4
-from foosim.vhub.episodes import Episodes, episodes_of_burst, episodes_of_outages
+from foosim.vhub.episodes import Episodes
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
@@ -39,7 +39,7 @@ class Residual(Stage):
         self._burst = chance_threshold(good_loss), chance_threshold(bad_loss)
         self._any = tuple(chance_threshold(state + (1.0 - state) * loss) for state in (good_loss, bad_loss))
         outages = setup.settings.outages
-        self._outages = None if outages is None else episodes_of_outages(_time_key(setup, "outages"), outages)
+        self._outages = None if outages is None else setup.times.of_outages(_time_key(setup, "outages"), outages)
 
     def is_bad(self, flight: Flight) -> bool:
         """Whether the packet meets the link in its bad state."""
@@ -137,7 +137,7 @@ def make_residual(setup: LinkSetup) -> Residual | None:
         return FourStates(setup, settings.markov4)
     burst = settings.burst
     if burst is not None:
-        return InTime(setup, episodes_of_burst(_time_key(setup, "burst"), burst), burst.bad_loss)
+        return InTime(setup, setup.times.of_burst(_time_key(setup, "burst"), burst), burst.bad_loss)
     return Residual(setup) if settings.loss > 0.0 or settings.outages is not None else None
 
 
