@@ -152,12 +152,13 @@ class OnAir(Stage):
         ready_ns = flight.sent_ns + flight.phase_ns
         ready_ns = max(ready_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
-        (delay_ns, occupancy_ns, retries, _, outcome), air_ns = self.access(flight, broadcast, UNIT if cause else None)
-        end_ns, until_ns = start_ns + delay_ns, start_ns + occupancy_ns
+        access, air_ns = self.access(flight, broadcast, UNIT if cause else None)
+        delay_ns, outcome = access.delay_ns, access.outcome
+        end_ns, until_ns = start_ns + delay_ns, start_ns + access.occupancy_ns
         flight.air_start_ns, flight.air_end_ns = end_ns - air_ns, end_ns
         flight.airtime_ns = airtime_ns = air_ns if air_ns < delay_ns else delay_ns
         flight.access_ns = end_ns - ready_ns - airtime_ns
-        flight.retries = retries
+        flight.retries = access.retries
         if outcome == "ok":
             flight.is_settled = self.is_acknowledged and not broadcast
         else:
