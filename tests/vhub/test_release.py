@@ -53,6 +53,27 @@ def test_what_leaves_together_leaves_with_its_latest() -> None:
     assert [flying.sequence for flying in release.flights] == [1, 2, 3] and release.tick == 10
 
 
+def test_it_counts_how_late_packets_leave() -> None:
+    """Behind their due time by the wall clock, whether their tick was closed late or they were taken late."""
+    made = releases()
+    made.committed(10, START + 10 * T)
+    made.add("watcher", 1, 10, [flight(11 * T, 1), flight(11 * T, 2), flight(11 * T, 3)], START + 10 * T)
+    made.take(START + 11 * T)
+    assert made.lateness.count == 3 and made.lateness.max_ns == 0
+    made.add("watcher", 2, 11, [flight(12 * T, 4)], START + 15 * T)
+    made.take(START + 16 * T)
+    assert made.lateness.count == 4 and made.lateness.as_json() == {"p50": 0.01, "p99": 8.0, "max": 8.0}
+    made.add("watcher", 3, 12, [flight(30 * T, 5)], START + 17 * T)
+    made.set_tempo(2.0, False)
+    made.take(START + 17 * T)
+    made.add("watcher", 4, 13, [flight(31 * T, 6)], START + 17 * T)
+    made.take(START + 40 * T)
+    made.committed(40, START + 40 * T)
+    made.add("watcher", 5, 41, [flight(90 * T, 7)], START + 40 * T)
+    made.take(START + 41 * T, everything=True)
+    assert made.lateness.count == 4, "what no clock gave a time, and what the end of the run let go, is not late"
+
+
 def test_never_before_its_tick_is_closed() -> None:
     made = releases()
     made.committed(10, START + 10 * T)
