@@ -21,7 +21,7 @@ ANCHOR_WINDOW_NS: Final = 1_000_000_000
 class Release:
     """Flights that leave together for one client, as its downlink `number`, at wall time `at_ns`.
 
-    Their latest was due at wall time `due_ns`; 0 where nothing is due by the clock.
+    Their latest was due at wall time `due_ns`; None where nothing is due by the clock.
     """
 
     at_ns: int
@@ -29,7 +29,7 @@ class Release:
     number: int
     tick: int
     flights: list[Flight]
-    due_ns: int = 0
+    due_ns: int | None = None
 
 
 class Releases:
@@ -48,7 +48,7 @@ class Releases:
         """Take a new pace: the anchor is learnt anew, and what waited by the old one leaves at once."""
         if factor != self.factor or paused != self.paused:
             self._anchors.clear()
-            self._waiting = [replace(release, at_ns=0, due_ns=0) for release in self._waiting]
+            self._waiting = [replace(release, at_ns=0, due_ns=None) for release in self._waiting]
         self.factor = factor
         self.paused = paused
 
@@ -63,11 +63,12 @@ class Releases:
     def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
         """Take what a closed tick releases to a client: never before what it was released earlier."""
         at_ns = max([now_ns, *(release.at_ns for release in self._waiting if release.client == client)])
-        due_ns = 0
+        due_ns = None
         if self.factor and self._anchors:
             anchor_ns = min(anchor for _, anchor in self._anchors)
             due_ns = anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor)
-        self._waiting.append(Release(max(at_ns, due_ns), client, number, tick, flights, due_ns))
+            at_ns = max(at_ns, due_ns)
+        self._waiting.append(Release(at_ns, client, number, tick, flights, due_ns))
         self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
 
     def take(self, now_ns: int, everything: bool = False) -> list[Release]:
@@ -75,7 +76,7 @@ class Releases:
         due = [release for release in self._waiting if everything or release.at_ns <= now_ns]
         self._waiting = self._waiting[len(due) :]
         for release in due:
-            if release.due_ns and not everything:
+            if release.due_ns is not None and not everything:
                 self.lateness.add(max(0, now_ns - release.due_ns), len(release.flights))
         return due
 
