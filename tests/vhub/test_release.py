@@ -8,8 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.protocol import channels
+from foosim.protocol.codec import decode_json
+from foosim.protocol.messages import Tempo
 from foosim.vhub.packet import Flight
 from foosim.vhub.release import ANCHOR_WINDOW_NS, Release, Releases
+from foosim.vhub.report import report
+from tests.vhub.test_sessions import PERIODS, Hub, sent
 
 MS: Final = 1_000_000
 T: Final = 2 * MS
@@ -187,3 +192,22 @@ def test_nothing_is_lost_and_a_clients_downlinks_leave_in_order(
     for release in made.take(10**18):
         said[release.client].append(release.number)
     assert said == {client: list(range(1, last + 1)) for client, last in count.items()}
+
+
+def test_a_report_tells_how_late_packets_left() -> None:
+    """One tick is closed 7 ms late, so what was due within it leaves that much later than the clock said."""
+    hub = Hub()
+    hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
+    hub.begin()
+    hub.enter("ear")
+    assert decode_json(report(hub.core))["lateness_ms"] is None
+    hub.commit(0)
+    for name in PERIODS:
+        hub.done(name, 0, *([sent(1, "ear")] if name == "hand" else []))
+    hub.now_ns = T + 7 * MS
+    hub.commit(1)
+    hub.core.wake(hub.now_ns)
+    (down,) = [down for down in hub.said(channels.DOWN) if down.packets]
+    late = hub.now_ns - max(packet.due_ns for packet in down.packets)
+    assert late >= 7 * MS
+    assert decode_json(report(hub.core))["lateness_ms"] == {"p50": late / MS, "p99": late / MS, "max": late / MS}
