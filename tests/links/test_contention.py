@@ -16,6 +16,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import UNIT, chance_threshold, draw_key, draw_words
 from foosim.protocol.messages import Sent
 from foosim.vhub.fabric import Fabric
+from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import lrwpan_airtime_ns, wifi_ack_ns, wifi_airtime_ns
 from foosim.vhub.radio.contention import (
@@ -29,7 +30,7 @@ from foosim.vhub.radio.contention import (
     wifi_access,
 )
 from foosim.vhub.radio.timings import CATEGORIES, LRWPAN, WIFI_5, with_category
-from foosim.vhub.state import HubState, Joining
+from foosim.vhub.state import HubState
 from tests.links.offered import Hub, deployment_of
 from tests.links.proof import Proof
 from tests.links.statistics import Z_ALPHA, binomial_z
