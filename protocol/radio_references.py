@@ -180,9 +180,14 @@ def _radio(network: Network, way: str) -> Radio:
 
 
 def _ways(network: Network, rule: LinkRule, ends: Sequence[str], carriers: Mapping[str, str]) -> Iterator[str]:
-    """Yield by which radios packets go that meet a rule; the empty name is that of the defaults."""
+    """Yield by which radios packets go that meet a rule; the empty name is that of the defaults.
+
+    Where there are but wires, which all heed the same, only what a rule says by `via`.
+    """
     if rule.via is not None:
         yield rule.via
+        return
+    if not any(_radio(network, way).is_on_air for way in ("", *network.radios)):
         return
     for source in ends:
         for destination in ends:

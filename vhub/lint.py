@@ -16,6 +16,7 @@ from typing import Final
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.impairments import Burst, GilbertElliott, Impairments, Markov4, TableJitter
 from foosim.protocol.network import Network
+from foosim.protocol.radio_references import unheeded
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.jitter import interpolate_ns, moments_ns, quantiles_ns
@@ -433,6 +434,10 @@ def _warnings(use: Use, meaning: Meaning) -> Iterator[str]:
         at_hz = settings.frequency_hz
         if low_hz <= at_hz <= high_hz and settings.duty_cycle > share:
             yield f"duty_cycle is above the {100.0 * share:g} % that the EU allows at {at_hz / 1e6:g} MHz"
+    for key, value in (("rate", settings.rate_bps), ("trace", settings.trace), ("overhead", settings.overhead_bytes)):
+        what = unheeded(key, settings.medium) if value else None
+        if what is not None:
+            yield f"{key} {what}"
     if meaning.carried and settings.queue.bytes_max < meaning.carried[-1].size:
         yield f"a packet of {meaning.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
     if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and _has_queue(settings):

@@ -116,6 +116,8 @@ def test_ranges_are_where_the_formulas_say() -> None:
         ({"preset": "lora_eu868", "duty_cycle": "10 %"}, "duty_cycle is above the 1 % that the EU allows at 868.1 MHz"),
         ({"preset": "lora_eu868", "frequency": "869.5 MHz", "duty_cycle": "20 %"},
          "duty_cycle is above the 10 % that the EU allows at 869.5 MHz"),
+        ({"preset": "zigbee", "rate": "1 kbit/s"},
+         "rate has no effect over ieee802154: a radio's bit rate is 250 kbit/s"),
         ({"queue": {"packets": 3}}, "the queue has no effect: no rate, no medium"),
     ],
 )  # fmt: skip
