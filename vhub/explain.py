@@ -236,7 +236,7 @@ class _Story:
     def _admit(self) -> tuple[str, dict[str, Any]]:
         row, longest = self.row, self.settings.payload_max
         if not self.setup.is_routed:
-            return "the ends have no radio in common, or not that of their rule", {"routed": False}
+            return "the ends have no radio in common", {"routed": False}
         state = "out of service" if row.cause == "node_down" and row.arrival_tick < 0 else "in service"
         limit = "any size" if longest is None else f"at most {longest} B"
         return f"{row.size} B of {limit}, sender {state}", {"size": row.size, "mtu": longest, "sender": state}
