@@ -174,7 +174,7 @@ def test_802_11n_has_its_rates(size: int) -> None:
 
 @pytest.mark.parametrize("radio", ["preset: dot11p", "medium: wifi, bandwidth: 40 MHz"])
 def test_802_11n_is_in_20_mhz(radio: str) -> None:
-    with pytest.raises(DeploymentError, match=r"radios\.r\.standard: has 20 MHz here, not [14]0 MHz, '802.11n'"):
+    with pytest.raises(DeploymentError, match=r"not a bandwidth of 802.11n here, which has 20 MHz, '[14]0 MHz'"):
         sent(f"{radio}, standard: 802.11n", 5, 100)
 
 

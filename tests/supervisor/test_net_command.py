@@ -121,7 +121,10 @@ def test_on_a_terminal_there_are_tables(command: Command, tmp_path: Path, monkey
 def test_presets_have_a_source_for_each_value(command: Command) -> None:
     assert len(json.loads(command("presets", "--json").out)) == len(PRESETS)
     out = command("presets", "lora_eu868").out
-    assert "  mtu: 222 B                   [R] at SF7 and SF8; 115 B at SF9, 51 B above\n" in out
+    assert "  spreading_factor: 7                               [J] write yours\n" in out
+    assert "  isolation of SF7: 6, -16, -18, -19, -19, -20 dB   [S] signetlabdei/lorawan" in out
+    wifi = command("presets", "wifi_5_indoor").out
+    assert "  AIFSN, CW of voice: 2, 3 to 7             [S] ns-3 wifi-mac.cc\n" in wifi
     refused = command("presets", "lora_eu")
     assert refused.code == 2 and "nearest is 'lora_eu868'" in refused.err
 

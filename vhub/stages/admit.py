@@ -33,7 +33,7 @@ class Admit(Stage):
 
 
 class NoRoute(Admit):
-    """The ends have no radio in common."""
+    """The ends have no radio in common, or not that of their rule."""
 
     def at_sending(self, flight: Flight) -> str:
         return NO_ROUTE

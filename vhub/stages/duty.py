@@ -1,9 +1,13 @@
-"""Duty cycle: how much of the time a radio may send, by law; a bucket of airtime that fills up again."""
+"""Duty cycle: how much of the time a radio may send, by law; a bucket of airtime that fills up again.
+
+It is for media on which a packet is sent once, for a time that is known before: LoRa, and a radio with a rate.
+"""
 
 from __future__ import annotations
 
 from typing import Final
 
+from foosim.protocol.radios import Radio
 from foosim.vhub.memory import Sending
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
@@ -17,7 +21,7 @@ class Duty(Stage):
     """Takes a packet's airtime out of its sender's bucket, or drops it."""
 
     def __init__(self, setup: LinkSetup) -> None:
-        self._settings, self._sender = setup.settings, setup.sender
+        self._settings, self._shared, self._sender = setup.settings, setup.shared, setup.sender
         self._share = setup.settings.duty_cycle
         self._size_ns = int(self._share * setup.settings.duty_window_ns)
         self._broadcasts = setup.sends_once
@@ -38,7 +42,7 @@ class Duty(Stage):
         filled_ns = int((flight.sent_ns - sender.tokens_at_ns) * self._share)
         sender.tokens_ns = min(self._size_ns, sender.tokens_ns + filled_ns)
         sender.tokens_at_ns = flight.sent_ns
-        airtime_ns = self._airtime_ns(len(flight.payload))
+        airtime_ns = self._airtime_ns(len(flight.payload), self._shared if broadcast else self._settings)
         if airtime_ns > sender.tokens_ns:
             if broadcast:
                 sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
@@ -46,9 +50,9 @@ class Duty(Stage):
         sender.tokens_ns -= airtime_ns
         return ""
 
-    def _airtime_ns(self, size: int) -> int:
-        settings = self._settings
+    def _airtime_ns(self, size: int, settings: Radio) -> int:
         if settings.medium == "lora":
             bandwidth_hz = int(settings.bandwidth_hz)
             return lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
-        return serialisation_ns(size + settings.overhead_bytes, settings.rate_bps or settings.fixed_rate_bps)
+        rate_bps = settings.rate_bps
+        return 0 if rate_bps is None else serialisation_ns(size + settings.overhead_bytes, rate_bps)

@@ -111,7 +111,7 @@ class OnAir(Stage):
 
     def __init__(self, setup: LinkSetup) -> None:
         assert setup.budget is not None and setup.air is not None
-        self._setup, self._settings = setup, setup.settings
+        self._setup, self._settings, self._shared = setup, setup.settings, setup.shared
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
@@ -182,8 +182,9 @@ class OnAir(Stage):
 
         `lost` is the threshold for errors of a packet that cannot get through; None where the signal decides.
         """
-        rate_bps = flight.rate_bps = self._settings.rate_bps or 0
-        airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, rate_bps) if rate_bps else 0
+        settings = self._shared if broadcast else self._settings
+        rate_bps = flight.rate_bps = settings.rate_bps or 0
+        airtime_ns = serialisation_ns(len(flight.payload) + settings.overhead_bytes, rate_bps) if rate_bps else 0
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
     def _words(self, flight: Flight, broadcast: bool) -> Words:
