@@ -66,8 +66,9 @@ class Fabric:
                 quantiles_ns(rule.jitter, self._table(rule))
 
     def turn_to(self, frame: Frame) -> None:
-        """Take the newest committed frame."""
-        self.world.turn_to(frame)
+        """Take the newest committed frame. Links are made anew where bodies go out of service in it, or come back."""
+        if self.world.turn_to(frame):
+            self.timeline.version += 1
 
     def take(self, tick: int, at_ns: int, text: str) -> None:
         """Take an event that was asked for, as JSON; it happens at a tick."""

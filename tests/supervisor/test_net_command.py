@@ -21,7 +21,8 @@ from foosim.supervisor import net_command
 from foosim.supervisor.links_shown import links_shown
 from foosim.supervisor.net_text import link_line
 from foosim.vhub.capture_reader import CaptureData, open_capture
-from foosim.vhub.explain import STAGE_NAMES, PacketName, explain_packet, parse_packet
+from foosim.vhub.explain import PacketName, explain_packet, parse_packet
+from foosim.vhub.explain_stages import STAGE_NAMES
 from foosim.vhub.rows import PACKETS, PacketRow
 from tests.supervisor.conftest import Command, Typed
 
@@ -215,7 +216,8 @@ def test_a_clog_that_was_asked_for_is_in_the_delay(capture: CaptureData) -> None
 
 def test_a_partition_that_was_asked_for_is_seen_at_sending(capture: CaptureData) -> None:
     told = explain(capture, first(capture, cause="partition", arrival_tick=-1))
-    assert told["policy"] == "at sending cut: partition" and told["queue"] == "not reached"
+    assert told["policy"] == "at sending cut by request 2, from 412 ms to 492 ms: partition"
+    assert told["queue"] == "not reached"
 
 
 @pytest.mark.parametrize(

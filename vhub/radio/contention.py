@@ -114,6 +114,11 @@ def _doublings(cw_min: int, cw_max: int) -> int:
     return ((cw_max + 1) // (cw_min + 1)).bit_length() - 1
 
 
+def wifi_contention(contenders: int, timing: WifiTiming, *, unicast: bool) -> Contention:
+    """Return the fixed point that 802.11 frames meet: broadcasts' window does not double."""
+    return contention(contenders, timing.cw_min + 1, _doublings(timing.cw_min, timing.cw_max) if unicast else 0)
+
+
 def wifi_access(
     words: Words,
     contenders: int,

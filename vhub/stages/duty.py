@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.protocol.radios import Radio
 from foosim.vhub.memory import Sending
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
@@ -36,21 +35,25 @@ class Duty(Stage):
         if broadcast:
             shared = sender.sending(flight.sequence, flight.copy)
             if shared is not None:
+                flight.decided_by = shared.decided_by
                 return DUTY_CYCLE if shared.cause == DUTY_CYCLE else ""
         if sender.tokens_ns < 0:
             sender.tokens_ns = self._size_ns
         filled_ns = int((flight.sent_ns - sender.tokens_at_ns) * self._share)
         sender.tokens_ns = min(self._size_ns, sender.tokens_ns + filled_ns)
         sender.tokens_at_ns = flight.sent_ns
-        airtime_ns = self._airtime_ns(len(flight.payload), self._shared if broadcast else self._settings)
+        airtime_ns = self.airtime_ns(len(flight.payload), flight.published)
         if airtime_ns > sender.tokens_ns:
+            flight.decided_by = (sender.tokens_ns,)
             if broadcast:
-                sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE)
+                sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE, decided_by=flight.decided_by)
             return DUTY_CYCLE
         sender.tokens_ns -= airtime_ns
         return ""
 
-    def _airtime_ns(self, size: int, settings: Radio) -> int:
+    def airtime_ns(self, size: int, published: bool) -> int:
+        """Return for how long a payload of so many bytes is on air."""
+        settings = self._shared if self._broadcasts and published else self._settings
         if settings.medium == "lora":
             bandwidth_hz = int(settings.bandwidth_hz)
             return lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)

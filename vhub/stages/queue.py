@@ -52,6 +52,7 @@ class Queue(Stage):
             shared = sender.sending(flight.sequence, flight.copy)
             if shared is not None:
                 flight.queue_bytes, flight.queue_ns = shared.queue_bytes, shared.queue_ns
+                flight.decided_by = shared.decided_by
                 return shared.cause
         now_ns, waiting = flight.sent_ns + flight.phase_ns, sender.waiting
         while waiting and waiting[0][0] <= now_ns:
@@ -63,9 +64,19 @@ class Queue(Stage):
         limits = self._shared if broadcast else self._own
         cause = self._judge(limits, len(waiting), queued + len(flight.payload) + limits.overhead, now_ns, wait_ns)
         flight.queue_bytes, flight.queue_ns = queued, wait_ns
+        if cause:
+            flight.decided_by = self._numbers(limits, cause, len(waiting), now_ns + wait_ns)
         if broadcast:
             sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
+            sender.last.decided_by = flight.decided_by
         return cause
+
+    def _numbers(self, limits: Limits, cause: str, packets: int, leaves_ns: int) -> tuple[int, ...]:
+        """Return by what a packet is dropped: how many wait; of CoDel also since when too long, and its count."""
+        if cause != CODEL:
+            return (packets,)
+        since_ns = self._sender.first_above_ns - limits.interval_ns
+        return packets, leaves_ns - since_ns, self._sender.drop_count
 
     def _judge(self, limits: Limits, packets: int, size: int, now_ns: int, wait_ns: int) -> str:
         if packets >= limits.packets or size > limits.bytes_max:
