@@ -38,7 +38,7 @@ def attempts_of(row: PacketRow, setup: LinkSetup, *, broadcast: bool) -> tuple[f
     else:
         return 0.0, []
     key, attempts = setup.sending_key if broadcast else setup.key, []
-    is_lost = row.collision == "contention" or row.cause in ("snr", "out_of_range", "blocked")
+    is_lost = row.decided_by.collision == "contention" or row.cause in ("snr", "out_of_range", "blocked")
     for attempt in range(row.retries + 1):
         block = draw_words(key, row.sequence, row.copy | ACCESS_BLOCK + (attempt >> 1) << BLOCK_SHIFT)
         at = (attempt & 1) << 2
@@ -65,9 +65,10 @@ def lora_text(row: PacketRow, settings: Radio, facts: dict[str, Any]) -> str:
     power_dbm, floor_dbm = row.received_cdbm / 100.0, floors[place]
     facts["sensitivity_dbm"] = max(floor_dbm, settings.sensitivity_dbm)
     text = f", the receiver needs {facts['sensitivity_dbm']:g} dBm"
+    levels, isolations = row.decided_by.by_factor_cdbm, LORA_ISOLATION_DB[place]
     facts["others"] = others = {
         factor: {"dbm": level / 100.0, "ratio_db": round(power_dbm - level / 100.0, 2), "needed_db": float(needed_db)}
-        for factor, level, needed_db in zip(LORA_FACTORS, row.by_factor_cdbm, LORA_ISOLATION_DB[place], strict=False)
+        for factor, level, needed_db in zip(LORA_FACTORS, levels, isolations, strict=False)
         if level
     }
     for factor, other in others.items():

@@ -121,7 +121,7 @@ class Stages:
         row = self.row
         if row.fate != "dropped":
             return ""
-        if row.collision == "contention":
+        if row.decided_by.collision == "contention":
             return "medium"
         return (_AT_ARRIVAL if row.arrival_tick >= 0 else _AT_SENDING).get(row.cause, "receiver")
 
@@ -170,24 +170,25 @@ class Stages:
         facts: dict[str, Any] = {"duty_cycle": share, "window_ns": window_ns, "airtime_ns": airtime_ns}
         text = f"{100 * share:g} % of {_time(window_ns)} on air, the packet takes {_time(airtime_ns)}"
         if self.dropped_by == "duty":
-            facts["left_ns"] = row.duty_left_ns
-            text += f", {_time(row.duty_left_ns)} is left"
+            facts["left_ns"] = row.decided_by.duty_left_ns
+            text += f", {_time(row.decided_by.duty_left_ns)} is left"
         return text, facts
 
     def _queue(self) -> Told:
-        row, queue = self.row, self.settings.queue
+        row, queue, decided = self.row, self.settings.queue, self.row.decided_by
         facts: dict[str, Any] = {"bytes": row.queue_bytes, "wait_ns": row.queue_ns, "packets_max": queue.packets}
         facts |= {"bytes_max": queue.bytes_max, "wait_max_ns": queue.wait_ns, "drop": queue.drop}
         limits = f"{queue.packets} packets, {queue.bytes_max} B, {_time(queue.wait_ns)}; {queue.drop}"
         before = f"{row.queue_bytes} B"
         if row.cause in (QUEUE_FULL, CODEL):
-            facts["packets"] = row.queue_packets
-            before = f"{row.queue_packets} packets of {row.queue_bytes} B"
+            facts["packets"] = decided.queue_packets
+            before = f"{decided.queue_packets} packets of {row.queue_bytes} B"
         text = f"{before} before it, waits {_time(row.queue_ns)} (at most {limits})"
         if row.cause == CODEL:
             facts |= {"target_ns": queue.codel_target_ns, "interval_ns": queue.codel_interval_ns}
-            facts |= {"above_ns": row.codel_above_ns, "drops": row.codel_drops}
-            text += f", for {_time(row.codel_above_ns)} above {_time(queue.codel_target_ns)}, drop {row.codel_drops}"
+            facts |= {"above_ns": decided.codel_above_ns, "drops": decided.codel_drops}
+            above, target = _time(decided.codel_above_ns), _time(queue.codel_target_ns)
+            text += f", for {above} above {target}, drop {decided.codel_drops}"
         return text, facts
 
     def _medium(self) -> Told:
@@ -232,7 +233,7 @@ class Stages:
             "snr_db": row.snr_cdb / 100.0,
             "interference_dbm": row.interference_cdbm / 100.0 if row.interference_cdbm else None,
             "error_rate": row.error_ppm / 1e6,
-            "half_duplex": row.collision == "half_duplex",
+            "half_duplex": row.decided_by.collision == "half_duplex",
         }
         text += f", path loss {row.path_loss_cdb / 100.0:g} dB (shadowing {row.shadowing_cdb / 100.0:g}"
         text += f", fading {row.fading_cdb / 100.0:g})" if self.settings.fading is not None else ")"
@@ -242,7 +243,7 @@ class Stages:
     def _judged(self, facts: dict[str, Any]) -> str:
         """Return what the channel compares a signal with."""
         row, settings = self.row, self.settings
-        if row.collision == "half_duplex":
+        if row.decided_by.collision == "half_duplex":
             return f"; {row.destination} is on air itself meanwhile and hears nothing (half duplex)"
         if settings.medium == "lora":
             return lora_text(row, settings, facts)
@@ -357,20 +358,20 @@ class Stages:
         return ((what, ns) for what, ns in spent.items() if ns)
 
     def _capacity(self) -> Told:
-        row, most = self.row, self.settings.capacity
+        row, most, by = self.row, self.settings.capacity, self.row.decided_by
         facts: dict[str, Any] = {"capacity": most, "evicted": row.cause == EVICTED}
         text = f"at most {most} on their way at once"
         if row.cause != EVICTED:
             return f"{text}, it kept its place", facts
-        block = row.evicted_by_copy | CAPACITY_BLOCK << BLOCK_SHIFT
-        draw = draw_words(self.setup.key, row.evicted_by, block)[0]
-        facts |= {"evicted_by": row.evicted_by, "evicted_by_copy": row.evicted_by_copy, "under_way": row.under_way}
+        block = by.evicted_by_copy | CAPACITY_BLOCK << BLOCK_SHIFT
+        draw = draw_words(self.setup.key, by.evicted_by, block)[0]
+        facts |= {"evicted_by": by.evicted_by, "evicted_by_copy": by.evicted_by_copy, "under_way": by.under_way}
         facts["draw"] = draw / UNIT
-        other = f"number {row.evicted_by}" + (f", copy {row.evicted_by_copy}," if row.evicted_by_copy else "")
-        return f"{text}: {other} took its place, draw {_share(draw)} among {row.under_way} under way", facts
+        other = f"number {by.evicted_by}" + (f", copy {by.evicted_by_copy}," if by.evicted_by_copy else "")
+        return f"{text}: {other} took its place, draw {_share(draw)} among {by.under_way} under way", facts
 
     def _receiver(self) -> Told:
-        row = self.row
+        row, decided = self.row, self.row.decided_by
         facts: dict[str, Any] = {"due_ns": row.due_ns, "arrival_tick": row.arrival_tick}
         facts["wall_released_ns"] = row.wall_released_ns
         released = f", left for it at {row.wall_released_ns} ns of the vHub's clock" if row.wall_released_ns else ""
@@ -380,8 +381,9 @@ class Stages:
             taken = f", {row.destination} {state}"
         elif row.cause == RECEIVER_FULL:
             size = size_of_payload(row.size)
-            facts |= {"message_bytes": size, "room_left": row.room_left, "room_share": row.room_share}
-            taken = f", {size} B in a message in which {row.source} has {row.room_left} B left of {row.room_share} B"
+            facts |= {"message_bytes": size, "room_left": decided.room_left, "room_share": decided.room_share}
+            left = f"{decided.room_left} B left of {decided.room_share} B"
+            taken = f", {size} B in a message in which {row.source} has {left}"
         return f"due {_time(row.due_ns)}, arrives at tick {row.arrival_tick}{taken}{released}", facts
 
     def _receiver_state(self) -> str:

@@ -32,6 +32,7 @@ from foosim.vhub.rows import (
     TICK,
     AddedRow,
     ClientRow,
+    DecidedRow,
     DeliveredRow,
     EditRow,
     EntityRow,
@@ -166,16 +167,27 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.bits_flipped,
         flight.rate_bps,
     )
-    row = PacketRow(*common, *_radio_inputs(flight)) if flight.radio else PacketRow(*common)
-    if fate is DROPPED and flight.decided_by:
-        names = DECIDING.get(flight.cause, ())
-        return replace(row, **dict(zip(names, flight.decided_by, strict=False)))
-    return row
+    if not flight.radio:
+        row = PacketRow(*common)
+        return _with_decision(row, flight) if flight.decided_by else row
+    row = PacketRow(*common, *_radio_inputs(flight))
+    return _with_decision(row, flight) if flight.cause or flight.by_factor else row
+
+
+def _with_decision(row: PacketRow, flight: Flight) -> PacketRow:
+    """Return the row of a packet with what it was dropped by, where there is more to say than its cause."""
+    cause, by_factor = flight.cause, flight.by_factor
+    found: dict[str, Any] = dict(zip(DECIDING.get(cause, ()), flight.decided_by, strict=False))
+    if by_factor:
+        found["by_factor_cdbm"] = [level_cdbm(power) for power in by_factor]
+    if cause == COLLISION:
+        found["collision"] = _collision_of(flight)
+    return replace(row, decided_by=DecidedRow(**found)) if found else row
 
 
 def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
     """Return what the stages of a radio found, in the order of a row."""
-    threshold, walls, by_factor = flight.error_threshold, flight.walls, flight.by_factor
+    threshold, walls = flight.error_threshold, flight.walls
     interference = flight.interference if flight.interference < DEAF else 0
     return (
         flight.distance_mm,
@@ -191,8 +203,6 @@ def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
         flight.words[_ERROR].to_bytes(8).hex() if threshold else "",
         flight.contenders,
         flight.retries,
-        _collision_of(flight) if flight.cause == COLLISION else "",
-        [level_cdbm(power) for power in by_factor] if by_factor else [],
     )
 
 

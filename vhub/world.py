@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 
+import numpy as np
+
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
@@ -49,9 +51,12 @@ class World:
         """By endpoint, in the frames of a layout."""
         self._standing: dict[str, Vector] = {}
         self._down: frozenset[str] = frozenset()
-        self._switches: list[tuple[int, str]] = []
-        """Of each robot of a layout: the slot that says whether it is out of service."""
         self._switched: Layout | None = None
+        self._robots: list[str] = []
+        self._switches = np.zeros(0, np.intp)
+        """Of each robot of that layout: the slot that says whether it is out of service."""
+        self._states = b""
+        """What these slots hold in the newest frame."""
         self.turns = 0
         """Grows with every frame."""
 
@@ -67,13 +72,18 @@ class World:
         return self._look_who_is_down(frame)
 
     def _look_who_is_down(self, frame: Frame) -> bool:
+        """Take who is out of service; return whether that are others than before."""
         if frame.layout is not self._switched:
             self._switched = frame.layout
-            self._switches = [(robot.offsets["down"], robot.name) for robot in frame.layout.robots]
-        numbers = frame.numbers
-        robots = {name for slot, name in self._switches if numbers[slot] != 0.0}
-        if not robots and not self._down:
+            self._robots = [robot.name for robot in frame.layout.robots]
+            self._switches = np.array([robot.offsets["down"] for robot in frame.layout.robots], np.intp)
+            self._states = b""
+        found = frame.values[self._switches]
+        states = found.tobytes()
+        if states == self._states:
             return False
+        self._states = states
+        robots = {name for name, is_down in zip(self._robots, found.tolist(), strict=True) if is_down}
         down = frozenset((*robots, *(name for name, robot in self._carriers.items() if robot in robots)))
         changed, self._down = down != self._down, down
         return changed
