@@ -1,7 +1,7 @@
 """Admission: what is too long for the link, or comes from a body that is out of service, is not sent.
 
 By radio or by wire: who is on board of a body that is out of service has no power. Links are made anew when a body goes
-out of service (`fabric.turn_to`), so that the others need not ask.
+out of service (`Fabric.turn_to`), so that the others need not ask.
 """
 
 from __future__ import annotations
