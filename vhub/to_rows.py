@@ -131,7 +131,8 @@ _ERROR: Final = int(Slot.ERROR)
 
 def packet_row(flight: Flight) -> PacketRow:
     """Return the row of a packet whose fate is final, or that is in flight at the end."""
-    fate = _FATES.get(flight.cause, DROPPED)
+    cause, radio = flight.cause, flight.radio
+    fate = _FATES.get(cause, DROPPED)
     on_its_way = flight.arrival_tick >= 0
     slots, words, payload = flight.slots, flight.words, flight.payload
     common = (
@@ -145,14 +146,14 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.due_ns if on_its_way else -1,
         flight.arrival_tick,
         fate,
-        flight.cause if fate is DROPPED else "",
+        cause if fate is DROPPED else "",
         flight.rule,
         words[_LOSS].to_bytes(8).hex() if slots >> _LOSS & 1 else "",
         words[_JITTER].to_bytes(8).hex() if slots >> _JITTER & 1 and on_its_way else "",
         len(payload),
         payload,
         flight.released_wall_ns,
-        flight.radio,
+        radio,
         flight.published,
         flight.queue_bytes,
         flight.queue_ns,
@@ -167,11 +168,11 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.bits_flipped,
         flight.rate_bps,
     )
-    if not flight.radio:
+    if not radio:
         row = PacketRow(*common)
-        return _with_decision(row, flight) if flight.decided_by else row
+        return _with_decision(row, flight) if cause and flight.decided_by else row
     row = PacketRow(*common, *_radio_inputs(flight))
-    return _with_decision(row, flight) if flight.cause or flight.by_factor else row
+    return _with_decision(row, flight) if cause or flight.by_factor else row
 
 
 def _with_decision(row: PacketRow, flight: Flight) -> PacketRow:
