@@ -8,12 +8,13 @@ from typing import Any, Final
 import msgspec
 import pytest
 
-from foosim.protocol.deployment_file import apply_sets
+from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.vhub.capture_reader import CaptureData, open_capture
 from foosim.vhub.explain import PacketName, Step, explain_packet
 from foosim.vhub.explain_stages import STAGE_NAMES
+from foosim.vhub.model_hash import model_hash
 from foosim.vhub.rows import PACKETS, PacketRow
 from foosim.vhub.to_rows import DECIDING
 from tests.links.offered import TABLE
@@ -166,3 +167,14 @@ def test_fields_of_other_causes_are_left_out(capture: CaptureData) -> None:
 
 def test_stages_are_told_in_their_order(capture: CaptureData, lost: Lost) -> None:
     assert list(steps(capture, lost["law", "duty_cycle", ""][0])) == list(STAGE_NAMES)
+
+
+def test_one_hash_is_that_of_a_model(capture: CaptureData) -> None:
+    """Whatever else a deployment says; another network, or another seed, is another model."""
+    text = capture.about.deployment_text
+
+    def hashed(*sets: str) -> str:
+        return model_hash(load_deployment(apply_sets(text, "t.yaml", list(sets)), "t.yaml"))
+
+    assert capture.about.metadata["model_hash"] == hashed() == hashed("pace=fast") == hashed("scenery={}")
+    assert len({hashed(), hashed("seed=2"), hashed("network.links.lora.loss=1 %"), hashed("network.events=[]")}) == 4
