@@ -130,7 +130,7 @@ class Stages:
     def _admit(self) -> Told:
         row, longest = self.row, self.settings.payload_max
         if not self.setup.is_routed:
-            return "the ends have no radio in common", {"routed": False}
+            return "the ends have no radio in common, or not that of their rule", {"routed": False}
         is_down = row.cause == NODE_DOWN
         state = f"out of service{self._on_board(row.source)}" if is_down else "in service"
         limit = "any size" if longest is None else f"at most {longest} B"
@@ -166,7 +166,8 @@ class Stages:
     def _duty(self) -> Told:
         row, settings, stage = self.row, self.settings, self.stages["duty"]
         assert isinstance(stage, Duty)
-        share, window_ns, airtime_ns = settings.duty_cycle, settings.duty_window_ns, stage.airtime_ns(row.size)
+        share, window_ns = settings.duty_cycle, settings.duty_window_ns
+        airtime_ns = stage.airtime_ns(row.size, row.published)
         facts: dict[str, Any] = {"duty_cycle": share, "window_ns": window_ns, "airtime_ns": airtime_ns}
         text = f"{100 * share:g} % of {_time(window_ns)} on air, the packet takes {_time(airtime_ns)}"
         if self.dropped_by == "duty":
@@ -175,7 +176,8 @@ class Stages:
         return text, facts
 
     def _queue(self) -> Told:
-        row, queue, decided = self.row, self.settings.queue, self.row.decided_by
+        row, decided = self.row, self.row.decided_by
+        queue = (self.setup.shared if self.setup.sends_once and row.published else self.settings).queue
         facts: dict[str, Any] = {"bytes": row.queue_bytes, "wait_ns": row.queue_ns, "packets_max": queue.packets}
         facts |= {"bytes_max": queue.bytes_max, "wait_max_ns": queue.wait_ns, "drop": queue.drop}
         limits = f"{queue.packets} packets, {queue.bytes_max} B, {_time(queue.wait_ns)}; {queue.drop}"

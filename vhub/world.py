@@ -52,7 +52,7 @@ class World:
         self._standing: dict[str, Vector] = {}
         self._down: frozenset[str] = frozenset()
         self._switched: Layout | None = None
-        self._robots: list[str] = []
+        self._named: list[str] = []
         self._switches = np.zeros(0, np.intp)
         """Of each robot of that layout: the slot that says whether it is out of service."""
         self._states = b""
@@ -75,7 +75,7 @@ class World:
         """Take who is out of service; return whether that are others than before."""
         if frame.layout is not self._switched:
             self._switched = frame.layout
-            self._robots = [robot.name for robot in frame.layout.robots]
+            self._named = [robot.name for robot in frame.layout.robots]
             self._switches = np.array([robot.offsets["down"] for robot in frame.layout.robots], np.intp)
             self._states = b""
         found = frame.values[self._switches]
@@ -83,7 +83,7 @@ class World:
         if states == self._states:
             return False
         self._states = states
-        robots = {name for name, is_down in zip(self._robots, found.tolist(), strict=True) if is_down}
+        robots = {name for name, is_down in zip(self._named, found.tolist(), strict=True) if is_down}
         down = frozenset((*robots, *(name for name, robot in self._carriers.items() if robot in robots)))
         changed, self._down = down != self._down, down
         return changed
