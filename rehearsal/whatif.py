@@ -189,6 +189,8 @@ class _Compared:
         """Take a packet whose fate is final, or that is in flight at the end."""
         key = flight.source, flight.sequence, flight.destination, flight.copy
         before = self._rows.pop(key, None)
+        if before is None and not flight.copy:
+            return  # its row is behind the end of a part: another receiver's says that it was sent
         flight.released_wall_ns = 0 if before is None else before.wall_released_ns
         after = packet_row(flight)
         if before is not None and before.payload_hash:

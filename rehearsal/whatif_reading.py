@@ -20,7 +20,7 @@ from foosim.protocol.messages import RobotPacket, Sent
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick
-from foosim.vhub.capture_split import CUT_TICK
+from foosim.vhub.capture_split import CUT_REASON, CUT_TICK
 from foosim.vhub.payload_hash import check_payloads
 from foosim.vhub.rows import CLIENTS, PACKETS, TICK, CaptureError, ClientRow, EditRow, PacketRow, TickRow
 from foosim.vhub.state import OUTBOX_SHIFT
@@ -50,7 +50,7 @@ class Offered:
 
 def frames_for(capture: CaptureData, *, on_radio: bool) -> Frames:
     """Return which frames are needed: where no fate depends on places and nobody is taken out of service, only one."""
-    if not on_radio and "freeze" not in capture.edit_kinds:
+    if not on_radio and not {"freeze", "thaw"} & capture.edit_kinds:
         return "first"
     return "captured" if set(judged_ticks(capture)) <= set(capture.frame_ticks.tolist()) else "computed"
 
@@ -61,7 +61,7 @@ def caveats(capture: CaptureData) -> tuple[str, ...]:
     if CUT_TICK in capture.about.metadata:
         found.append("it begins within its run: what links remembered, and events asked for before, are not known")
     end = capture.about.end
-    if not capture.finished or "problem" in end or end.get("reason") == "cut":
+    if not capture.finished or "problem" in end or end.get("reason") == CUT_REASON:
         found.append("it does not have the end of its run: packets in flight there may lack, and take no part")
     return tuple(found)
 
@@ -69,7 +69,7 @@ def caveats(capture: CaptureData) -> tuple[str, ...]:
 def judged_ticks(capture: CaptureData) -> list[int]:
     """Return the ticks that are closed again: behind the last frame of a run that has its end nothing was sent."""
     ticks: list[int] = capture.ticks.tolist()
-    return ticks[:-1] if capture.finished else ticks
+    return ticks[:-1] if capture.finished and capture.about.end.get("reason") != CUT_REASON else ticks
 
 
 class Offers:

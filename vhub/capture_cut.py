@@ -20,7 +20,7 @@ from foosim.protocol.units import format_ns
 from foosim.vhub.capture_file import CHUNK_BYTES, check_new, declare_topics
 from foosim.vhub.capture_parts import END_METADATA, METADATA, Joined
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
-from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK, OWN
+from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_REASON, CUT_TICK, OWN
 from foosim.vhub.in_force import InForce
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.mcap_writer import McapWriter
@@ -136,7 +136,7 @@ class _Copy:
             elif not self._take(scan, content):
                 break
         self._mcap.end_chunk()
-        self._mcap.add_metadata(END_METADATA, {"reason": "cut", "last_tick": str(self._stop_tick)})
+        self._mcap.add_metadata(END_METADATA, {"reason": CUT_REASON, "last_tick": str(self._stop_tick)})
 
     def _describe(self, content: records.Metadata) -> None:
         if content.name == END_METADATA:

@@ -20,6 +20,8 @@ from foosim.vhub.rows import CaptureError
 CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cut_chain"
 """Which capture a file is of that begins later, its first frame, its digest, and the chain up to it: entries of the
 metadata `foosim`."""
+CUT_REASON: Final = "cut"
+"""The reason of its end that a part says."""
 OWN: Final = frozenset({PART, AFTER, LAST, CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN})
 """What the files of a capture say otherwise, each for itself."""
 

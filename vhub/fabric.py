@@ -69,8 +69,9 @@ class Fabric:
                 quantiles_ns(rule.jitter, self._table(rule))
 
     def turn_to(self, frame: Frame) -> None:
-        """Take the newest committed frame."""
-        self.world.turn_to(frame)
+        """Take the newest committed frame. Links are made anew where bodies go out of service in it, or come back."""
+        if self.world.turn_to(frame):
+            self.timeline.version += 1
 
     def take(self, tick: int, at_ns: int, text: str) -> None:
         """Take an event that was asked for, as JSON; it happens at a tick."""
@@ -120,8 +121,8 @@ class Fabric:
     def restore_flight(self, flight: Flight) -> None:
         """Take up a packet in flight of such a state: it may be on air."""
         profile = self.profiles.find(flight.source, flight.destination, flight.channel)
-        settings, name = profile.settings, profile.radio or profile.rule
-        if settings.medium not in ("none", "wired"):
+        settings, name = profile.settings, profile.radio or self.network.defaults.preset
+        if settings.is_on_air:
             self._air(name, settings).restore(flight, self._propagation(name, settings))
 
     def setup(
@@ -140,9 +141,10 @@ class Fabric:
         sender = self.radios.get(radio)
         if sender is None:
             sender = self.radios[radio] = RadioState()
-        air, budget = None, None
-        if settings.medium not in ("none", "wired"):
-            name = profile.radio or profile.rule
+        air, budget, own = None, None, None
+        if settings.is_on_air:
+            name = profile.radio or self.network.defaults.preset
+            own = self.profiles.base(profile.radio)
             propagation = self._propagation(name, settings)
             air = self._air(name, settings)
             budget = Budget(propagation, source, destination, self.seed, settings.air or name)
@@ -167,6 +169,7 @@ class Fabric:
             self._opportunities(settings),
             self._model(settings),
             self.faults,
+            own,
         )
 
     def queue_ns(self, key: LinkKey, now_ns: int) -> int:

@@ -168,6 +168,19 @@ def test_an_unfinished_capture_is_judged_as_far_as_it_goes(tmp_path: Path) -> No
     assert "does not have the end of its run" in replay("whatif", torn).err
 
 
+def test_a_broadcast_whose_fate_is_behind_the_end_is_left_out(tmp_path: Path) -> None:
+    """One receiver has it, the other one's link is slow: a faster network would deliver what nothing is known of."""
+    whole, part = tmp_path / "run.mcap", tmp_path / "part.mcap"
+    slow = "links: [{id: slow, from: '*', to: player-red, delay: 450 ms}, {id: rest, from: '*', to: '*', delay: 1 ms}]"
+    rehearse(TABLE.read_text(), TABLE.name, 100, 1, ["engine=pure", f"network={{{slow}}}"], capture=whole)
+    assert replay("cut", whole, "--to", "0.1 s", "-o", part).code == 0
+    capture = open_capture(part)
+    assert what_if(capture).changed == 0
+    about = capture.about
+    text = with_network(about.deployment_text, about.deployment_name, None, ["network.links.slow.delay=1 ms"])
+    assert what_if(capture, load_deployment(text, about.deployment_name)).changed == 0
+
+
 def test_a_part_is_judged_by_what_it_has(tmp_path: Path) -> None:
     """Who took part before it began takes part; what was sent before that is not judged."""
     whole, part = captured(tmp_path / "run.mcap", "wifi"), tmp_path / "part.mcap"

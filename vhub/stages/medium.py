@@ -111,7 +111,7 @@ class OnAir(Stage):
 
     def __init__(self, setup: LinkSetup) -> None:
         assert setup.budget is not None and setup.air is not None
-        self._setup, self._settings = setup, setup.settings
+        self._setup, self._settings, self._shared = setup, setup.settings, setup.shared
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
@@ -154,20 +154,21 @@ class OnAir(Stage):
         ready_ns = max(ready_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
         access, air_ns = self.access(flight, broadcast, UNIT if cause else None)
-        delay_ns, occupancy_ns, retries, paid_ns, outcome = access
-        end_ns, until_ns = start_ns + delay_ns, start_ns + occupancy_ns
+        delay_ns, outcome = access.delay_ns, access.outcome
+        end_ns, until_ns = start_ns + delay_ns, start_ns + access.occupancy_ns
         flight.air_start_ns, flight.air_end_ns = end_ns - air_ns, end_ns
         flight.airtime_ns = airtime_ns = air_ns if air_ns < delay_ns else delay_ns
         flight.access_ns = end_ns - ready_ns - airtime_ns
-        flight.retries = retries
+        flight.retries = access.retries
         if outcome == "ok":
             flight.is_settled = self.is_acknowledged and not broadcast
         else:
             flight.outcome = COLLISION if outcome in ("collision", "busy") else SNR
         sender.free_ns = until_ns
-        sender.waiting.append((until_ns, len(flight.payload) + self._settings.overhead_bytes))
+        settings = self._shared if broadcast else self._settings
+        sender.waiting.append((until_ns, len(flight.payload) + settings.overhead_bytes))
         if self._is_limited:
-            sender.tokens_ns = max(0, sender.tokens_ns - paid_ns)
+            sender.tokens_ns = max(0, sender.tokens_ns - access.airtime_ns)
         of = self._budget.propagation
         what = source, flight.sequence, flight.copy, end_ns - air_ns, end_ns, until_ns
         air.register(Transmission(*what, of.place(source).at, of.power_cdbm, self._factor))
@@ -185,8 +186,9 @@ class OnAir(Stage):
 
         `lost` is the threshold for errors of a packet that cannot get through; None where the signal decides.
         """
-        rate_bps = flight.rate_bps = self._settings.rate_bps or 0
-        airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, rate_bps) if rate_bps else 0
+        settings = self._shared if broadcast else self._settings
+        rate_bps = flight.rate_bps = settings.rate_bps or 0
+        airtime_ns = serialisation_ns(len(flight.payload) + settings.overhead_bytes, rate_bps) if rate_bps else 0
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
     def _words(self, flight: Flight, broadcast: bool) -> Words:

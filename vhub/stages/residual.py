@@ -45,6 +45,10 @@ class Residual(Stage):
         """Whether the packet meets the link in its bad state."""
         return False
 
+    def is_out(self, sent_ns: int) -> bool:
+        """Whether a time is one of the link's outages, in which all is lost."""
+        return self._outages is not None and self._outages.is_bad(sent_ns)
+
     def threshold(self, *, bad: bool) -> int:
         """Return the number below which a packet's draw loses it, in the good or the bad state."""
         return self._any[bad]
