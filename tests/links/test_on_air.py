@@ -56,7 +56,7 @@ def test_what_the_queue_drops_costs_no_duty_cycle(published: bool) -> None:
 def test_what_waits_before_a_radio_counts_as_before_a_wire() -> None:
     """Payload and overhead: of 5000 B four packets of 1100 B have room."""
     settings = "rate: 1 Mbit/s, overhead: 1000 B, queue: {bytes: 5000 B}"
-    on_air, on_wire = near(f"{{preset: wifi_5_indoor, {settings}}}"), fabric_of(settings)
+    on_air, on_wire = near(f"{{medium: radio, tx_power: 10 dBm, {settings}}}"), fabric_of(settings)
     found = []
     for fabric in (on_air, on_wire):
         flights = [Flight("a", "b", "data", number, 0, 0, bytes(100)) for number in range(1, 8)]
