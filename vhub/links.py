@@ -109,10 +109,16 @@ class Link:
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """Clogs have changed: give packets on their way, in the order of sending, new due times."""
+        judged = [(flight, self._is_late(flight)) for flight in flights]
         self._settle(now_ns)
         for stage in self._stages:
             if isinstance(stage, Delay):
-                stage.retime(flights, now_ns)
+                stage.retime(judged, now_ns)
+
+    def _is_late(self, flight: Flight) -> bool:
+        """Whether those behind a packet overtake it, by the settings of when it was sent."""
+        self._settle(flight.sent_ns)
+        return any(isinstance(stage, Delay) and stage.is_late(flight) for stage in self._stages)
 
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from math import expm1
+from typing import Any, Final
 
 import pytest
 
@@ -15,7 +16,6 @@ from tests.links.offered import ENDS, MS, Hub, S, deployment_of, every, fabric_o
 from tests.links.proof import Proof
 from tests.links.statistics import ks
 
-TICK_NS = 2 * MS
 PAIRS = [(one, other) for one in ENDS for other in ENDS if one != other]
 
 
@@ -152,16 +152,26 @@ def test_a_burst_goes_on_in_another_model_of_bursts(chain: str, is_burst: bool) 
     assert [bool(f.cause) for f in fates(fabric_of(two, 1, to_four), every(MS, 30))] == [is_burst] * 30
 
 
-def test_a_clog_behind_new_reordering_moves_what_was_sent_before() -> None:
-    """What was sent before links reordered keeps its order: it has drawn nothing for it."""
-    reorder = {"set": {"link": "tried", "reorder": {"probability": "100 %", "extra": "5 ms"}}}
-    clog = {"clog": {"from": "a", "to": "b"}, "for": "60 ms"}
+REORDER: Final = {"set": {"link": "tried", "reorder": {"probability": "100 %", "extra": "5 ms"}}}
+CLOG: Final = {"clog": {"from": "a", "to": "b"}, "for": "46 ms"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "due_ns"),
+    [
+        ({3: REORDER, 4: CLOG}, [54 * MS, 54 * MS + 1, 54 * MS + 2, 61 * MS, 63 * MS, 65 * MS]),
+        ({3: REORDER, 4: {"heal": "settings"}, 8: CLOG}, [62 * MS + place for place in (0, 1, 2, 0, 3, 4)]),
+    ],
+    ids=["before new reordering", "behind old reordering"],
+)
+def test_a_clog_leaves_the_order_in_which_packets_were_sent(asked: dict[int, Any], due_ns: list[int]) -> None:
+    """What is overtaken by the settings of when it was sent is, and nothing else, whatever the link does by then."""
     hub = Hub(deployment_of(rule("delay: 50 ms")))
-    for tick in range(4):
-        hub.close({"a": [Sent(tick + 1, "b", "data", 0, b"x")]}, edits=[Disrupt(json.dumps(reorder))] * (tick == 3))
-    hub.close({}, edits=[Disrupt(json.dumps(clog))])
-    held = {flight.sequence: flight.due_ns for flight in hub.state.in_flight()}
-    assert held == {n: 4 * TICK_NS + 60 * MS + (n - 1) * (n < 4) for n in (1, 2, 3, 4)}
+    for tick in range(9):
+        sent = [Sent(tick + 1, "b", "data", 0, b"x")] if tick < 6 else []
+        hub.close({"a": sent}, edits=[Disrupt(json.dumps(asked[tick]))] if tick in asked else [])
+    due = {flight.sequence: flight.due_ns for flight in hub.state.in_flight()}
+    assert [due[number] for number in range(1, 7)] == due_ns
 
 
 def test_what_is_fast_again_does_not_overtake() -> None:

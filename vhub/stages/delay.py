@@ -52,7 +52,7 @@ class Delay(Stage):
             due_ns += jitter_ns
         if flight.is_bad:
             due_ns += self._bad_ns
-        is_late = self._extra_ns > 0 and self._is_late(flight)
+        is_late = self._extra_ns > 0 and self.is_late(flight)
         if is_late:
             due_ns += self._extra_ns
         held_ns = self._held_ns(due_ns) if self._holds else due_ns
@@ -66,27 +66,26 @@ class Delay(Stage):
             flight.held_ns = held_ns - due_ns
         return ""
 
-    def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
+    def retime(self, flights: Iterable[tuple[Flight, bool]], now_ns: int) -> None:
         """Give packets on their way, in the order of sending, the due times that the present clogs leave them.
 
-        What is due already and waits for its receiver's tick stays.
+        Each comes with whether those behind it overtake it. What is due already, and waits for its receiver, stays.
         """
         last_ns = -1
-        for flight in flights:
+        for flight, is_late in flights:
             if flight.due_ns < now_ns:
                 continue
             free_ns = flight.due_ns - flight.held_ns
             flight.due_ns = self._held_ns(free_ns)
-            if not self._is_late(flight):
+            if not is_late:
                 last_ns = flight.due_ns = self._in_order(flight.due_ns, last_ns)
             flight.held_ns = flight.due_ns - free_ns
         if self._fifo:
             self._memory.last_due_ns = max(last_ns, min(self._memory.last_due_ns, now_ns))
 
-    def _is_late(self, flight: Flight) -> bool:
-        """Whether those behind it overtake it."""
-        is_drawn = flight.slots >> Slot.REORDER & 1
-        return self._extra_ns > 0 and is_drawn > 0 and flight.words[Slot.REORDER] < self._reordered
+    def is_late(self, flight: Flight) -> bool:
+        """Whether those behind a packet that was sent by these settings overtake it."""
+        return self._extra_ns > 0 and flight.words[Slot.REORDER] < self._reordered
 
     def _held_ns(self, due_ns: int) -> int:
         """Return when what would be due now is, for clogs."""
