@@ -149,6 +149,12 @@ def end_of(path: Path) -> dict[str, str] | None:
         raise CaptureError(f"{path}: a damaged summary, {error}") from None
 
 
+def has_end(last: Path) -> bool:
+    """Whether a capture has its end, which is in its last file. Raises CaptureError."""
+    end = end_of(last)
+    return end is not None and NEXT not in end
+
+
 def _end_in(stream: BinaryIO, summary: bytes, size: int) -> dict[str, str]:
     for opcode, start, stop in chunk_records(summary):
         if opcode != Opcode.METADATA_INDEX:
