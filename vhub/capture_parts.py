@@ -31,6 +31,8 @@ END_METADATA: Final = "foosim.end"
 PART, AFTER, LAST = "part", "part_after", "last"
 """What each file of a split capture says: its number from 0, the file before, and how long a time is kept where only
 the last is: entries of the metadata `foosim`."""
+ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
+"""Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
 NEXT: Final = "goes_on_in"
 """The file behind one: an entry of the metadata `foosim.end`."""
 
