@@ -11,7 +11,7 @@ import signal
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -33,9 +33,10 @@ from foosim.supervisor.remote import CAPTURE
 from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
-from foosim.vhub.capture_parts import first_there, parts_at
+from foosim.vhub.capture_parts import first_there, has_end, parts_at
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
+from foosim.vhub.rows import CaptureError
 
 POLL_S: Final = 0.02
 """How often a run that starts is looked at."""
@@ -446,17 +447,17 @@ class Up:
         return [f"{child.name} {child.ending}; its log is {child.log}", *(f"    {line}" for line in child.last_lines())]
 
     def _capture_lines(self) -> list[str]:
-        """Say where the capture is; who was killed did not finish it."""
+        """Say where the capture is, and whether it has its end: who was killed, or failed, did not finish it."""
         files = {} if self.capture is None else parts_at(self.capture)
         if not files:
             return [self._not_home] if self._not_home else []
-        hub = self._launcher.children.get(VHUB)
-        finished = hub is not None and hub.exit_code in (DONE, FAILED)
         result = self.folder.result()
         wrong = "" if result is None else recording_text(result)
         count = f", {len(files)} files" if len(files) > 1 else ""
-        first = next(iter(files.values()))
-        lines = [f"capture {first}{count}" if finished else f"capture {first}{count} (unfinished)"]
+        there, is_finished = [*files.values()], False
+        with suppress(CaptureError):
+            is_finished = has_end(there[-1])
+        lines = [f"capture {there[0]}{count}" if is_finished else f"capture {there[0]}{count} (unfinished)"]
         return [*lines, wrong] if wrong else lines
 
     @contextmanager

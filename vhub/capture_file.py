@@ -26,7 +26,17 @@ from foosim.protocol.disk import Room, megabytes, room_on_disk
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch, Origin
 from foosim.vhub.capture_left import Journalled, Left, Progress, look, run_of
-from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, part_path, parts_at
+from foosim.vhub.capture_parts import (
+    END_METADATA,
+    METADATA,
+    NEXT,
+    ORIGIN,
+    ORIGIN_CHAIN,
+    ORIGIN_DIGEST,
+    ORIGIN_TICK,
+    part_path,
+    parts_at,
+)
 from foosim.vhub.capture_split import OWN, Split
 from foosim.vhub.in_force import HOLDING
 from foosim.vhub.link_models import model_versions
@@ -44,8 +54,6 @@ DEPLOYMENT: Final = "deployment.yaml"
 ASSETS: Final = "assets/"
 """How the names of the files begin that the deployment refers to; their paths follow."""
 VERSIONS: Final = "versions.json"
-ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
-"""Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
 CHUNK_BYTES: Final = 4 * 1024 * 1024
 """A chunk is ended at this size, or when it is to be flushed; a reader holds one at a time."""
 _LIBRARIES: Final = (
@@ -435,7 +443,7 @@ class CaptureFile:
         self.torn_bytes = left.torn_bytes
         if split is not None and is_described:
             first = found.book.chunks[0].chunk_start_offset if found.book.chunks else found.book.offset
-            split.take_over(number, first)
+            split.take_over(number, first, is_empty=left.done.tick < 0)
             own = {key: value for key, value in found.metadata[METADATA].items() if key not in OWN}
             self._described = replace(self._described, metadata=own)
             with os.fdopen(os.dup(self._file), "rb") as stream:

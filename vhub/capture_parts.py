@@ -31,6 +31,8 @@ END_METADATA: Final = "foosim.end"
 PART, AFTER, LAST = "part", "part_after", "last"
 """What each file of a split capture says: its number from 0, the file before, and how long a time is kept where only
 the last is: entries of the metadata `foosim`."""
+ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
+"""Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
 NEXT: Final = "goes_on_in"
 """The file behind one: an entry of the metadata `foosim.end`."""
 
@@ -147,6 +149,12 @@ def end_of(path: Path) -> dict[str, str] | None:
         raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
     except (EndOfFile, struct.error, ValueError) as error:
         raise CaptureError(f"{path}: a damaged summary, {error}") from None
+
+
+def has_end(last: Path) -> bool:
+    """Whether a capture has its end, which is in its last file. Raises CaptureError."""
+    end = end_of(last)
+    return end is not None and NEXT not in end
 
 
 def _end_in(stream: BinaryIO, summary: bytes, size: int) -> dict[str, str]:

@@ -36,13 +36,20 @@ from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames
 from foosim.vhub.capture_file import (
     ASSETS,
     DEPLOYMENT,
+    VERSIONS,
+)
+from foosim.vhub.capture_parts import (
+    END_METADATA,
+    METADATA,
+    NEXT,
     ORIGIN,
     ORIGIN_CHAIN,
     ORIGIN_DIGEST,
     ORIGIN_TICK,
-    VERSIONS,
+    Joined,
+    files_from,
+    has_end,
 )
-from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT, Joined, end_of, files_from
 from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import (
@@ -313,8 +320,7 @@ def read_about(path: Path) -> About:
     scan = Scan(path)
     for _ in scan.messages():
         break
-    end = end_of(files_from(path)[-1])
-    scan.about.finished = end is not None and NEXT not in end
+    scan.about.finished = has_end(files_from(path)[-1])
     return scan.about
 
 

@@ -12,7 +12,7 @@ from typing import Final
 
 from foosim.protocol.deployment import Capture
 from foosim.protocol.units import format_ns
-from foosim.vhub.capture_parts import AFTER, LAST, PART, head_of, number_of, part_path, parts_at
+from foosim.vhub.capture_parts import AFTER, LAST, ORIGIN_TICK, PART, head_of, number_of, part_path, parts_at
 from foosim.vhub.in_force import InForce
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import CaptureError
@@ -58,8 +58,8 @@ class Split:
         """How many bytes the files before have."""
         return sum(file.bytes for file in self._earlier)
 
-    def take_over(self, number: int, described_bytes: int) -> None:
-        """Go on with the file of this number. Raises CaptureError for one before it that is none."""
+    def take_over(self, number: int, described_bytes: int, *, is_empty: bool) -> None:
+        """Go on with the file of this number; `is_empty`: it has no tick. Raises CaptureError for one that is none."""
         self.number, self._described_bytes = number, described_bytes
         for known, path in parts_at(self._path).items():
             if known > number:
@@ -67,11 +67,12 @@ class Split:
             head = head_of(path)
             if PART not in head or number_of(path, head) != known:
                 raise CaptureError(f"{path}: is not the file of number {known} of {self._path}")
-            first_tick = number_of(path, head, CUT_TICK) if CUT_TICK in head else 0
+            begin = next((entry for entry in (CUT_TICK, ORIGIN_TICK) if entry in head), None)
+            first_tick = 0 if begin is None else number_of(path, head, begin)
             if known < number:
                 self._earlier.append(_File(path, first_tick, path.stat().st_size))
             else:
-                self._first_tick = first_tick
+                self._first_tick = -1 if is_empty else first_tick
 
     def begin(self, number: int, described_bytes: int) -> None:
         """Note that a file is begun, which is so long before its first row."""

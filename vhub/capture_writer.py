@@ -69,7 +69,7 @@ class CaptureWriter:
     a file that this run left unfinished is gone on with (`CaptureFile`): `keep` everything that the journal has, from
     that tick on; what the file has already is not written again, and what it has behind `journal_end`, the last tick
     and epoch of that journal, is cut off. `say` takes what people should know, as (level, text).
-    `keep`, `log` and `finish` are for one thread.
+    `keep`, `log`, `finish` and `leave` are for one thread.
     """
 
     def __init__(
@@ -94,7 +94,10 @@ class CaptureWriter:
         self._error: BaseException | None = None
         self._queue: deque[Item] = deque()
         self._queued_rows = self._waits = 0
+        self._is_over = False
+        """Whether nothing comes any more."""
         self._ending: Mapping[str, str] | None = None
+        """How it ended, where the file gets an end."""
         self._idle = False
         """Whether the thread waits to be told of the next row."""
         self._changed = threading.Condition()
@@ -121,11 +124,23 @@ class CaptureWriter:
     def finish(self, metadata: Mapping[str, str] | None = None) -> None:
         """Write what waits, the last frame and the summary; a second call does nothing. `metadata`: how it ended."""
         with self._changed:
-            if self._ending is None:
+            if not self._is_over:
                 self._ending = {} if metadata is None else dict(metadata)
+        self._end()
+        self._raise_error()
+
+    def leave(self) -> None:
+        """Write what waits and let go of the file without an end: whoever has its journal can go on with it.
+
+        A second call does nothing. It raises nothing, since it comes behind what is wrong.
+        """
+        self._end()
+
+    def _end(self) -> None:
+        with self._changed:
+            self._is_over = True
             self._changed.notify_all()
         self._thread.join()
-        self._raise_error()
 
     @property
     def synced_tick(self) -> int:
@@ -139,7 +154,7 @@ class CaptureWriter:
     def _put(self, item: Item) -> None:
         rows = _rows_in(item)
         with self._changed:
-            assert self._ending is None, "a row after the end"
+            assert not self._is_over, "a row after the end"
             full = self._is_full(rows)
             self._waits += full
             first = full and self._waits == 1
@@ -193,8 +208,9 @@ class CaptureWriter:
             if now_ns >= sync_at_ns and self._syncer.lags and not self._pending:
                 self._syncer.ask()
                 sync_at_ns = now_ns + SYNC_NS
-        assert self._ending is not None
-        if self.state.level < Level.OUT:
+        if self._ending is None:
+            self._flush()
+        elif self.state.level < Level.OUT:
             self._finish(self._ending)
 
     def _flush(self) -> None:
@@ -251,14 +267,14 @@ class CaptureWriter:
         Also return whether nothing comes after it.
         """
         with self._changed:
-            while not self._queue and self._ending is None:
+            while not self._queue and not self._is_over:
                 self._idle = True
                 if until_ns is None:
                     self._changed.wait()
                 elif not self._changed.wait(max(0, until_ns - time.monotonic_ns()) * 1e-9):
                     break
             self._idle = False
-            gather = self._ending is None and 0 < self._queued_rows < BATCH_ROWS
+            gather = not self._is_over and 0 < self._queued_rows < BATCH_ROWS
         if gather:
             time.sleep(GATHER_S)
         items: list[Item] = []
@@ -269,7 +285,7 @@ class CaptureWriter:
                 rows += _rows_in(items[-1])
             self._queued_rows -= rows
             self._changed.notify_all()
-            return items, self._ending is not None and not self._queue
+            return items, self._is_over and not self._queue
 
     def _write_item(self, item: Item) -> None:
         if isinstance(item, Closing) and self._file.begins_next(item):

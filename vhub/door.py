@@ -163,8 +163,7 @@ class Door:
         session = core.sessions.by_name.get(name)
         if session is None or core.state is None or core.deployment is None or core.ended is not None:
             return
-        known = self._known(name)
-        if known is not None and known.period > 0:
+        if self._is_waited_for(name):
             session.away_ns = now_ns + core.deployment.deadlines.client_back_ns
             return
         self._leave(name)
@@ -176,12 +175,16 @@ class Door:
             return
         for name in core.sessions.late(now_ns):
             session = core.sessions.by_name[name]
-            known = self._known(name)
-            if known is not None and known.period > 0:
+            if self._is_waited_for(name):
                 session.away_ns = -1  # its session stays: a tick may be waiting for it
                 core.lose(name, "its connection closed" if session.boot else "it did not come back to the vHub")
             else:
                 self._leave(name)
+
+    def _is_waited_for(self, name: str) -> bool:
+        """Whether the run waits for a client: it is in lockstep, or a tick still waits for its Done."""
+        known = self._known(name)
+        return self._core.waits_for(name) or (known is not None and known.period > 0)
 
     def _leave(self, name: str) -> None:
         core = self._core

@@ -11,7 +11,7 @@ import logging
 import sys
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -121,13 +121,21 @@ class HubProcess:
         self._wire.watch_alive(SUPERVISOR)
 
     def run(self) -> int:
-        """Take part until the end, close the capture, say farewell; return the exit code."""
+        """Take part until the end, close the capture, say farewell; return the exit code.
+
+        Whatever else ends it leaves the capture without an end, and the journal.
+        """
         sys.setswitchinterval(SWITCH_S)
         try:
             self._loop.run(self._is_over)
             self._loop.perform()
-        finally:
+        except BaseException:
+            self._leave()
+            raise
+        if self.core.finished:
             self._close()
+        else:
+            self._leave()
         if self.core.member.refusal:
             return REFUSED
         if self.core.failure:
@@ -300,10 +308,9 @@ class HubProcess:
 
     def _close(self) -> None:
         """Finish the capture; only then is the journal done with."""
+        assert self.core.ended is not None
         if self._capture is not None:
-            end = self.core.ended
-            reason = "not ended in order" if end is None else end.reason
-            self._capture.finish({"reason": reason, "ended": wall.now_text()})
+            self._capture.finish({"reason": self.core.ended.reason, "ended": wall.now_text()})
             self.core.capture = str(first_there(Path(self.core.capture)))
         if self._room is not None:
             self.core.recording = self._room.recording
@@ -313,8 +320,17 @@ class HubProcess:
             except JournalError as error:
                 self._log.error(str(error))
                 return
-            if self.core.finished and self.core.ended is not None and not self.core.ended.failed:
+            if not self.core.ended.failed:
                 remove_journal(self._journal.folder, VHUB)
+
+    def _leave(self) -> None:
+        """The run has not ended: leave capture and journal as a kill would, for a vHub that goes on with them."""
+        if self._capture is not None:
+            self._capture.leave()
+            self._log.warning("leaves its capture %s without an end: the run can go on with it", self._capture.path)
+        if self._journal is not None:
+            with suppress(JournalError):
+                self._journal.close()
 
 
 def run_vhub(connect: str, listen: str, insecure: bool, options: HubOptions, pki: Path | None = None) -> int:
@@ -377,7 +393,7 @@ def vhub(  # noqa: PLR0913, PLR0917  # a command's options
     capture.
 
     It exits with 0 when the run ended and the capture is finished, with 1 when the supervisor was lost for longer than
-    the deployment's `deadlines.orphan`, and with 3 when the supervisor would not have it.
+    the deployment's `deadlines.orphan`, or something else ended it, and with 3 when the supervisor would not have it.
     """
     die_with_parent()
     if no_capture and capture is not None:

@@ -7,7 +7,7 @@ capture is. Neighbours: `records` (the fold), `core` goes on from here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from foosim.protocol import limits
@@ -22,7 +22,7 @@ from foosim.vhub.commits import Committed
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.naming import in_branch
 from foosim.vhub.packet import received
-from foosim.vhub.records import Fold, Folded, HeadRecord, HubRecord, InputsRecord, TickRecord
+from foosim.vhub.records import Closing, Fold, Folded, HeadRecord, HubRecord, InputsRecord, TickRecord
 from foosim.vhub.state import HubState
 
 
@@ -87,18 +87,18 @@ def recall(
     _remember(past, *_deliveries_of(fold.state))
     if captured is not None and captured.tick == fold.state.closed:
         past.known = _frame(fold)
+    closings: dict[int, Closing] = {}
     for folded in fold:
         _remember(past, folded.record.tick + 1, folded.record.deliveries)
         _number(past, folded)
         if captured is not None and folded.record.tick > captured.tick:
-            past.kept.append(Keep(folded.closing))
+            closings[folded.record.tick] = folded.closing
         elif captured is not None and folded.record.tick == captured.tick:
             past.known = folded.closing.frame
     if captured is not None:
         if captured.tick > fold.state.closed:
             raise Malformed(f"the capture has tick {captured.tick}, its journal ends at {fold.state.closed}")
-        untold = [record for record in found if isinstance(record, Epoch) and record.epoch > captured.epoch]
-        past.kept[:0] = [KeepEpoch(epoch) for epoch in untold]
+        past.kept = list(_untold(found, closings, captured.epoch))
     past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
     _name_branch(past)
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
@@ -106,6 +106,15 @@ def recall(
     if frame is not None:
         past.committed = fold.commit, decode(Commit, fold.commit), frame
     return past
+
+
+def _untold(found: Iterable[object], closings: Mapping[int, Closing], epoch: int) -> Iterator[Keep | KeepEpoch]:
+    """Yield closings by tick, and the epochs behind one, in the order of the journal: one holds from its tick on."""
+    for record in found:
+        if isinstance(record, Epoch) and record.epoch > epoch:
+            yield KeepEpoch(record)
+        elif isinstance(record, TickRecord) and record.tick in closings:
+            yield Keep(closings[record.tick])
 
 
 def _name_branch(past: Past) -> None:

@@ -16,7 +16,9 @@ from foosim.protocol.disk import Level
 from foosim.protocol.journal import Journal
 from foosim.vhub import capture_file, capture_left, capture_writer
 from foosim.vhub.capture_cut import cut_capture
+from foosim.vhub.capture_file import CaptureFile, Described
 from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_left import Journalled
 from foosim.vhub.capture_parts import Joined, files_from
 from foosim.vhub.capture_reader import open_capture, read_about
 from foosim.vhub.capture_recovery import recover_capture
@@ -219,7 +221,7 @@ def test_a_number_that_is_none_is_refused(tmp_path: Path, hub_run: HubRun, entri
     path.write_bytes(b"".join(written))
     split = Split(path, split_by(hub_run, BY_TIME)[1].capture, 2_000_000)
     with pytest.raises(CaptureError, match=r"run\.mcap: its (part|cut_tick) is no number, '"):
-        split.take_over(0, 0)
+        split.take_over(0, 0, is_empty=True)
 
 
 def test_others_of_like_names_are_left_alone(path: Path, tmp_path: Path) -> None:
@@ -240,6 +242,21 @@ def left_behind(parts: Path, folder: Path, count: int, size: int) -> Path:
     if size >= 0:
         (folder / files[count].name).write_bytes(files[count].read_bytes()[:size])
     return folder / parts.name
+
+
+def test_the_first_file_of_a_branch_that_is_gone_on_with_ends_when_it_would_have(
+    hub_run: HubRun, tmp_path: Path
+) -> None:
+    text, deployment = split_by(hub_run, BY_TIME)
+    described = Described(deployment, NAME, text, {**METADATA, "from": "other", "from_tick": "35"})
+    file = CaptureFile(tmp_path / "run.mcap", described)
+    for closing in hub_run.closings[35:38]:
+        file.write(closing)
+    file.end_chunk()
+    file.close()
+    file = CaptureFile(tmp_path / "run.mcap", described, Journalled(35))
+    assert [closing.frame.tick for closing in hub_run.closings[38:55] if file.begins_next(closing)] == [50]
+    file.close()
 
 
 def places(parts: Path) -> Iterator[tuple[int, int]]:

@@ -21,6 +21,7 @@ from foosim.vhub.records import Closing, HeadRecord, HubRecord, InputsRecord, Ti
 from foosim.vhub.resume import Captured, recall
 from foosim.vhub.state import HubState
 from foosim.vhub.to_rows import Entry, Plan, packet_entry, plan_of, world_rows
+from tests.vhub.conftest import EPOCH_AT
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -170,6 +171,10 @@ def test_a_vhub_that_is_started_again_knows_what_the_one_before_knew(hub_run: Hu
     assert kept == ([] if captured is None else list(range(captured + 1, 64)))
     epochs = [item.epoch.epoch for item in past.kept if isinstance(item, KeepEpoch)]
     assert epochs == ([] if captured is None else [2] if captured >= 0 else [1, 2])
+    if captured is not None:
+        second = next(at for at, item in enumerate(past.kept) if isinstance(item, KeepEpoch) and item.epoch.epoch == 2)
+        before = sum(isinstance(item, Keep) for item in past.kept[:second])
+        assert before == max(0, EPOCH_AT - captured - 1), "it holds from its tick on"
     assert (past.known is not None and past.known.tick == captured) if captured is not None and captured >= 0 else True
 
 

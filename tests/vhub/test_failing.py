@@ -1,0 +1,104 @@
+"""A vHub that something ends before its run: what it leaves is gone on with by the next one, or recovered."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+import pytest
+
+from foosim.protocol import channels, limits
+from foosim.protocol.codec import decode_any, encode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Failed, Malformed
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.journal import Journal
+from foosim.protocol.messages import Build
+from foosim.protocol.session import Session
+from foosim.vhub.capture_file import CaptureFile, Described
+from foosim.vhub.capture_info import capture_info
+from foosim.vhub.capture_parts import end_of, has_end
+from foosim.vhub.capture_recovery import UNCLEAN, recover_capture
+from foosim.vhub.main import HubOptions, HubProcess
+from foosim.vhub.records import HeadRecord, HubRecord, TickRecord
+from tests.vhub.conftest import NAME
+from tests.vhub.test_capture_recovery import LAST
+
+if TYPE_CHECKING:
+    from tests.vhub.conftest import HubRun
+
+CAPTURED = 20
+
+
+@pytest.fixture
+def plane() -> Iterator[Session]:
+    """The simulation plane, for a vHub that runs amid tests: it sets how threads and garbage are dealt with."""
+    switch_s, thresholds = sys.getswitchinterval(), gc.get_threshold()
+    with Session.router("tcp/127.0.0.1:0") as session:
+        yield session
+    sys.setswitchinterval(switch_s)
+    gc.set_threshold(*thresholds)
+    gc.unfreeze()
+
+
+def leave(folder: Path, run: HubRun, without: int = -1) -> Path:
+    """Leave what a vHub that was killed does: a capture of some ticks, a journal of all, but perhaps one."""
+    path = folder / "run.mcap"
+    file = CaptureFile(path, Described(run.deployment, NAME, run.text, {"run": "run-1"}))
+    for closing in run.closings[:CAPTURED]:
+        file.write(closing)
+    file.end_chunk()
+    file.close()
+    with Journal(folder / "journals", "vhub") as journal:
+        head = decode_any(HeadRecord, run.journal[0])
+        journal.append(encode(msgspec.structs.replace(head, capture=str(path))))
+        for raw in run.journal[1:]:
+            record = decode_any(HubRecord, raw)
+            if not isinstance(record, TickRecord) or record.tick != without:
+                journal.append(raw)
+    return path
+
+
+def live(plane: Session, run: HubRun, folder: Path) -> None:
+    """Be a vHub that is started again, and whose port is in use."""
+
+    def is_busy(deployment: Deployment) -> Session:
+        raise Failed("its port is in use")
+
+    inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+    hub = HubProcess(plane, is_busy, inbox, HubOptions(folder=folder))
+    build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, run.text, "fast", [])
+    hub.core.receive(channels.BUILD, "vhub", encode(build), time.monotonic_ns())
+    inbox.wake()
+    hub.run()
+
+
+def test_a_vhub_that_cannot_listen_leaves_a_capture_that_the_next_one_goes_on_with(
+    hub_run: HubRun, plane: Session, tmp_path: Path
+) -> None:
+    path = leave(tmp_path, hub_run)
+    for _ in range(2):
+        with pytest.raises(Failed, match="its port is in use"):
+            live(plane, hub_run, tmp_path)
+        assert end_of(path) is None
+    found = recover_capture(path, tmp_path / "journals")
+    assert found is not None and (found.tick, found.problem) == (LAST, "")
+    assert has_end(path) and capture_info(path).end["reason"] == UNCLEAN
+
+
+def test_a_vhub_whose_journal_contradicts_itself_leaves_its_capture_as_it_was(
+    hub_run: HubRun, plane: Session, tmp_path: Path
+) -> None:
+    path = leave(tmp_path, hub_run, without=40)
+    size = path.stat().st_size
+    with pytest.raises(Malformed, match="does not follow on tick"):
+        live(plane, hub_run, tmp_path)
+    assert path.stat().st_size == size
+    found = recover_capture(path, tmp_path / "journals")
+    assert found is not None and "does not follow on tick" in found.problem
+    assert found.tick == 39, "what is before the gap is used"
