@@ -28,6 +28,7 @@ from foosim.vhub.stages.capacity import EVICTED
 from foosim.vhub.stages.own import MODEL, MODEL_FAILED
 from foosim.vhub.stages.residual import Residual
 from foosim.vhub.state import OUTBOX_SHIFT
+from foosim.vhub.transit import TRANSIT_FULL
 
 NAMES_SHOWN: Final = 8
 
@@ -93,6 +94,7 @@ _AT_SENDING: Final = {
     **dict.fromkeys(("random_loss", "burst_loss"), "residual"),
     **dict.fromkeys((MODEL, MODEL_FAILED), "model"),
     **dict.fromkeys(("crc_fail",), "mangle"),
+    **dict.fromkeys((TRANSIT_FULL,), "receiver"),
 }
 _AT_ARRIVAL: Final = {
     **dict.fromkeys(("partition", "expired"), "policy"),
@@ -409,6 +411,8 @@ class _Story:
 
     def _receiver(self) -> tuple[str, dict[str, Any]]:
         row = self.row
+        if row.cause == TRANSIT_FULL:
+            return "what is on its way in the whole run leaves no room for it", {"due_ns": row.due_ns}
         facts = {"due_ns": row.due_ns, "arrival_tick": row.arrival_tick, "wall_released_ns": row.wall_released_ns}
         released = f", left for it at {row.wall_released_ns} ns of the vHub's clock" if row.wall_released_ns else ""
         taken = {"rx_down": ", down or gone", "rx_full": ", full"}.get(row.cause, "")
