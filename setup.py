@@ -41,7 +41,7 @@ COMPILED: Final = {
     ),
     "vhub": (
         *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "numbers", "packet"),
-        *("propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "world"),
+        *("propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit", "world"),
     ),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss", "shadowing"),

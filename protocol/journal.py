@@ -199,7 +199,10 @@ class Journal:
         """Write one record; when this returns, a killed process does not lose it."""
         if self._error is not None:
             raise self._error
-        assert len(record) <= limits.JOURNAL_BYTES_MAX, "a record larger than a journal file may be"
+        if len(record) > limits.JOURNAL_BYTES_MAX:
+            most = f"a file of it has {limits.JOURNAL_BYTES_MAX} at most"
+            self._error = JournalError(f"{self.path}: cannot be written, a record has {len(record)} bytes, {most}")
+            raise self._error
         framing = _FRAMING.pack(len(record), _checksum(record))
         self._write(framing + record if self._size else SIGNATURE + framing + record)
         self._records += 1

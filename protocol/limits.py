@@ -58,6 +58,10 @@ ROBOTS_BYTES_PER_TICK_MAX: Final = 3 * 1024 * 1024
 """What reaches robots at one tick, which is one message; what is beyond it is dropped."""
 CLIENT_BYTES_PER_TICK_MAX: Final = 768 * 1024
 """The same of one client."""
+TRANSIT_BYTES_MAX: Final = 48 * 1024 * 1024
+"""What is on its way in the whole run, which a record of the vHub's journal holds; what is beyond it is dropped."""
+FLIGHT_HEAD_BYTES: Final = 200
+"""What a packet on its way counts beside its payload."""
 RECOVERIES_PER_COMMIT_MAX: Final = 1_024
 """How many losses and returns a commit tells of; what is beyond it is told by the next one."""
 HELD_MESSAGES_MAX: Final = 1024

@@ -302,7 +302,8 @@ class CaptureFile:
 
     def disk_error(self, error: OSError) -> CaptureError:
         """Return what to tell people of a disk that refuses."""
-        return CaptureError(f"{self.path}: cannot be written, {error.strerror}")
+        path = self.path if self._split is None else self._split.path
+        return CaptureError(f"{path}: cannot be written, {error.strerror}")
 
     # --- a new file --------------------------------------------------------------------------------------------------
 

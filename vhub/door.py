@@ -62,7 +62,9 @@ class Door:
         if not core.state.hears_clients:
             return [], []
         joins = core.sessions.take_joins(tick)
-        leaves, self._leaves = self._leaves, []
+        members = core.state.members
+        leaves = [name for name in dict.fromkeys(self._leaves) if name in members and members[name].active]
+        self._leaves = []
         if joins or leaves:
             core.actions.append(Journal(encode(InputsRecord(tick, joins, leaves))))
         return joins, leaves

@@ -33,6 +33,7 @@ from foosim.vhub.stages.own import MODEL, MODEL_FAILED
 from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
 from foosim.vhub.stages.residual import Residual
+from foosim.vhub.transit import TRANSIT_FULL
 
 Told = tuple[str, dict[str, Any]]
 """What a stage found, as a text and as facts."""
@@ -50,6 +51,7 @@ _AT_SENDING: Final = {
     **dict.fromkeys(("random_loss", "burst_loss"), "residual"),
     **dict.fromkeys((MODEL, MODEL_FAILED), "model"),
     **dict.fromkeys(("crc_fail",), "mangle"),
+    **dict.fromkeys((TRANSIT_FULL,), "receiver"),
 }
 _AT_ARRIVAL: Final = {
     **dict.fromkeys(("partition", "expired"), "policy"),
@@ -374,6 +376,8 @@ class Stages:
 
     def _receiver(self) -> Told:
         row, decided = self.row, self.row.decided_by
+        if row.cause == TRANSIT_FULL:
+            return "what is on its way in the whole run leaves no room for it", {"due_ns": row.due_ns}
         facts: dict[str, Any] = {"due_ns": row.due_ns, "arrival_tick": row.arrival_tick}
         facts["wall_released_ns"] = row.wall_released_ns
         released = f", left for it at {row.wall_released_ns} ns of the vHub's clock" if row.wall_released_ns else ""

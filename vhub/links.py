@@ -146,6 +146,12 @@ class Link:
             self.state.dropped += 1
             self.state.causes[cause] = self.state.causes.get(cause, 0) + 1
 
+    def turn_away(self, flight: Flight, cause: str) -> None:
+        """Drop a packet that would be on its way: there is no room for it."""
+        self._drop(flight, cause)
+        if self.state.under_way:
+            leave(self.state, flight)
+
     def arrive(self, flight: Flight, hindered: str) -> bool:
         """Judge a packet at arrival, by the settings of when it was sent: whatever was sent on the link meanwhile.
 

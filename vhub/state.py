@@ -27,6 +27,7 @@ from foosim.vhub.packet import Flight, Packets, content_of, flight_of, order_of,
 from foosim.vhub.room import Room
 from foosim.vhub.sendings import Sendings
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
+from foosim.vhub.transit import TRANSIT_FULL, Transit
 
 OUTBOX_SHIFT = 16
 """A robot's sequence number is tick x 2^16 + index."""
@@ -96,6 +97,7 @@ class HubState:
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
+        self._transit = Transit(len(self._endpoints))
         self._receivers: dict[tuple[str, str], tuple[str, ...]] | None = None
         """Who hears each (endpoint, channel), in name order; None when it is to be found anew."""
 
@@ -309,7 +311,12 @@ class HubState:
         for flight in flights:
             is_offered = flight.copy == 0
             self.packets.offered += is_offered
-            if not self.fabric.link(flight.source, flight.destination, flight.channel).send(flight):
+            link = self.fabric.link(flight.source, flight.destination, flight.channel)
+            is_under_way = link.send(flight)
+            if is_under_way and not self._transit.takes(flight):
+                is_under_way = False
+                link.turn_away(flight, TRANSIT_FULL)
+            if not is_under_way:
                 self.packets.dropped += is_offered
                 fates.append(flight)
                 continue
@@ -364,6 +371,7 @@ class HubState:
 
     def _arrive(self, flight: Flight, hindered: str) -> bool:
         """Judge a packet at arrival, and count it: copies are in no account."""
+        self._transit.arrived(flight)
         link = self.fabric.link(flight.source, flight.destination, flight.channel)
         is_delivered = link.arrive(flight, hindered)
         if flight.copy == 0:
@@ -469,6 +477,7 @@ class HubState:
             if (flight.source, flight.destination) not in ends:
                 raise Malformed(f"a packet in flight from {flight.source} to {flight.destination} without a link")
             state.fabric.restore_flight(flight)
+            state._transit.restored(flight)
             state._flights.setdefault(flight.arrival_tick, []).append(flight)
         return state
 

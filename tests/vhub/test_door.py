@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from foosim.vhub.keeping import Keep
 from tests.vhub.test_sessions import MS, Hub
 
 
@@ -24,3 +25,24 @@ def test_whoever_has_the_name_of_a_client_that_a_tick_waits_for_is_waited_for(an
     hub.core.wake(2_000 * MS)
     assert hub.core.lost == ("" if answers else "hand: its connection closed")
     assert hub.state.closed == (0 if answers else -1)
+
+
+def test_a_client_leaves_once_however_often_it_comes_and_goes() -> None:
+    hub = Hub().begin()
+    hub.enter("ear")
+    hub.close(0)
+    for boot in ("two", "three"):
+        hub.core.client_gone("ear", 0)
+        hub.enter("ear", boot=boot)
+    hub.core.client_gone("ear", 0)
+    for tick in range(1, 5):
+        hub.close(tick)
+    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, Keep)]
+    assert [leaves for leaves in left if leaves] == [["ear"]]
+    for tick in range(5, 15):
+        if hub.state.hears_clients:
+            hub.enter("ear", boot=f"at {tick}")
+            hub.core.client_gone("ear", 0)
+        hub.close(tick)
+    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, Keep)]
+    assert [leaves for leaves in left if leaves] == [["ear"]], "who has left cannot leave"
