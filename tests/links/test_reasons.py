@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -51,8 +52,11 @@ NETWORK: Final = """network={
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory: pytest.TempPathFactory) -> CaptureData:
     """A run in which packets are lost by nearly every cause."""
-    path = tmp_path_factory.mktemp("reasons") / "run.mcap"
-    text = apply_sets(TABLE.read_text(), "t.yaml", [NETWORK])
+    return captured(NETWORK, tmp_path_factory.mktemp("reasons") / "run.mcap")
+
+
+def captured(network: str, path: Path) -> CaptureData:
+    text = apply_sets(TABLE.read_text(), "t.yaml", [network])
     rehearse(text, "t.yaml", 260, 1, ["engine=pure"], Settings(), capture=path)
     return open_capture(path)
 
@@ -91,7 +95,6 @@ STAGES: Final[dict[tuple[str, str, str], str]] = {
     ("out", "burst_loss", ""): "residual",
     ("zigbee", "collision", "contention"): "medium",
     ("zigbee", "collision", "half_duplex"): "channel",
-    ("zigbee", "collision", "interference"): "channel",
 }
 
 
@@ -122,7 +125,6 @@ DECIDED: Final[dict[tuple[str, str, str], Callable[[dict[str, Any]], bool]]] = {
     ("near", "out_of_range", ""): lambda f: f["distance_m"] > f["range_m"] == 1.0,
     ("out", "burst_loss", ""): lambda f: f == {"outage": True},
     ("zigbee", "collision", "half_duplex"): lambda f: f["half_duplex"] and f["interference_dbm"] is None,
-    ("zigbee", "collision", "interference"): lambda f: f["error_draw"] < f["error_rate"] and f["sinr_db"] < f["snr_db"],
     ("zigbee", "collision", "contention"): lambda f: f["attempts"] in (["collision"], ["the channel was never free"]),
 }
 
@@ -131,6 +133,15 @@ DECIDED: Final[dict[tuple[str, str, str], Callable[[dict[str, Any]], bool]]] = {
 def test_the_numbers_that_decided_are_told(capture: CaptureData, lost: Lost, key: tuple[str, str, str]) -> None:
     for facts in facts_of(capture, lost[key]):
         assert DECIDED[key](facts), facts
+
+
+def test_interference_of_stations_that_do_not_hear_one_another_is_told(tmp_path: Path) -> None:
+    capture = captured(NETWORK.replace("tx_power: -40 dBm", "tx_power: -56 dBm"), tmp_path / "run.mcap")
+    rows = [row for row in capture.rows(PACKETS) if isinstance(row, PacketRow)]
+    spoiled = [row for row in rows if (row.rule, row.decided_by.collision) == ("zigbee", "interference")]
+    assert {steps(capture, row)["channel"].outcome for row in spoiled} == {"dropped"}
+    for facts in facts_of(capture, spoiled):
+        assert facts["error_draw"] < facts["error_rate"] and facts["sinr_db"] < facts["snr_db"]
 
 
 def test_interference_of_lora_is_told_by_spreading_factor(capture: CaptureData, lost: Lost) -> None:

@@ -156,8 +156,8 @@ class OnAir(Stage):
         access, air_ns = self.access(flight, broadcast, UNIT if cause else None)
         delay_ns, outcome = access.delay_ns, access.outcome
         end_ns, until_ns = start_ns + delay_ns, start_ns + access.occupancy_ns
-        flight.air_start_ns, flight.air_end_ns = end_ns - air_ns, end_ns
-        flight.airtime_ns = airtime_ns = air_ns if air_ns < delay_ns else delay_ns
+        flight.airtime_ns = airtime_ns = air_ns if air_ns < delay_ns else delay_ns  # never on air before its turn
+        flight.air_start_ns, flight.air_end_ns = end_ns - airtime_ns, end_ns
         flight.access_ns = end_ns - ready_ns - airtime_ns
         flight.retries = access.retries
         if outcome == "ok":
@@ -170,7 +170,7 @@ class OnAir(Stage):
         if self._is_limited:
             sender.tokens_ns = max(0, sender.tokens_ns - access.airtime_ns)
         of = self._budget.propagation
-        what = source, flight.sequence, flight.copy, end_ns - air_ns, end_ns, until_ns
+        what = source, flight.sequence, flight.copy, end_ns - airtime_ns, end_ns, until_ns
         air.register(Transmission(*what, of.place(source).at, of.power_cdbm, self._factor))
 
     # --- what media differ in ----------------------------------------------------------------------------------------
@@ -301,8 +301,7 @@ class LrWpan(OnAir):
             threshold = errors.per_threshold(LRWPAN_MODE, flight.snr_cdb, size + LRWPAN_OVERHEAD_BYTES)
             flight.error_threshold = threshold
         words = self._words(flight, broadcast)
-        access = csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing)
-        return access, min(airtime_ns, access.delay_ns)  # not before its turn; never where it found no free channel
+        return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
 
 
 class LoRa(OnAir):
