@@ -43,8 +43,10 @@ minutes: environment
 machines: environment
 	@$(PYTEST) -m campaign tests/wire/test_machines.py tests/wire/test_ssh.py $(ARGS)
 
-swarm: environment
-	@.venv/bin/foosim-rehearse deploy/table.yaml --swarm --seeds $(SEEDS) $(ARGS)
+# Compiling takes as long as some hundred seeds: it pays for more.
+MANY := $(shell [ $(SEEDS) -ge 1000 ] && echo many)
+swarm: $(if $(MANY),compiled,environment)
+	@.venv$(if $(MANY),-compiled)/bin/foosim-rehearse deploy/table.yaml --swarm --seeds $(SEEDS) $(ARGS)
 
 faults: environment
 	@$(PYTHON) -m bench.faults --count $(or $(N),20) $(ARGS)

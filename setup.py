@@ -2,8 +2,8 @@
 
 The source stays in the wheel beside them and is what runs where they were not compiled: the same bits, more slowly.
 What is compiled is `COMPILED`. FOOSIM_COMPILE says what is wanted: `auto` (the default: whoever has no C compiler gets
-the source alone), `always` (fail without one) or `never`. An editable install is never compiled, so that what is edited
-is what runs. All else about the package is in pyproject.toml.
+the source alone), `always` (fail without one), `quick` (as that, not optimised: for tests) or `never`. An editable
+install is never compiled, so that what is edited is what runs. All else about the package is in pyproject.toml.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ COMPILED: Final = {
 PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
 TYPED: Final = Path("build", "typed")
 """Where the folders stand under the name that they are imported by, for mypyc."""
-CHOICES: Final = ("auto", "always", "never")
+CHOICES: Final = ("auto", "always", "quick", "never")
 MYPY: Final = (
     "--config-file=",
     "--explicit-package-bases",
@@ -65,7 +65,7 @@ MYPY: Final = (
     "--ignore-missing-imports",
 )
 EXACT: Final = (
-    *("-O3", "-g0", "-ffp-contract=off"),
+    *("-g0", "-ffp-contract=off"),
     *(f"-fno-builtin-{name}" for name in ("exp", "log", "sin", "cos", "tan", "pow", "fmod")),
 )
 """One rounding for each operation, and no function of the mathematical library worked out by the compiler."""
@@ -79,7 +79,7 @@ class CompileOrLeave(build_ext):
         try:
             super().run()
         except (BaseError, CCompilerError) as error:
-            if choice() == "always":
+            if choice() != "auto":
                 raise
             why = str(error)[:200]
             print(f"foosim gets no compiled modules, so it is slower; a C compiler is missing or fails: {why}")
@@ -107,7 +107,8 @@ def extensions() -> list[Extension]:
         shutil.copytree(package, TYPED / "foosim" / package, ignore=shutil.ignore_patterns("__pycache__"))
     os.environ["MYPYPATH"] = str(TYPED)
     files = [str(TYPED / "foosim" / folder / f"{name}.py") for folder, names in COMPILED.items() for name in names]
-    made = mypycify([*MYPY, *files], multi_file=True, target_dir="build/c", group_name="foosim")
+    level = "0" if choice() == "quick" else "3"
+    made = mypycify([*MYPY, *files], opt_level=level, multi_file=True, target_dir="build/c", group_name="foosim")
     for extension in made:
         extension.extra_compile_args = [*extension.extra_compile_args, *EXACT]
     return made

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from mypy_extensions import mypyc_attr
+
 from foosim.client.beacons import FLEET, TELEMETRY, Entry, Telemetry, decode_telemetry, encode_fleet
 from foosim.client.packets import Outgoing
 from foosim.client.player import Samples, Turn
@@ -21,6 +23,7 @@ ENTRIES_MAX: Final = 30
 """210 bytes, which the smallest packets of the usual radios hold; the newest are told."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Dispatch:
     """The player. Its one parameter is `cell_m`, the patrols' own: both number the spots of the same roadmap."""
 

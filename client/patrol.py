@@ -14,6 +14,8 @@ from dataclasses import dataclass, fields
 from math import atan2, cos, hypot, pi, sin
 from typing import Any, Final, NamedTuple
 
+from mypy_extensions import mypyc_attr
+
 from foosim.client.beacons import (
     BEACON,
     FLEET,
@@ -110,6 +112,7 @@ class Heard(NamedTuple):
     goal: int
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Patrol:
     """The player: one rover's controller. What it remembers is of its own; all it knows of others came by radio."""
 

@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from math import atan2, sin, sqrt
 from typing import Any, Final, NamedTuple
 
+from mypy_extensions import mypyc_attr
+
 from foosim.client.errors import UnknownName
 from foosim.client.payloads import BallPosition, Command, RodPosition
 from foosim.client.player import Commands, Samples
@@ -190,6 +192,7 @@ class Striker:
         return rod.command(rod.slide_to(y), DOWN_RAD)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Team:
     """A keeper and a striker for one team. Parameters: `team`, red or blue. It commands the rods that it hears."""
 

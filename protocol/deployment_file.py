@@ -24,6 +24,7 @@ from foosim.protocol.errors import DeploymentError, describe
 from foosim.protocol.hall_start import start_findings
 from foosim.protocol.network import Network
 from foosim.protocol.network_references import check_network, check_network_alone
+from foosim.protocol.radio_references import place_findings, rule_findings
 from foosim.protocol.references import Finding, check_references, path_text
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.settings import place_sets
@@ -96,6 +97,8 @@ def load_network(text: str, name: str, sets: Sequence[str] = ()) -> Network | No
         network = Network.model_validate(data["network"])
     except ValidationError as error:
         findings += islice(schema_findings(error, ("network",)), PROBLEMS_MAX + 1)
+    if network is not None and not findings:
+        findings += islice(rule_findings(network, (), {}), PROBLEMS_MAX + 1)
     found = [*problems, *set_problems, *(_problem(tree, finding) for finding in findings)]
     if found or network is None:
         raise DeploymentError(_report(found))
@@ -107,9 +110,12 @@ def check_open_meshes(text: str, name: str, deployment: Deployment) -> None:
 
     `text` and `name` are what the deployment, which has its files, was loaded from. Raises DeploymentError.
     """
-    what = "a wall without a thickness: the mesh is not closed, so its radio needs thickness or loss"
-    found = deployment.open_meshes()
-    findings = [Finding(("scenery", thing, "radio"), what, deployment.scenery[thing].radio) for thing in found]
+    findings = []
+    for thing in deployment.open_meshes():
+        radio = deployment.scenery[thing].radio
+        material = "concrete" if radio is None or radio.is_ is None else radio.is_
+        what = f"a wall without a thickness: the mesh is not closed, write {{is: {material}, thickness: 10 cm}}"
+        findings.append(Finding(("scenery", thing, "radio"), what, material))
     refuse_findings(text, name, findings)
 
 
@@ -178,7 +184,9 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
         except ValidationError as error:
             findings += islice(schema_findings(error), PROBLEMS_MAX + 1)
         if deployment is not None and not findings:
-            findings = list(start_findings(deployment))
+            rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
+            found_later = chain(start_findings(deployment), rules, place_findings(deployment))
+            findings = list(islice(found_later, PROBLEMS_MAX + 1))
         found += [_problem(tree, finding) for finding in findings]
     if found or deployment is None:
         raise DeploymentError(_report(found))

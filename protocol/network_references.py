@@ -13,16 +13,12 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.impairments import BURST_MAX, BURSTS, PARETO_MAX
 from foosim.protocol.names import nearest_name
 from foosim.protocol.network import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_MAX, REST
-from foosim.protocol.presets import PRESETS, preset_settings
-from foosim.protocol.references import Finding, Location, View, quoted
+from foosim.protocol.radio_references import is_on_air, radio_findings
+from foosim.protocol.references import BODILESS, Finding, Location, View, quoted
 
-HT: Final = "802.11n"
-HT_BANDWIDTH: Final = "20 MHz"
 JITTER_RATIO_MAX: Final = 100
 NO_ENDPOINT: Final = "a selector that matches no endpoint"
 CHAOS_NS_MAX: Final = 3_600_000_000_000
-BODILESS: Final = "camera"
-"""The model of robots that have no body."""
 _LASTING: Final = ("partition", "clog", "chaos")
 
 
@@ -65,23 +61,7 @@ def _radios(view: View) -> Iterator[Finding]:
     for name in list(view.mapping("network", "radios"))[:RADIOS_MAX]:
         location: Location = ("network", "radios", name)
         yield from _impairments(view, location)
-        yield from _standard(view, location)
-
-
-def _standard(view: View, location: Location) -> Iterator[Finding]:
-    """802.11n is that in 20 MHz."""
-    written = view.mapping(*location)
-    if written.get("standard") != HT:
-        return
-    preset = written.get("preset", "perfect")
-    inherited = preset_settings(preset) if preset in PRESETS else {}
-    bandwidth = written.get("bandwidth", inherited.get("bandwidth", HT_BANDWIDTH))
-    try:
-        fits = units.parse(bandwidth, units.FREQUENCY) == units.parse(HT_BANDWIDTH, units.FREQUENCY)
-    except BadValue:
-        return
-    if not fits:
-        yield Finding((*location, "standard"), f"has {HT_BANDWIDTH} here, not {bandwidth}", HT)
+        yield from radio_findings(view, location)
 
 
 def _carriers(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
@@ -117,7 +97,7 @@ def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
     places = view.mapping("network", "places")
     for endpoint in endpoints:
         glob = next((glob for glob in carried if fnmatchcase(endpoint, glob)), None)
-        on_air = [radio for _, radio in view.texts("network", "robots", glob or "") if _is_on_air(view, radio)]
+        on_air = [radio for _, radio in view.texts("network", "robots", glob or "") if is_on_air(view, radio)]
         if not on_air or any(fnmatchcase(endpoint, place) for place in places):
             continue
         section = next(one for one in ("players", "clients", "robots") if endpoint in view.mapping(one))
@@ -131,13 +111,6 @@ def _placeless(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:
             endpoint,
             at="key",
         )
-
-
-def _is_on_air(view: View, radio: str) -> bool:
-    written = view.mapping("network", "radios", radio)
-    preset = written.get("preset", "perfect")
-    inherited = preset_settings(preset).get("medium") if preset in PRESETS else None
-    return written.get("medium", inherited) not in (None, "none", "wired")
 
 
 def _links(view: View, endpoints: Sequence[str]) -> Iterator[Finding]:

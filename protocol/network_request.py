@@ -20,6 +20,7 @@ from foosim.protocol.errors import Refused, describe
 from foosim.protocol.impairments import Trace
 from foosim.protocol.network import Event, Network
 from foosim.protocol.network_references import event_findings
+from foosim.protocol.radio_references import set_findings
 from foosim.protocol.references import Finding, Location, View, path_text
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.traces import file_settings
@@ -59,6 +60,7 @@ def _findings(deployment: Deployment, data: dict[str, object], at_ns: int) -> li
         event = Event.model_validate({**data, "at": f"{at_ns} ns"})
     except ValidationError as error:
         return found + [_relative(finding) for finding in schema_findings(error, _UNDER)]
+    found += set_findings(deployment.network, event, (), deployment.endpoints(), deployment.carriers())
     found += _files(deployment, event)
     if event.until_ns is not None and event.until_ns <= at_ns:
         what = f"not after the present simulated time, {units.format_ns(at_ns)}"

@@ -4,7 +4,7 @@ A radio names a preset and writes what differs: a preset is the same keys with a
 Neighbours: `impairments` (what is beside radio), `network` (who carries which), the vHub's stages.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -117,6 +117,21 @@ class RadioKeys(LinkSettings):
     speed_m_s: Annotated[float, Quantity(units.SPEED, "1 m/s", "299792458 m/s")] = default("299792458 m/s", "speed")
     """At which the signal travels."""
 
+    @property
+    def is_on_air(self) -> bool:
+        """Whether packets go by radio: where the ends are decides, and others on air."""
+        return self.medium not in ("none", "wired")
+
+
+LORA_LONGEST: Final = (222, 222, 115, 51, 51, 51)
+"""Bytes that LoRaWAN allows by spreading factor 7 to 12 in Europe; recalled, unverified."""
+
+
+def lora_longest(factor: object) -> int | None:
+    """Return the longest payload of a spreading factor, in bytes; None for what is none."""
+    is_factor = isinstance(factor, int) and 7 <= factor <= 12
+    return LORA_LONGEST[factor - 7] if isinstance(factor, int) and is_factor else None
+
 
 _PART_BY_PART = ("antenna", "path_loss", "shadowing", "queue")
 """Mappings of which a radio may write one key and keep the preset's others; the rest replace the preset's whole."""
@@ -139,5 +154,10 @@ class Radio(RadioKeys):
     @model_validator(mode="before")
     @classmethod
     def _take_preset(cls, value: Any) -> Any:
+        """Settings over those of their preset; the payloads of LoRa are as long as its spreading factor lets them."""
         name = value.get("preset", "perfect") if isinstance(value, dict) else None
-        return over(preset_settings(name), value) if isinstance(name, str) and name in PRESETS else value
+        if not isinstance(name, str) or name not in PRESETS:
+            return value
+        merged = over(preset_settings(name), value)
+        longest = lora_longest(merged.get("spreading_factor", 7)) if merged.get("medium") == "lora" else None
+        return merged if longest is None or "mtu" in value else {**merged, "mtu": f"{longest} B"}

@@ -26,6 +26,8 @@ _PLAIN_KEY = re.compile(r"[A-Za-z0-9_.-]{1,48}")
 
 WORLD_OF_MODEL: Final[Mapping[str, str]] = {"rod": "table", "camera": "table", "rover": "hall", "station": "hall"}
 """The kind of world that a model of robot is for."""
+BODILESS: Final = "camera"
+"""The model of robots that have no body."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,7 +81,8 @@ def _bounds(kind: str, context: Mapping[str, Any]) -> str | None:
         case "too_long":
             return f"more than {context['max_length']} entries"
         case "too_short":
-            return "empty"
+            least = context.get("min_length", 1)
+            return "empty" if least == 1 else f"fewer than {least} entries"
     return None
 
 

@@ -21,6 +21,7 @@ from foosim.protocol.network import EVENTS_MAX
 from foosim.supervisor.requests import ANSWERS_KEPT
 from foosim.vhub.geometry import PAIRS_KEPT, Sight
 from foosim.vhub.memory import AirState, LinkState, RadioState
+from foosim.vhub.propagation import LOSS_MAX_DB
 from foosim.vhub.radio.shadowing import CELLS_KEPT
 
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
@@ -35,6 +36,7 @@ BOUNDS: Final[Mapping[str, int]] = {
     "_Memory._older": PAIRS_KEPT,
     "Propagation._ways": limits.CLIENTS_MAX,  # a pair that talks, or hears
     "Propagation._places": limits.CLIENTS_MAX,
+    "Propagation._reaches": LOSS_MAX_DB + 1,  # of fixed length
     "_Lattice._cells": CELLS_KEPT,
     "Fabric.states": limits.CLIENTS_MAX,
     "Fabric._links": limits.CLIENTS_MAX,

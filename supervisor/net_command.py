@@ -37,6 +37,7 @@ from foosim.vhub.explain import explain_packet, parse_packet
 from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import Meaning, meaning_of, meanings, uses_alone
 from foosim.vhub.lint_text import meaning_lines
+from foosim.vhub.provenance import held
 
 app = new_app()
 
@@ -120,7 +121,7 @@ def presets(
     name: Annotated[str | None, typer.Argument(help="Which preset; by default all.", show_default=False)] = None,
     json: Json = False,
 ) -> None:
-    """Print the values of presets and where each comes from.
+    """Print the values of presets, with the numbers that their media have beside, and where each comes from.
 
     [S] read in a standard's reference code or a project's source, [M] measured in a cited paper, [C] computed from
     such, [R] recalled from a standard that was not at hand: unverified, [J] judgement.
@@ -130,7 +131,7 @@ def presets(
         raise BadValue(
             f"no such preset, there are {', '.join(PRESETS)}", name, None if nearest is None else repr(nearest)
         )
-    chosen = {one: list(provenance(one)) for one in ([name] if name is not None else PRESETS)}
+    chosen = {one: [*provenance(one), *held(one)] for one in ([name] if name is not None else PRESETS)}
     if json:
         content = {
             one: [{"key": key, "value": value, "source": source} for key, value, source in rows]

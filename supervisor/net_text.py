@@ -54,7 +54,7 @@ def _table(title: str, first: str, *columns: str) -> Table:
 
 RANGE_NOTE: Final = (
     f"ranges: 90 % of single frames of {SMALL_BYTES} B at the lowest rate, without shadowing and fading, "
-    "antennas 1.5 m up"
+    "antennas 1.5 m up and their mounts, or where the places of the first ends are"
 )
 
 

@@ -7,46 +7,9 @@ not at all, but for the ticks that `step` granted. Neighbours: `core` publishes 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Final
-
 from foosim.protocol import limits
+from foosim.protocol.lags import Lags
 from foosim.protocol.units import Pace
-
-CELL_NS: Final = 10_000
-CELL_BITS: Final = 10
-LAG_CELLS: Final = 1_000_000
-"""10 s; what is later counts as that late."""
-
-
-@dataclass(slots=True)
-class Lags:
-    """Lags of the ticks so far, in a histogram: cells of 10 us up to 10 ms, of 1/512 to 1/1024 of the lag up to 10 s.
-
-    That is bounded memory, and exact enough for people.
-    """
-
-    cells: dict[int, int] = field(default_factory=dict)
-    """How many ticks by the upper edge of their cell, in units of 10 us."""
-    count: int = 0
-    max_ns: int = 0
-
-    def add(self, lag_ns: int) -> None:
-        edge = min(lag_ns // CELL_NS, LAG_CELLS) + 1
-        width = 1 << max(0, edge.bit_length() - CELL_BITS)
-        edge = -(-edge // width) * width
-        self.cells[edge] = self.cells.get(edge, 0) + 1
-        self.count += 1
-        self.max_ns = max(self.max_ns, lag_ns)
-
-    def quantile_ms(self, share: float) -> float:
-        """Return the lag, in ms, that `share` of the ticks did not exceed (upper edge of its cell)."""
-        left = share * self.count
-        for edge in sorted(self.cells):
-            left -= self.cells[edge]
-            if left <= 0:
-                return min(edge * CELL_NS / 1e6, self.max_ns / 1e6)
-        return 0.0
 
 
 class Pacer:

@@ -19,12 +19,12 @@ from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
+from foosim.protocol.lags import Lags
 from foosim.protocol.layout import BALL, Layout, build_layout
 from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, End, Epoch
 from foosim.protocol.start import Start, first_chain, first_frame
 from foosim.supervisor.account import Account, Recovered, close_outages
 from foosim.supervisor.issued import Issued
-from foosim.supervisor.pacing import Lags
 
 
 class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_unknown_fields=True):

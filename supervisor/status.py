@@ -44,8 +44,6 @@ def result(core: SupervisorCore) -> dict[str, Any]:
     hub = core.roster.by_name.get(VHUB)
     report = {} if hub is None else hub.report
     wall_ns = core.committed_ns - core.started_ns
-    lags = core.pacer.lags
-    fast = core.pacer.is_fast
     origin = core.settings.origin
     return {
         "run": core.settings.run,
@@ -55,9 +53,8 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         "first_tick": core.first_tick,
         "tick_ns": core.deployment.tick_ns,
         "rtf": round((frame.tick - core.first_tick) * core.deployment.tick_ns / wall_ns, 3) if wall_ns > 0 else None,
-        "lag_ms": None
-        if fast
-        else {"p50": lags.quantile_ms(0.5), "p99": lags.quantile_ms(0.99), "max": lags.max_ns / 1e6},
+        "lag_ms": None if core.pacer.is_fast else core.pacer.lags.as_json(),
+        "lateness_ms": report.get("lateness_ms"),
         "digest": {"frame": frame.digest.hex(), "chain": core.chain.hex()},
         "packets": report.get("packets", NO_PACKETS),
         "recording": report.get("recording") or NOT_RECORDED,

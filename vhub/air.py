@@ -41,7 +41,10 @@ class _Heard:
         return self.of is of and self.source == flight.source and times_ns == (flight.air_start_ns, flight.air_end_ns)
 
     def overlaps(self, known: Transmission) -> bool:
-        return known.start_ns < self.end_ns and known.end_ns > self.start_ns and known.source != self.source
+        """Whether another's is on air beside it; one without a duration never is."""
+        if known.start_ns == known.end_ns or known.source == self.source:
+            return False
+        return known.start_ns < self.end_ns and known.end_ns > self.start_ns
 
 
 class Air:

@@ -43,6 +43,7 @@ from foosim.vhub.link_models import model_versions
 from foosim.vhub.mcap_file import Book, Message
 from foosim.vhub.mcap_scan import Scanned, read_messages
 from foosim.vhub.mcap_writer import McapWriter
+from foosim.vhub.model_hash import MODEL_HASH, model_hash
 from foosim.vhub.payload_hash import hashed_row, keeps_hashes
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE, ROW_TYPES, CaptureError, Row, row_schema
@@ -326,6 +327,7 @@ class CaptureFile:
         described, deployment = self._described, self._described.deployment
         channels = declare_topics(mcap)
         content = {
+            MODEL_HASH: model_hash(deployment),
             **described.metadata,
             "format": str(FORMAT),
             "world": deployment.world,

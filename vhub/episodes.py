@@ -7,10 +7,14 @@ are exponential). Neighbours: `stages.residual` loses packets in bad times.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from foosim.protocol.draws import draw_words, unit_interval
 from foosim.protocol.impairments import Burst, Outages, ParetoDwell
 from foosim.vhub.numbers import exponential_ns, power
+
+KEPT: Final = 8
+"""Times that a link has at hand: those of its bursts and outages, under settings that come and go."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +78,27 @@ class Episodes:
         return max(1, exponential_ns(self._bad_ns, word))
 
 
-def episodes_of_burst(key: bytes, burst: Burst) -> Episodes:
-    """Return the times of a burst model in seconds, bad ones as frequent as its mean loss wants."""
-    assert burst.mean_bad_ns is not None
-    share = burst.loss / burst.bad_loss
-    dwell = None if burst.dwell is None else pareto_with_mean(burst.mean_bad_ns, burst.dwell)
-    return Episodes(key, int(burst.mean_bad_ns * (1.0 - share) / share), burst.mean_bad_ns, dwell)
+class Times:
+    """The good and bad times of one link, for each settings that it has: it goes on in them where it comes back."""
 
+    def __init__(self) -> None:
+        self._known: dict[tuple[bytes, int, int, Pareto | None], Episodes] = {}
 
-def episodes_of_outages(key: bytes, outages: Outages) -> Episodes:
-    """Return the times of a link that comes and goes."""
-    return Episodes(key, outages.mean_on_ns, outages.mean_off_ns)
+    def of_burst(self, key: bytes, burst: Burst) -> Episodes:
+        """Return the times of a burst model in seconds, bad ones as frequent as its mean loss wants."""
+        assert burst.mean_bad_ns is not None
+        share = burst.loss / burst.bad_loss
+        dwell = None if burst.dwell is None else pareto_with_mean(burst.mean_bad_ns, burst.dwell)
+        return self._of(key, int(burst.mean_bad_ns * (1.0 - share) / share), burst.mean_bad_ns, dwell)
+
+    def of_outages(self, key: bytes, outages: Outages) -> Episodes:
+        """Return the times of a link that comes and goes."""
+        return self._of(key, outages.mean_on_ns, outages.mean_off_ns, None)
+
+    def _of(self, key: bytes, good_ns: int, bad_ns: int, dwell: Pareto | None) -> Episodes:
+        what = key, good_ns, bad_ns, dwell
+        found = self._known.pop(what, None) or Episodes(key, good_ns, bad_ns, dwell)
+        self._known[what] = found
+        if len(self._known) > KEPT:
+            del self._known[next(iter(self._known))]
+        return found

@@ -31,6 +31,8 @@ class Cut:
     end_ns: int
     groups: tuple[frozenset[str], ...]
     is_symmetric: bool
+    event: str = ""
+    """Whose it is: `event N` of the deployment, or `request N`, from 0 on."""
 
     def parts(self, source: str, destination: str) -> bool:
         """Whether a link is cut: its ends are in different groups, and, one way only, its source is in the first."""
@@ -104,18 +106,20 @@ class Timeline:
             if event.heal is not None:
                 heals |= dict.fromkeys(HEALED if event.heal == "all" else (event.heal,), event.at_ns)
             else:
-                self._take(event, draw_key(self._seed, "network", purpose), heals)
+                self._take(event, purpose, heals)
         for line in (self.cuts, self.holds, self.settings, self.chaos):
             line.reverse()
 
-    def _take(self, event: Event, key: bytes, heals: Mapping[str, int]) -> None:
+    def _take(self, event: Event, purpose: str, heals: Mapping[str, int]) -> None:
+        key = draw_key(self._seed, "network", purpose)
         start_ns, end_ns = event.at_ns, _end_ns(event, key)
 
         def healed(what: str) -> int:
             return min(end_ns, heals.get(what, FOREVER_NS))
 
         if event.partition is not None:
-            self.cuts.append(Cut(start_ns, healed("partitions"), self._groups(event.partition), event.symmetric))
+            groups = self._groups(event.partition)
+            self.cuts.append(Cut(start_ns, healed("partitions"), groups, event.symmetric, purpose))
         elif event.clog is not None:
             ends = self._selected(event.clog.from_), self._selected(event.clog.to)
             self.holds.append(Hold(start_ns, healed("clogs"), *ends))
@@ -127,7 +131,7 @@ class Timeline:
             self.chaos.append(chaos)
             self.settings.append(Settings(start_ns, chaos.end_ns, "", chaos_settings(key), among))
             for begin_ns, stop_ns, group, both in partitions_of_chaos(key, start_ns, chaos.end_ns, sorted(among)):
-                self.cuts.append(Cut(begin_ns, stop_ns, (group, among - group), both))
+                self.cuts.append(Cut(begin_ns, stop_ns, (group, among - group), both, purpose))
 
     def _selected(self, globs: Sequence[str]) -> frozenset[str]:
         return frozenset(name for name in self._endpoints if selects(globs, name))
@@ -150,6 +154,11 @@ class Timeline:
     def cuts_of(self, source: str, destination: str) -> list[tuple[int, int]]:
         """Return the times in which the link is cut, by start."""
         return sorted((cut.start_ns, cut.end_ns) for cut in self.cuts if cut.parts(source, destination))
+
+    def cut_at(self, source: str, destination: str, at_ns: int) -> Cut | None:
+        """Return what cuts a link at a time, the first to begin; None where nothing does."""
+        found = [cut for cut in self.cuts if cut.start_ns <= at_ns < cut.end_ns and cut.parts(source, destination)]
+        return min(found, key=lambda cut: (cut.start_ns, cut.end_ns), default=None)
 
     @property
     def has_holds(self) -> bool:

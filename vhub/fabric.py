@@ -18,6 +18,7 @@ from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
+from foosim.vhub.episodes import Times
 from foosim.vhub.events import Timeline
 from foosim.vhub.jitter import quantiles_ns
 from foosim.vhub.link_models import LinkModel, make_model
@@ -59,6 +60,8 @@ class Fabric:
         self._models: dict[str, LinkModel] = {}
         self._links: dict[tuple[str, str, str], Link] = {}
         """By source, destination and what of the channel decides."""
+        self._by_rule: dict[LinkKey, Link] = {}
+        """The same ones by the rule that matches: channels of one rule are one link."""
         self._phases: dict[str, int] = {}
         self._propagations: dict[str, Propagation] = {}
         for rule in (*self.network.links, *self.network.radios.values()):
@@ -66,8 +69,9 @@ class Fabric:
                 quantiles_ns(rule.jitter, self._table(rule))
 
     def turn_to(self, frame: Frame) -> None:
-        """Take the newest committed frame."""
-        self.world.turn_to(frame)
+        """Take the newest committed frame. Links are made anew where bodies go out of service in it, or come back."""
+        if self.world.turn_to(frame):
+            self.timeline.version += 1
 
     def take(self, tick: int, at_ns: int, text: str) -> None:
         """Take an event that was asked for, as JSON; it happens at a tick."""
@@ -90,9 +94,14 @@ class Fabric:
         kind = self.profiles.kind(channel)
         link = self._links.get((source, destination, kind))
         if link is None:
-            profile = self.profiles.find(source, destination, channel)
-            state = self.states.setdefault((source, destination, _name(profile)), LinkState())
-            link = self._links[source, destination, kind] = Link(source, destination, profile, self, state)
+            rule = self.network.rule_for(source, destination, channel)
+            key = source, destination, "" if rule is None else rule.id
+            link = self._by_rule.get(key)
+            if link is None:
+                profile = self.profiles.of_rule(rule, source, destination)
+                state = self.states.setdefault((source, destination, _name(profile)), LinkState())
+                link = self._by_rule[key] = Link(source, destination, profile, self, state)
+            self._links[source, destination, kind] = link
         return link
 
     def restore(
@@ -112,12 +121,19 @@ class Fabric:
     def restore_flight(self, flight: Flight) -> None:
         """Take up a packet in flight of such a state: it may be on air."""
         profile = self.profiles.find(flight.source, flight.destination, flight.channel)
-        settings, name = profile.settings, profile.radio or profile.rule
-        if settings.medium not in ("none", "wired"):
+        settings, name = profile.settings, profile.radio or self.network.defaults.preset
+        if settings.is_on_air:
             self._air(name, settings).restore(flight, self._propagation(name, settings))
 
     def setup(
-        self, source: str, destination: str, profile: Profile, settings: Radio, key: bytes, memory: LinkState
+        self,
+        source: str,
+        destination: str,
+        profile: Profile,
+        settings: Radio,
+        key: bytes,
+        memory: LinkState,
+        times: Times,
     ) -> LinkSetup:
         """Return what the stages of a link are made from, for some time."""
         timeline = self.timeline
@@ -125,9 +141,10 @@ class Fabric:
         sender = self.radios.get(radio)
         if sender is None:
             sender = self.radios[radio] = RadioState()
-        air, budget = None, None
-        if settings.medium not in ("none", "wired"):
-            name = profile.radio or profile.rule
+        air, budget, own = None, None, None
+        if settings.is_on_air:
+            name = profile.radio or self.network.defaults.preset
+            own = self.profiles.base(profile.radio)
             propagation = self._propagation(name, settings)
             air = self._air(name, settings)
             budget = Budget(propagation, source, destination, self.seed, settings.air or name)
@@ -139,6 +156,7 @@ class Fabric:
             key,
             draw_key(self.seed, "sending", *radio),
             memory,
+            times,
             sender,
             self.world,
             profile.rule != NO_RADIO,
@@ -151,6 +169,7 @@ class Fabric:
             self._opportunities(settings),
             self._model(settings),
             self.faults,
+            own,
         )
 
     def queue_ns(self, key: LinkKey, now_ns: int) -> int:

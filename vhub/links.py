@@ -7,11 +7,12 @@ that is walked), `fabric` (all links of a run, and what they share), `profiles` 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from foosim.protocol.draws import Slot, draw_key, draw_words
 from foosim.protocol.radios import Radio
+from foosim.vhub.episodes import Times
 from foosim.vhub.events import FOREVER_NS
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
@@ -22,10 +23,13 @@ from foosim.vhub.stages.capacity import leave
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.own import Own
 from foosim.vhub.stages.queue import Queue
-from foosim.vhub.stages.stage import Stage, arrival_hooks, sending_hooks
+from foosim.vhub.stages.stage import Stage, at_arrival, at_sending
 
 if TYPE_CHECKING:
     from foosim.vhub.fabric import Fabric
+
+Settled = tuple[int, int, int, list[Stage], list[Stage], list[Stage], int, int, bool]
+"""By version of the time line, from when, until when: stages, at sending, at arrival, draws, phase, being apart."""
 
 
 class Link:
@@ -35,16 +39,19 @@ class Link:
         self.source, self.destination = source, destination
         self.profile = profile
         self.state = state
-        self._fabric = fabric
+        self._fabric, self._timeline = fabric, fabric.timeline
         via = (profile.radio,) if profile.radio else ()
         self._key = draw_key(fabric.seed, "link", source, destination, *via)
         self._version = -1
         self._since_ns = self._until_ns = -1
         self._stages: list[Stage] = []
-        self._at_sending: list[Callable[[Flight], str]] = []
-        self._at_arrival: list[Callable[[Flight, str], str]] = []
+        self._at_sending: list[Stage] = []
+        self._at_arrival: list[Stage] = []
         self._is_apart = False
         self._slots = self._phase_ns = 0
+        self._times = Times()
+        self._other: Settled | None = None
+        """What holds in another time: packets arrive by the settings of when they were sent."""
 
     @property
     def rule(self) -> str:
@@ -53,7 +60,7 @@ class Link:
     def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
         """Return the link's settings at a time, and from when and until when they hold."""
         settings, since_ns, until_ns = self.profile.settings, -1, FOREVER_NS
-        for change in self._fabric.timeline.changes_of(self.rule, self.source, self.destination):
+        for change in self._timeline.changes_of(self.rule, self.source, self.destination):
             if change.start_ns <= time_ns < change.end_ns:
                 settings = over(settings, change.changes)
             for edge_ns in (change.start_ns, change.end_ns):
@@ -68,20 +75,32 @@ class Link:
         return self._setup(self.settings_at(time_ns)[0])
 
     def _setup(self, settings: Radio) -> LinkSetup:
-        return self._fabric.setup(self.source, self.destination, self.profile, settings, self._key, self.state)
+        source, destination, profile = self.source, self.destination, self.profile
+        return self._fabric.setup(source, destination, profile, settings, self._key, self.state, self._times)
 
     def _settle(self, time_ns: int) -> None:
         """Have the stages of a time: made anew where settings have changed, or what is known of them."""
-        if self._version == self._fabric.timeline.version and self._since_ns <= time_ns < self._until_ns:
+        version, other = self._timeline.version, self._other
+        if self._version == version and self._since_ns <= time_ns < self._until_ns:
+            return
+        self._other = self._settled()
+        if other is not None and other[0] == version and other[1] <= time_ns < other[2]:
+            self._version, self._since_ns, self._until_ns, self._stages, self._at_sending, self._at_arrival = other[:6]
+            self._slots, self._phase_ns, self._is_apart = other[6:]
             return
         settings, self._since_ns, self._until_ns = self.settings_at(time_ns)
-        self._version = self._fabric.timeline.version
+        self._version = version
         setup = self._setup(settings)
         self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
-        self._at_sending, self._at_arrival = sending_hooks(self._stages), arrival_hooks(self._stages)
+        self._at_sending, self._at_arrival = at_sending(self._stages), at_arrival(self._stages)
         self._slots = slots_of(settings, is_radio=setup.is_radio)
         self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
         self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self._stages))
+
+    def _settled(self) -> Settled:
+        times = self._version, self._since_ns, self._until_ns
+        stages = self._stages, self._at_sending, self._at_arrival
+        return *times, *stages, self._slots, self._phase_ns, self._is_apart
 
     def is_apart(self, time_ns: int) -> bool:
         """Whether what is sent at a time shares no radio, queue or air with other links, and no model of one's own."""
@@ -90,26 +109,32 @@ class Link:
 
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """Clogs have changed: give packets on their way, in the order of sending, new due times."""
+        judged = [(flight, self._is_late(flight)) for flight in flights]
         self._settle(now_ns)
         for stage in self._stages:
             if isinstance(stage, Delay):
-                stage.retime(flights, now_ns)
+                stage.retime(judged, now_ns)
+
+    def _is_late(self, flight: Flight) -> bool:
+        """Whether those behind a packet overtake it, by the settings of when it was sent."""
+        self._settle(flight.sent_ns)
+        return any(isinstance(stage, Delay) and stage.is_late(flight) for stage in self._stages)
 
     def send(self, flight: Flight) -> bool:
         """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
-        state = self.state
-        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._fabric.timeline.version:
-            self._settle(flight.sent_ns)
-        is_offered = flight.copy == 0
-        state.offered += is_offered
+        sent_ns, is_offered = flight.sent_ns, flight.copy == 0
+        if not self._since_ns <= sent_ns < self._until_ns or self._version != self._timeline.version:
+            self._settle(sent_ns)
+        if is_offered:
+            self.state.offered += 1
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
-        flight.due_ns = flight.sent_ns
+        flight.due_ns = sent_ns
         flight.phase_ns = self._phase_ns
         if self._slots:
             flight.slots = self._slots
             flight.words = draw_words(self._key, flight.sequence, flight.copy)
-        for judge in self._at_sending:
-            cause = judge(flight)
+        for stage in self._at_sending:
+            cause = stage.at_sending(flight)
             if cause:
                 self._drop(flight, cause)
                 return False
@@ -133,11 +158,11 @@ class Link:
         True when it is delivered, False when it is dropped. `hindered` is why its receiver does not take it; empty when
         it does.
         """
-        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._fabric.timeline.version:
+        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._timeline.version:
             self._settle(flight.sent_ns)
         state, is_offered = self.state, flight.copy == 0
-        for judge in self._at_arrival:
-            cause = judge(flight, hindered)
+        for stage in self._at_arrival:
+            cause = stage.at_arrival(flight, hindered)
             if cause:
                 self._drop(flight, cause)
                 break

@@ -1,12 +1,13 @@
 """What a network means, in the figures that people think in: mean loss, bursts, delay, airtime, throughput, range.
 
 Nothing here decides a fate: the same formulas as in the stages, asked for their means. Ranges are without shadowing and
-fading, antennas 1.5 m above the ground. Neighbours: `profiles` (which settings are a link's), `stages`, `radio`;
-`foosim-net lint` and the start of a run print it.
+fading, of ends 1.5 m above the ground where no place is written, and antennas mounted as they are. Neighbours:
+`profiles` (which settings are a link's), `stages`, `radio`; `foosim-net lint` and the start of a run print it.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, inf
@@ -14,7 +15,8 @@ from typing import Final
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.impairments import Burst, GilbertElliott, Impairments, Markov4, TableJitter
-from foosim.protocol.network import LinkRule, Network
+from foosim.protocol.network import Network
+from foosim.protocol.radio_references import unheeded
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.jitter import interpolate_ns, moments_ns, quantiles_ns
@@ -42,9 +44,9 @@ LARGE_BYTES: Final = 1500
 MANY: Final = 10
 """Stations of a channel that is full."""
 HEIGHT_M: Final = 1.5
+SPACING_NS: Final = 10_000_000
+"""Between packets of which it is asked whether they overtake each other."""
 HOUR_NS: Final = 3_600_000_000_000
-LORA_LONGEST: Final = (222, 222, 115, 51, 51, 51)
-"""Bytes that LoRaWAN allows by spreading factor 7 to 12 in Europe; recalled, unverified."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +59,8 @@ class Use:
     links: int | None = None
     """Directed pairs that have them; None where endpoints are not known."""
     example: tuple[str, str] | None = None
+    heights_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)
+    """Of the ends of the example above the ground, without the mount of the antennas."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +93,8 @@ class Meaning:
     """Beside queue, medium and way: the constant delay, jitter, what bad times and reordering add."""
     delay_sd_ns: int
     delay_p99_ns: int
+    reordered: float | None
+    """The share of packets that the next one overtakes, when one comes every SPACING_NS; None where none does."""
     rate_bps: int | None
     carried: tuple[Carried, ...]
     range_los_m: float | None
@@ -116,12 +122,16 @@ def uses_of(deployment: Deployment, network: Network | None = None) -> list[Use]
     network = deployment.network if network is None else network
     profiles = Profiles(deployment, network)
     found: dict[tuple[str, str], Use] = {}
-    for source, destination, rule in _pairs(network, deployment.endpoints()):
+    endpoints = deployment.endpoints()
+    pairs = ((source, destination) for source in endpoints for destination in endpoints if source != destination)
+    for source, destination, rule in ((*pair, rule) for pair in pairs for rule in network.rules_for(*pair)):
         profile = profiles.of_rule(rule, source, destination)
         key = profile.rule, profile.radio
         known = found.get(key)
         if known is None:
-            found[key] = Use(profile.rule, profile.radio, profile.settings, 1, (source, destination))
+            ends = network.place_of(source), network.place_of(destination)
+            one, other = (HEIGHT_M if place is None else place[2] for place in ends)
+            found[key] = Use(profile.rule, profile.radio, profile.settings, 1, (source, destination), (one, other))
         else:
             found[key] = replace(known, links=(known.links or 0) + 1)
     order = {rule.id: number for number, rule in enumerate(network.links)}
@@ -142,21 +152,6 @@ def uses_alone(network: Network) -> list[Use]:
     return uses or [Use(network.defaults.preset, "", preset_radio(network.defaults.preset))]
 
 
-def _pairs(network: Network, endpoints: Sequence[str]) -> Iterator[tuple[str, str, LinkRule | None]]:
-    """Yield each directed pair with each rule that packets on some channel meet there."""
-    for source in endpoints:
-        for destination in endpoints:
-            if source == destination:
-                continue
-            for rule in network.links:
-                if rule.matches(source, destination):
-                    yield source, destination, rule
-                    if rule.channels is None:
-                        break
-            else:
-                yield source, destination, None
-
-
 # --- what they mean --------------------------------------------------------------------------------------------------
 
 
@@ -174,7 +169,7 @@ def meanings(deployment: Deployment) -> list[Meaning]:
         capacity_hz = _capacity_hz(meaning)
         load_hz = offered.get((use.rule, use.radio), 0.0)
         if capacity_hz is not None and load_hz > capacity_hz:
-            which = "all together offer" if _is_air(use.settings) else "one sender offers"
+            which = "all together offer" if use.settings.is_on_air else "one sender offers"
             warnings.append(
                 f"{which} {load_hz:.0f} packets/s by what is declared; of {SMALL_BYTES} B it carries "
                 f"{capacity_hz:.3g}/s"
@@ -189,9 +184,9 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
     loss, burst_packets, burst_ns = residual_of(settings)
     mean_ns, sd_ns, p99_ns = delay_of(settings, files)
     carried = carried_of(settings, files)
-    los_m, nlos_m = ranges_of(settings)
+    los_m, nlos_m = ranges_of(settings, use.heights_m)
     duty = settings.duty_cycle
-    is_limited = _is_air(settings) and duty < 1.0 and carried
+    is_limited = settings.is_on_air and duty < 1.0 and carried
     meaning = Meaning(
         use.rule,
         use.radio,
@@ -204,6 +199,7 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
         mean_ns,
         sd_ns,
         p99_ns,
+        reordered_of(settings, files),
         rate_of(settings, files),
         carried,
         los_m,
@@ -289,14 +285,35 @@ def delay_of(settings: Impairments, files: Mapping[str, bytes]) -> tuple[int, in
     return base_ns + round(mean_ns), round(sd_ns), base_ns + p99_ns
 
 
+def reordered_of(settings: Impairments, files: Mapping[str, bytes]) -> float | None:
+    """Return the share of packets that the next one overtakes, one every SPACING_NS; None where order is kept.
+
+    That is P(J > d + J') for two draws of jitter a time d apart, where order is free; and the same with its `extra` for
+    the share that is reordered on purpose.
+    """
+    reorder, jitter = settings.reorder, settings.jitter
+    if reorder is None and (settings.order == "fifo" or jitter is None):
+        return None
+    drawn_ns = [0]
+    if jitter is not None:
+        table = read_table(files[jitter.file].decode("ascii")) if isinstance(jitter, TableJitter) else ()
+        quantiles = quantiles_ns(jitter, table)
+        drawn_ns = [interpolate_ns(quantiles, (2 * n + 1) << 54) for n in range(512)]
+
+    def overtaken(extra_ns: int) -> float:
+        later = sum(bisect_left(drawn_ns, one + extra_ns - SPACING_NS) for one in drawn_ns)
+        return later / len(drawn_ns) / len(drawn_ns)
+
+    share = 0.0 if settings.order == "fifo" else overtaken(0)
+    if reorder is not None:
+        share += reorder.probability * (overtaken(reorder.extra_ns) - share)
+    return share
+
+
 def _bad_share(burst: Burst) -> float:
     """Return the share of what passes that passes in a bad time."""
     passing = 1.0 - burst.loss
     return burst.loss / burst.bad_loss * (1.0 - burst.bad_loss) / passing if passing else 0.0
-
-
-def _is_air(settings: Radio) -> bool:
-    return settings.medium not in ("none", "wired")
 
 
 def rate_of(settings: Radio, files: Mapping[str, bytes]) -> int | None:
@@ -311,7 +328,7 @@ def rate_of(settings: Radio, files: Mapping[str, bytes]) -> int | None:
     if settings.medium == "lte":
         direction = "down" if settings.tx_power_dbm >= BASE_STATION_DBM else "up"
         return errors.lte_rate_bps(errors.SNR_MAX, int(settings.bandwidth_hz), direction)
-    if settings.trace is not None and not _is_air(settings):
+    if settings.trace is not None and not settings.is_on_air:
         times_ms = read_opportunities(files[settings.trace.file].decode("ascii"))
         return len(times_ms) * OPPORTUNITY_BYTES * 8000 // times_ms[-1]
     return settings.rate_bps
@@ -355,9 +372,14 @@ def _carried(settings: Radio, size: int, rate_bps: int) -> Carried:
     return Carried(size, airtime_ns, bits * 1_000_000_000 // airtime_ns, None)
 
 
-def ranges_of(settings: Radio) -> tuple[float | None, float | None]:
-    """Return the range with and without line of sight; None on wires, and where walls alone decide it."""
-    if not _is_air(settings):
+def ranges_of(
+    settings: Radio, ends_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)
+) -> tuple[float | None, float | None]:
+    """Return the range with and without line of sight; None on wires, and where walls alone decide it.
+
+    `ends_m` are the heights of the two ends above the ground, beside which the antennas are mounted.
+    """
+    if not settings.is_on_air:
         return None, None
     gain_db, path_loss = settings.antenna.gain_dbi, settings.path_loss
     power_dbm = settings.tx_power_dbm + 2.0 * gain_db
@@ -365,7 +387,7 @@ def ranges_of(settings: Radio) -> tuple[float | None, float | None]:
     loss_db = power_dbm - max(settings.sensitivity_dbm, _least_dbm(settings, noise_dbm))
     environment = environment_of(settings)
     hard_m = inf if path_loss.range_m is None else path_loss.range_m
-    heights = HEIGHT_M, HEIGHT_M
+    heights = ends_m[0] + settings.antenna.mount[2], ends_m[1] + settings.antenna.mount[2]
     los_m = min(hard_m, range_m(environment, loss_db, settings.frequency_hz, *heights))
     if path_loss.strict_los:
         return los_m, 0.0
@@ -408,19 +430,20 @@ def _warnings(use: Use, meaning: Meaning) -> Iterator[str]:
         yield "nothing passes: allow is off"
     if meaning.range_los_m is not None and meaning.range_los_m < 1.0:
         yield f"it does not reach 1 m ({meaning.range_los_m:.2f} m)"
-    longest = LORA_LONGEST[settings.spreading_factor - 7]
-    if settings.medium == "lora" and (settings.payload_max is None or settings.payload_max > longest):
-        yield f"mtu is above the {longest} B of LoRaWAN at spreading factor {settings.spreading_factor}"
     for low_hz, high_hz, share in LORA_DUTY_CYCLES if settings.medium == "lora" else ():
         at_hz = settings.frequency_hz
         if low_hz <= at_hz <= high_hz and settings.duty_cycle > share:
             yield f"duty_cycle is above the {100.0 * share:g} % that the EU allows at {at_hz / 1e6:g} MHz"
+    for key, value in (("rate", settings.rate_bps), ("trace", settings.trace), ("overhead", settings.overhead_bytes)):
+        what = unheeded(key, settings.medium) if value else None
+        if what is not None:
+            yield f"{key} {what}"
     if meaning.carried and settings.queue.bytes_max < meaning.carried[-1].size:
         yield f"a packet of {meaning.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
     if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and _has_queue(settings):
         yield "the queue has no effect: no rate, no medium"
     if use.rule == NO_RADIO:
-        yield "these endpoints have no radio in common: nothing passes (no_route)"
+        yield "these endpoints have no radio in common, or not that of their rule: nothing passes (no_route)"
 
 
 def _has_queue(settings: Radio) -> bool:
@@ -446,7 +469,7 @@ def _offered(deployment: Deployment, uses: Sequence[Use]) -> dict[tuple[str, str
             if robot is None or channel not in robot.sensors:
                 continue
             profile = profiles.find(source, player, channel)
-            once = _is_air(profile.settings) and profile.settings.published == "broadcast"
+            once = profile.settings.is_on_air and profile.settings.published == "broadcast"
             flow = _key(profile), queue_of(profile, source, player), "" if once else player, channel
             flows[flow] = float(robot.sensors[channel].rate_hz)
         for robot_name in spec.robots:
@@ -458,7 +481,7 @@ def _offered(deployment: Deployment, uses: Sequence[Use]) -> dict[tuple[str, str
     found: dict[tuple[str, str], float] = {}
     for use in uses:
         rates = queues.get((use.rule, use.radio), {})
-        found[use.rule, use.radio] = sum(rates.values()) if _is_air(use.settings) else max(rates.values(), default=0.0)
+        found[use.rule, use.radio] = sum(rates.values()) if use.settings.is_on_air else max(rates.values(), default=0.0)
     return found
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from foosim.vhub.figures import range_text, rate_text, time_text
-from foosim.vhub.lint import MANY, Carried, Meaning
+from foosim.vhub.lint import MANY, SPACING_NS, Carried, Meaning
 
 LINES_MAX: Final = 12
 """Lines of the effective model at the start of a run."""
@@ -52,6 +52,8 @@ def meaning_line(meaning: Meaning) -> str:
     if burst_text(meaning) != "-":
         parts.append(f"bursts of {burst_text(meaning)}")
     parts.append(f"delay {delay_text(meaning)}")
+    if meaning.reordered is not None:
+        parts.append(f"{100 * meaning.reordered:.3g} % overtaken at {1_000_000_000 // SPACING_NS} packets/s")
     if meaning.rate_bps:
         parts.append(f"at {rate_text(meaning.rate_bps)}")
     for carried in meaning.carried:

@@ -16,7 +16,7 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
     last_due_ns: int = -1
     chain: int = 0
-    """The state of its packet-wise model of bursts; 0 is good."""
+    """The state of its packet-wise model of bursts: 0 good, 1 a burst, and further ones where it has four."""
     offered: int = 0
     delivered: int = 0
     dropped: int = 0
@@ -28,8 +28,11 @@ class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """How many were dropped by each cause."""
     model: bytes = b""
     """What a link model of one's own remembers, as msgpack."""
-    under_way: list[tuple[int, int, bool]] = []
-    """(sequence, copy, whether it was evicted) of what is on its way, where the link has a capacity."""
+    under_way: list[tuple[int, int, tuple[int, ...]]] = []
+    """Where the link has a capacity: (sequence, copy, who took its place) of what is on its way.
+
+    The last is empty, or sequence and copy of another packet and how many were under way when that came.
+    """
 
 
 class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
@@ -49,6 +52,7 @@ class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     outcome: str = ""
     is_ready: bool = False
     """Whether the medium has dealt with it; the queue does before."""
+    decided_by: tuple[int, ...] = ()
 
 
 class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
@@ -60,6 +64,7 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     first_above_ns: int = 0
     drop_next_ns: int = 0
     drop_count: int = 0
+    last_count: int = 0
     is_dropping: bool = False
     """CoDel's variables, by the names of RFC 8289."""
     tokens_ns: int = -1
@@ -174,6 +179,8 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """What a link model of one's own adds to its delay."""
     outcome: str = ""
     """What the medium found out and the channel says, at sending; empty when it came through."""
+    decided_by: tuple[int, ...] = ()
+    """The numbers by which a stage dropped it that it has nowhere else; `to_rows.DECIDING` has their names."""
 
 
 class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

@@ -53,6 +53,7 @@ class Flight:
         self.is_bad = self.is_doubled = self.is_settled = False
         self.walls: tuple[str, ...] = ()
         self.by_factor: tuple[int, ...] = ()
+        self.decided_by: tuple[int, ...] = ()
         self.distance_mm = self.walls_cdb = self.path_loss_cdb = self.shadowing_cdb = self.fading_cdb = 0
         self.received_cdbm = self.snr_cdb = self.interference = self.rate_bps = self.error_threshold = 0
         self.contenders = self.retries = self.air_start_ns = self.air_end_ns = 0
@@ -82,6 +83,11 @@ def content_of(flight: Flight) -> bytes:
 def size_of(flight: Flight) -> int:
     """Return how many bytes a packet takes in a message at most."""
     return PACKET_HEAD_BYTES_MAX + len(flight.payload)
+
+
+def size_of_payload(size: int) -> int:
+    """Return how many bytes a packet with so long a payload takes in a message at most."""
+    return PACKET_HEAD_BYTES_MAX + size
 
 
 def level_cdbm(power: int) -> int:

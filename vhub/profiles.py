@@ -18,7 +18,7 @@ PERFECT: Final = "perfect"
 ON_BOARD: Final = "on_board"
 """The rule of a link between a robot and what is on it, where no rule matches: a perfect one."""
 NO_RADIO: Final = "no_radio"
-"""The rule of a link between two that have radios, none of them the same."""
+"""The rule of a link between two that have radios: none of them the same, or not the one that their rule goes via."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Profile:
     radio: str
     settings: Radio
     is_own_queue: bool = False
-    """Whether the link has a queue of its own: its rule has a rate, else the sender's radio has one."""
+    """Whether the link has a queue of its own, as a wire has whose rule has a rate; else the sender's radio has one."""
 
 
 @lru_cache(maxsize=16)
@@ -46,7 +46,7 @@ class Profiles:
         self._carriers = deployment.carriers()
         self._by_channel = any(rule.channels is not None for rule in network.links)
         modelled = any(of.model is not None for of in (*network.radios.values(), *network.links))
-        self.on_radio = modelled or any(radio.medium not in ("none", "wired") for radio in network.radios.values())
+        self.on_radio = modelled or any(radio.is_on_air for radio in (*network.radios.values(), self.base("")))
         """Whether the fate of packets may depend on where endpoints are: on air, or by a model of one's own."""
 
     def kind(self, channel: str) -> str:
@@ -64,27 +64,20 @@ class Profiles:
     def of_rule(self, rule: LinkRule | None, source: str, destination: str) -> Profile:
         """Return the profile of a pair of which it is known which rule matches."""
         network = self._network
-        via = None if rule is None else rule.via
-        is_on_board = self.body(source) == self.body(destination)
-        if via is None and not is_on_board:
-            common = self._common(source, destination)
-            if common == "" and rule is None:
-                return Profile(NO_RADIO, "", preset_radio(PERFECT))
-            via = common or None
-        if via is None and rule is None and is_on_board:
+        way = network.way(rule, source, destination, self._carriers)
+        if way is None:
+            return Profile(NO_RADIO, "", preset_radio(PERFECT))
+        if rule is None and self.body(source) == self.body(destination):
             return Profile(ON_BOARD, "", preset_radio(PERFECT))
-        base = preset_radio(network.defaults.preset) if via is None else network.radios[via]
+        base = self.base(way)
         if rule is None:
-            return Profile(via or network.defaults.preset, via or "", base)
-        return Profile(rule.id, via or "", over(base, rule), "rate_bps" in rule.model_fields_set or via is None)
+            return Profile(way or network.defaults.preset, way, base)
+        is_own_queue = not base.is_on_air and (way == "" or "rate_bps" in rule.model_fields_set)
+        return Profile(rule.id, way, over(base, rule), is_own_queue)
 
-    def _common(self, source: str, destination: str) -> str | None:
-        """Return the first radio that both carry; empty when both carry some and none is common, None else."""
-        mine = self._network.radios_of(source, self.body(source))
-        theirs = self._network.radios_of(destination, self.body(destination))
-        if not mine or not theirs:
-            return None
-        return next((radio for radio in mine if radio in theirs), "")
+    def base(self, radio: str) -> Radio:
+        """Return the settings of a radio alone; of the defaults for the empty name."""
+        return self._network.radios[radio] if radio else preset_radio(self._network.defaults.preset)
 
 
 def over(base: Radio, changes: LinkRule | Impairments) -> Radio:

@@ -1,7 +1,8 @@
 """When what is due leaves for a free-running client: in realtime at anchor + due, in fast in tick order, at once.
 
 The anchor is the least of (arrival of Commit(k) - k T) over the last second, on the hub's own clock: the best estimate
-of wall time 0 that late commits do not spoil. Neighbours: `core` says what is released, `sessions` speaks.
+of wall time 0 that late commits do not spoil. How much later than that packets leave is counted. Neighbours: `core`
+says what is released, `sessions` speaks.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import Final
 
+from foosim.protocol.lags import Lags
 from foosim.vhub.packet import Flight
 
 ANCHOR_WINDOW_NS: Final = 1_000_000_000
@@ -17,13 +19,17 @@ ANCHOR_WINDOW_NS: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Flights that leave together for one client, as its downlink `number`, at wall time `at_ns`."""
+    """Flights that leave together for one client, as its downlink `number`, at wall time `at_ns`.
+
+    Their latest was due at wall time `due_ns`; None where nothing is due by the clock.
+    """
 
     at_ns: int
     client: str
     number: int
     tick: int
     flights: list[Flight]
+    due_ns: int | None = None
 
 
 class Releases:
@@ -32,6 +38,8 @@ class Releases:
     def __init__(self, tick_ns: int) -> None:
         self.factor = 0.0
         self.paused = False
+        self.lateness = Lags()
+        """By how much later than they were due packets left; of this process, and without those of the run's end."""
         self._tick_ns = tick_ns
         self._anchors: deque[tuple[int, int]] = deque()
         self._waiting: list[Release] = []
@@ -40,7 +48,7 @@ class Releases:
         """Take a new pace: the anchor is learnt anew, and what waited by the old one leaves at once."""
         if factor != self.factor or paused != self.paused:
             self._anchors.clear()
-            self._waiting = [replace(release, at_ns=0) for release in self._waiting]
+            self._waiting = [replace(release, at_ns=0, due_ns=None) for release in self._waiting]
         self.factor = factor
         self.paused = paused
 
@@ -55,16 +63,21 @@ class Releases:
     def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
         """Take what a closed tick releases to a client: never before what it was released earlier."""
         at_ns = max([now_ns, *(release.at_ns for release in self._waiting if release.client == client)])
+        due_ns = None
         if self.factor and self._anchors:
             anchor_ns = min(anchor for _, anchor in self._anchors)
-            at_ns = max(at_ns, anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor))
-        self._waiting.append(Release(at_ns, client, number, tick, flights))
+            due_ns = anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor)
+            at_ns = max(at_ns, due_ns)
+        self._waiting.append(Release(at_ns, client, number, tick, flights, due_ns))
         self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
 
     def take(self, now_ns: int, everything: bool = False) -> list[Release]:
         """Take what is due by now, in order; at the end of the run `everything`."""
         due = [release for release in self._waiting if everything or release.at_ns <= now_ns]
         self._waiting = self._waiting[len(due) :]
+        for release in due:
+            if release.due_ns is not None and not everything:
+                self.lateness.add(max(0, now_ns - release.due_ns), len(release.flights))
         return due
 
     def first_number(self, client: str) -> int | None:

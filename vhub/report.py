@@ -66,12 +66,13 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
 
     `links` are those with the most traffic: [from, to, offered, delivered, dropped, mean delay in ns, rule, how long
     its queue is in ns, dropped by cause], and `links_in_all` how many there are. `refused` counts messages by channel
-    and sender, `refusals` packets by reason.
+    and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime, null if none did.
     """
     state, refused = core.state, core.refusals.by_sender()
     if state is None:
         return encode_json({"refused": refused})
     packets = state.packets
+    lateness = None if core.releases is None else core.releases.lateness
     return encode_json(
         {
             "packets": {
@@ -86,6 +87,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
             "links": core.links_told.lines(state, anew=is_last),
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
+            "lateness_ms": lateness.as_json() if lateness is not None and lateness.count else None,
             "capture": core.capture,
             "recording": core.recording,
             "radio_address": core.radio_address,

@@ -21,6 +21,8 @@ class Room:
         self._is_shared = is_shared
         self._left: dict[tuple[str, str], int] = {}
         """Where too much arrives: what each source has left of its share."""
+        self._shares: dict[str, int] = {}
+        """There, by receiver: the share of each source, in bytes."""
         whole = 0
         for flight in flights:
             whole += size_of(flight)
@@ -35,10 +37,11 @@ class Room:
             of_receiver[flight.source] = of_receiver.get(flight.source, 0) + size_of(flight)
         for receiver, of_receiver in wanted.items():
             if sum(of_receiver.values()) > bytes_max:
-                self._left.update({(receiver, source): bytes_max // len(of_receiver) for source in of_receiver})
+                share = self._shares[receiver] = bytes_max // len(of_receiver)
+                self._left.update({(receiver, source): share for source in of_receiver})
 
     def takes(self, flight: Flight) -> bool:
-        """Whether a flight is taken."""
+        """Whether a flight is taken; one that is not is told by what."""
         if not self._left:
             return True
         key = "" if self._is_shared else flight.destination, flight.source
@@ -47,6 +50,7 @@ class Room:
             return True
         size = size_of(flight)
         if size > left:
+            flight.decided_by = left, self._shares[key[0]]
             return False
         self._left[key] = left - size
         return True

@@ -123,6 +123,32 @@ class FrameRow(Row, frozen=True):
     outboxes: list[OutboxRow]
 
 
+class DecidedRow(Row, frozen=True, omit_defaults=True):
+    """By what a packet was dropped, where its cause has numbers of its own.
+
+    A `collision` is `contention` (the medium's), `interference`, or `half_duplex`: its receiver was on air itself.
+    `by_factor_cdbm` is LoRa's interference by spreading factor from 7 on, 0 for none, whatever the fate. With
+    `duty_cycle` there is the airtime that was left; with `queue_full` and `queue_codel` how many packets waited, and of
+    CoDel for how long waits had been above its target, and which drop in a row it is; with `evicted` who took its
+    place (else -1), and how many were under way; with `rx_full` the bytes that its source had left of its share.
+    """
+
+    collision: Literal["", "contention", "interference", "half_duplex"] = ""
+    by_factor_cdbm: list[int] = []
+    duty_left_ns: Counter = 0
+    queue_packets: Counter = 0
+    codel_above_ns: Counter = 0
+    codel_drops: Counter = 0
+    evicted_by: CounterOrNone = -1
+    evicted_by_copy: Counter = 0
+    under_way: Counter = 0
+    room_left: Counter = 0
+    room_share: Counter = 0
+
+
+NOTHING_MORE: Final = DecidedRow()
+
+
 class PacketRow(Row, frozen=True, omit_defaults=True):
     """One offered packet and its fate, with the cause of a drop and what the verdict came from.
 
@@ -176,6 +202,7 @@ class PacketRow(Row, frozen=True, omit_defaults=True):
     error_word: WordHex = ""
     contenders: Counter = 0
     retries: Counter = 0
+    decided_by: DecidedRow = NOTHING_MORE
     payload_hash: bytes = b""
 
 

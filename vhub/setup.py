@@ -11,6 +11,7 @@ from foosim.protocol.draws import draw_words
 from foosim.protocol.radios import Radio
 from foosim.vhub.air import Air
 from foosim.vhub.budget import Budget
+from foosim.vhub.episodes import Times
 from foosim.vhub.link_models import LinkModel
 from foosim.vhub.memory import LinkState, RadioState
 from foosim.vhub.packet import Flight
@@ -33,6 +34,8 @@ class LinkSetup:
     sending_key: bytes
     """Of the draws of what its sender's radio sends once for several receivers."""
     memory: LinkState
+    times: Times
+    """Its bursts and outages in seconds."""
     sender: RadioState
     """The radio, or the port of a wire, that its packets leave by."""
     world: World
@@ -53,6 +56,8 @@ class LinkSetup:
     """A link model of one's own."""
     faults: list[str] = field(default_factory=list)
     """Takes why such a model has failed: the run ends for it."""
+    own: Radio | None = None
+    """What the sender's radio says by itself, which holds for what it sends once for all; None where nothing does."""
 
     def words(self, flight: Flight, block: int) -> tuple[int, ...]:
         """Return a further block of eight draws of a packet; block 0 are those of the named slots."""
@@ -60,7 +65,12 @@ class LinkSetup:
 
     @property
     def is_radio(self) -> bool:
-        return self.settings.medium not in ("none", "wired")
+        return self.settings.is_on_air
+
+    @property
+    def shared(self) -> Radio:
+        """The settings for what is sent once for several receivers: no rule of one of them changes those."""
+        return self.settings if self.own is None else self.own
 
     @property
     def sends_once(self) -> bool:

@@ -209,7 +209,7 @@ class HubState:
         if shares:
             sendings.judge_rest()
         self.closed = tick
-        deliveries = self._arrive_at_robots(tick + 1, frame, sendings.arrived)
+        deliveries = self._arrive_at_robots(tick + 1, sendings.arrived)
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
         self.was_final = tick < self.final
         if self.was_final:
@@ -397,31 +397,30 @@ class HubState:
         arriving = self._take_arrivals(tick, to_robots=False)
         if not arriving:
             return released
-        room = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False)
+        room, world = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False), self.fabric.world
         for flight in arriving:
             member = self.members.get(flight.destination)
             if member is not None and member.active and member.release_tick(tick) != tick:
                 flight.arrival_tick = member.release_tick(tick)
                 self._flights.setdefault(flight.arrival_tick, []).append(flight)
                 continue
-            down = member is None or not member.active
+            down = member is None or not member.active or world.is_down(flight.destination)
             hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
             if self._arrive(flight, hindered):
                 released.setdefault(flight.destination, []).append(flight)
             fates.append(flight)
         return released
 
-    def _arrive_at_robots(self, tick: int, frame: Frame, fates: list[Flight]) -> list[Delivered]:
+    def _arrive_at_robots(self, tick: int, fates: list[Flight]) -> list[Delivered]:
         deliveries: list[Delivered] = []
         arriving = self._take_arrivals(tick, to_robots=True)
         if not arriving:
             return deliveries
-        room = Room(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True)
-        down = {robot.name for robot in frame.layout.robots if frame.numbers[robot.offsets["down"]] != 0.0}
+        room, world = Room(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True), self.fabric.world
         for flight in arriving:
             fates.append(flight)
             to = flight.destination
-            hindered = RECEIVER_DOWN if to in down else "" if room.takes(flight) else RECEIVER_FULL
+            hindered = RECEIVER_DOWN if world.is_down(to) else "" if room.takes(flight) else RECEIVER_FULL
             if self._arrive(flight, hindered):
                 numbers = flight.sequence, flight.copy
                 content = content_of(flight)

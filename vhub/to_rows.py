@@ -11,11 +11,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from msgspec.structs import replace
+
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import Slot
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Add, Disrupt, Edit, Epoch, Freeze, Push, Recovered, Remove
+from foosim.vhub.air import DEAF
 from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
 from foosim.vhub.records import Closing
@@ -29,6 +32,7 @@ from foosim.vhub.rows import (
     TICK,
     AddedRow,
     ClientRow,
+    DecidedRow,
     DeliveredRow,
     EditRow,
     EntityRow,
@@ -44,6 +48,11 @@ from foosim.vhub.rows import (
     SubscriptionRow,
     TickRow,
 )
+from foosim.vhub.stages.capacity import EVICTED
+from foosim.vhub.stages.duty import DUTY_CYCLE
+from foosim.vhub.stages.medium import COLLISION
+from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
+from foosim.vhub.stages.receiver import RECEIVER_FULL
 
 Entry = tuple[str, int, int, int, Row]
 """A row with its place: topic, log time and publish time (simulated ns), sequence number."""
@@ -106,6 +115,14 @@ def packet_entry(flight: Flight) -> Entry:
     return PACKETS, sent_ns, stamp_ns or sent_ns, flight.sequence & 0xFFFF_FFFF, packet_row(flight)
 
 
+DECIDING: Final[dict[str, tuple[str, ...]]] = {
+    DUTY_CYCLE: ("duty_left_ns",),
+    QUEUE_FULL: ("queue_packets",),
+    CODEL: ("queue_packets", "codel_above_ns", "codel_drops"),
+    EVICTED: ("evicted_by", "evicted_by_copy", "under_way"),
+    RECEIVER_FULL: ("room_left", "room_share"),
+}
+"""The fields of a row for what a flight was dropped by, `decided_by`, by cause."""
 _FATES: Final[dict[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
 _LOSS: Final = int(Slot.LOSS)
 _JITTER: Final = int(Slot.JITTER)
@@ -114,7 +131,8 @@ _ERROR: Final = int(Slot.ERROR)
 
 def packet_row(flight: Flight) -> PacketRow:
     """Return the row of a packet whose fate is final, or that is in flight at the end."""
-    fate = _FATES.get(flight.cause, DROPPED)
+    cause, radio = flight.cause, flight.radio
+    fate = _FATES.get(cause, DROPPED)
     on_its_way = flight.arrival_tick >= 0
     slots, words, payload = flight.slots, flight.words, flight.payload
     common = (
@@ -128,14 +146,14 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.due_ns if on_its_way else -1,
         flight.arrival_tick,
         fate,
-        flight.cause if fate is DROPPED else "",
+        cause if fate is DROPPED else "",
         flight.rule,
         words[_LOSS].to_bytes(8).hex() if slots >> _LOSS & 1 else "",
         words[_JITTER].to_bytes(8).hex() if slots >> _JITTER & 1 and on_its_way else "",
         len(payload),
         payload,
         flight.released_wall_ns,
-        flight.radio,
+        radio,
         flight.published,
         flight.queue_bytes,
         flight.queue_ns,
@@ -150,12 +168,28 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.bits_flipped,
         flight.rate_bps,
     )
-    return PacketRow(*common, *_radio_inputs(flight)) if flight.radio else PacketRow(*common)
+    if not radio:
+        row = PacketRow(*common)
+        return _with_decision(row, flight) if cause and flight.decided_by else row
+    row = PacketRow(*common, *_radio_inputs(flight))
+    return _with_decision(row, flight) if cause or flight.by_factor else row
+
+
+def _with_decision(row: PacketRow, flight: Flight) -> PacketRow:
+    """Return the row of a packet with what it was dropped by, where there is more to say than its cause."""
+    cause, by_factor = flight.cause, flight.by_factor
+    found: dict[str, Any] = dict(zip(DECIDING.get(cause, ()), flight.decided_by, strict=False))
+    if by_factor:
+        found["by_factor_cdbm"] = [level_cdbm(power) for power in by_factor]
+    if cause == COLLISION:
+        found["collision"] = _collision_of(flight)
+    return replace(row, decided_by=DecidedRow(**found)) if found else row
 
 
 def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
     """Return what the stages of a radio found, in the order of a row."""
     threshold, walls = flight.error_threshold, flight.walls
+    interference = flight.interference if flight.interference < DEAF else 0
     return (
         flight.distance_mm,
         list(walls) if walls else [],
@@ -165,12 +199,19 @@ def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
         flight.fading_cdb,
         flight.received_cdbm,
         flight.snr_cdb,
-        level_cdbm(flight.interference) if flight.interference else 0,
+        level_cdbm(interference) if interference else 0,
         threshold * 1_000_000 >> 64,
         flight.words[_ERROR].to_bytes(8).hex() if threshold else "",
         flight.contenders,
         flight.retries,
     )
+
+
+def _collision_of(flight: Flight) -> str:
+    """Return what a packet collided with: the medium says so itself, of the rest the channel does."""
+    if flight.outcome == COLLISION:
+        return "contention"
+    return "half_duplex" if flight.interference >= DEAF else "interference"
 
 
 def _tick_row(closing: Closing) -> TickRow:

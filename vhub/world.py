@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 
+import numpy as np
+
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
@@ -21,16 +23,11 @@ from foosim.vhub.geometry import Crossing, LineOfSight, Sight, Trace
 class _Robot:
     """A robot, or an endpoint that is on none, in the frames of one layout."""
 
-    __slots__ = ("antenna", "body", "down", "entity", "orientation", "position", "turns")
+    __slots__ = ("antenna", "body", "entity", "orientation", "position", "turns")
 
     def __init__(self, name: str, body: Body | None, layout: Layout | None) -> None:
         self.body = body
-        self.entity: Entity | None = None
-        self.down = -1
-        """The slot of its flag, -1 where it has none."""
-        if layout is not None and name in layout:
-            self.entity = layout[name]
-            self.down = self.entity.offsets.get("down", -1)
+        self.entity: Entity | None = layout[name] if layout is not None and name in layout else None
         self.antenna: Vector = ORIGIN if body is None else body.antenna
         self.turns = -1
         """The number of the frame of the pose."""
@@ -53,17 +50,43 @@ class World:
         self._robots: dict[str, _Robot] = {}
         """By endpoint, in the frames of a layout."""
         self._standing: dict[str, Vector] = {}
+        self._down: frozenset[str] = frozenset()
+        self._switched: Layout | None = None
+        self._named: list[str] = []
+        self._switches = np.zeros(0, np.intp)
+        """Of each robot of that layout: the slot that says whether it is out of service."""
+        self._states = b""
+        """What these slots hold in the newest frame."""
         self.turns = 0
         """Grows with every frame."""
 
-    def turn_to(self, frame: Frame) -> None:
-        """Take the newest committed frame."""
-        if frame is not self._frame:
-            if self._frame is None or frame.layout is not self._frame.layout:
-                self._bodies = None
-                self._robots.clear()
-            self._frame, self._sight, self._numbers = frame, None, None
-            self.turns += 1
+    def turn_to(self, frame: Frame) -> bool:
+        """Take the newest committed frame; return whether others are out of service in it."""
+        if frame is self._frame:
+            return False
+        if self._frame is None or frame.layout is not self._frame.layout:
+            self._bodies = None
+            self._robots.clear()
+        self._frame, self._sight, self._numbers = frame, None, None
+        self.turns += 1
+        return self._look_who_is_down(frame)
+
+    def _look_who_is_down(self, frame: Frame) -> bool:
+        """Take who is out of service; return whether that are others than before."""
+        if frame.layout is not self._switched:
+            self._switched = frame.layout
+            self._named = [robot.name for robot in frame.layout.robots]
+            self._switches = np.array([robot.offsets["down"] for robot in frame.layout.robots], np.intp)
+            self._states = b""
+        found = frame.values[self._switches]
+        states = found.tobytes()
+        if states == self._states:
+            return False
+        self._states = states
+        robots = {name for name, is_down in zip(self._named, found.tolist(), strict=True) if is_down}
+        down = frozenset((*robots, *(name for name, robot in self._carriers.items() if robot in robots)))
+        changed, self._down = down != self._down, down
+        return changed
 
     def body(self, endpoint: str) -> str:
         """Return the robot that an endpoint is or is on board of; its own name where it is on none."""
@@ -71,8 +94,7 @@ class World:
 
     def is_down(self, endpoint: str) -> bool:
         """Whether the robot that an endpoint is, or is on board of, is out of service."""
-        down = self._robot(endpoint).down
-        return down >= 0 and self._values()[down] != 0.0
+        return endpoint in self._down
 
     def antenna(self, endpoint: str, mount: Vector) -> Vector:
         """Return the place (m, world frame) of an antenna: `mount` beside its body's own one, in the body's frame."""

@@ -173,9 +173,7 @@ def _untold(planting: Planting) -> None:
 
 @register("a delivery is left out", "deliveries are what counts as delivered", 1)
 def _left_out(planting: Planting) -> None:
-    before: Any = planting.swap(
-        HubState, "_arrive_at_robots", lambda self, tick, frame, fates: before(self, tick, frame, fates)[:3]
-    )
+    before: Any = planting.swap(HubState, "_arrive_at_robots", lambda self, tick, fates: before(self, tick, fates)[:3])
 
 
 @register("Dones lose packets", "nothing that a client answered is lost", 1)

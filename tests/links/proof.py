@@ -8,15 +8,20 @@ and an alpha of 1e-6 so that a hundred runs of the whole suite do not flake once
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NoReturn
+
+import pytest
 
 from tests.links.statistics import ALPHA, Z_ALPHA
 
 FULL_ALPHA: Final = 1e-6
 FULL_Z: Final = 4.89
 """A standard normal number is beyond it, on either side, with FULL_ALPHA."""
-Row = tuple[str, str, str, str, str, int, bool]
-"""Test, what, statistic, measured, accepted, n, whether it was."""
+HOLDS: Final = "holds"
+FAILS: Final = "**fails**"
+SKIPPED: Final = "skipped"
+Row = tuple[str, str, str, str, str, int, str]
+"""Test, what, statistic, measured, accepted, n, verdict."""
 
 
 @dataclass(slots=True)
@@ -53,6 +58,11 @@ class Proof:
         accepted = f"{expected:.5g} within {within:.2g}"
         self._row(test, what, "ratio", f"{measured:.5g} ({off:+.2%})", accepted, n, abs(off) <= within)
 
+    def within(self, test: str, what: str, measured: float, expected: float, off: float, n: int) -> None:
+        """Accept a figure that is off by no more than so much."""
+        holds = abs(measured - expected) <= off
+        self._row(test, what, "figure", f"{measured:.4g}", f"{expected:.4g} within {off:.2g}", n, holds)
+
     def below(self, test: str, what: str, measured: float, limit: float, n: int) -> None:
         """Accept a figure up to a limit."""
         self._row(test, what, "figure", f"{measured:.4g}", f"at most {limit:.4g}", n, measured <= limit)
@@ -61,6 +71,11 @@ class Proof:
         """Accept nothing but this."""
         self._row(test, what, "exact", str(measured), str(expected), n, measured == expected)
 
+    def skip(self, test: str, what: str, reason: str) -> NoReturn:
+        """End a test that cannot be made here; the table says why."""
+        self.rows.append((test, what, "", f"skipped: {reason}", "", 0, SKIPPED))
+        pytest.skip(reason)
+
     def _row(self, test: str, what: str, statistic: str, measured: str, accepted: str, n: int, holds: bool) -> None:
-        self.rows.append((test, what, statistic, measured, accepted, n, holds))
+        self.rows.append((test, what, statistic, measured, accepted, n, HOLDS if holds else FAILS))
         assert holds, f"{test} {what}: {statistic} {measured}, accepted is {accepted} (n = {n}, seed {self.seed})"

@@ -25,6 +25,7 @@ from foosim.vhub.radio.timings import (
     WIFI_5,
     with_category,
 )
+from tests.links.proof import Proof
 
 # Microseconds of a frame at 5 GHz: 20 + 4 ceil((16 + 8 (L + 36) + 6) / (4 R)), worked out by hand.
 FRAMES = {
@@ -41,8 +42,9 @@ FRAMES = {
 
 
 @pytest.mark.parametrize(("rate", "size"), FRAMES)
-def test_frames_of_wifi(rate: int, size: int) -> None:
-    assert wifi_airtime_ns(f"ofdm_{rate}", size, WIFI_5) == FRAMES[rate, size] * 1000
+def test_frames_of_wifi(proof: Proof, rate: int, size: int) -> None:
+    airtime_us = wifi_airtime_ns(f"ofdm_{rate}", size, WIFI_5) / 1000
+    proof.exact("T16", f"airtime of {size} B at {rate} Mbit/s, us", airtime_us, float(FRAMES[rate, size]), 1)
     assert wifi_airtime_ns(f"ofdm_{rate}", size, WIFI_2_4) == (FRAMES[rate, size] + 6) * 1000, "signal extension"
     half = f"ofdm10_{rate / 2:g}"
     assert wifi_airtime_ns(half, size, DOT11P) == 2000 * FRAMES[rate, size], "all twice as long at 10 MHz"
@@ -95,10 +97,11 @@ def test_802154() -> None:
     assert cycle == 4_768_000 and 50 * 8e9 / cycle == pytest.approx(84e3, rel=0.005)
 
 
-def test_lora() -> None:
+def test_lora(proof: Proof) -> None:
     """20 bytes at 125 kHz, 4/5, 8 symbols of preamble, worked out by the modem designer's guide."""
-    expected = (56_576_000, 102_912_000, 185_344_000, 370_688_000, 741_376_000, 1_318_912_000)
-    assert tuple(lora_airtime_ns(factor, 20) for factor in range(7, 13)) == expected
+    expected = [56.576, 102.912, 185.344, 370.688, 741.376, 1318.912]
+    airtime_ms = [lora_airtime_ns(factor, 20) / 1e6 for factor in range(7, 13)]
+    proof.exact("T17", "time on air of 20 B, spreading factors 7 to 12, ms", airtime_ms, expected, 6)
 
 
 @given(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from math import expm1
+from typing import Any, Final
 
 import pytest
 
-from foosim.protocol.messages import Disrupt
+from foosim.protocol.messages import Disrupt, Sent
 from foosim.protocol.network import event_of
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
-from tests.links.offered import ENDS, MS, S, deployment_of, every, fabric_of, fates, rule
+from tests.links.offered import ENDS, MS, Hub, S, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
 from tests.links.statistics import ks
 
@@ -128,6 +129,76 @@ def test_changes_are_over_one_another_and_heal_at_once() -> None:
     lost = [f.sent_ns // MS for f in found if f.cause]
     assert lost == list(range(10, 30))
     assert [(f.due_ns - f.sent_ns) // MS for f in found if not f.cause] == [1] * 10 + [2] * 10 + [1] * 10
+
+
+@pytest.mark.parametrize(
+    ("chain", "is_burst"),
+    [
+        ("p13: 100 %, p31: 0 %", True),
+        ("p13: 100 %, p31: 0 %, p32: 100 %", False),
+        ("p13: 0 %, p31: 0 %, p14: 100 %", False),
+    ],
+    ids=["burst", "delivery within a burst", "single loss"],
+)
+def test_a_burst_goes_on_in_another_model_of_bursts(chain: str, is_burst: bool) -> None:
+    """Of the four states only the burst is the bad one of two, and the other way round; singles are over."""
+    to_two = events("{at: 9 ms, set: {link: tried, gilbert_elliott: {p: 0.0001 %, r: 0.0001 %}}}")
+    found = [bool(f.cause) for f in fates(fabric_of(f"markov4: {{{chain}}}", 1, to_two), every(MS, 30))]
+    assert found[9:] == [is_burst] * 21
+    to_runs = events("{at: 9 ms, set: {link: tried, burst: {loss: 0.0001 %, mean_burst: 1000000}}}")
+    assert [bool(f.cause) for f in fates(fabric_of(f"markov4: {{{chain}}}", 1, to_runs), every(MS, 30))] == found
+    to_four = events("{at: 9 ms, set: {link: tried, markov4: {p13: 0.0001 %, p31: 0.0001 %}}}")
+    two = "gilbert_elliott: {p: 99 %, r: 0.0001 %}" if is_burst else "gilbert_elliott: {p: 0.0001 %, r: 100 %}"
+    assert [bool(f.cause) for f in fates(fabric_of(two, 1, to_four), every(MS, 30))] == [is_burst] * 30
+
+
+REORDER: Final = {"set": {"link": "tried", "reorder": {"probability": "100 %", "extra": "5 ms"}}}
+CLOG: Final = {"clog": {"from": "a", "to": "b"}, "for": "46 ms"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "due_ns"),
+    [
+        ({3: REORDER, 4: CLOG}, [54 * MS, 54 * MS + 1, 54 * MS + 2, 61 * MS, 63 * MS, 65 * MS]),
+        ({3: REORDER, 4: {"heal": "settings"}, 8: CLOG}, [62 * MS + place for place in (0, 1, 2, 0, 3, 4)]),
+    ],
+    ids=["before new reordering", "behind old reordering"],
+)
+def test_a_clog_leaves_the_order_in_which_packets_were_sent(asked: dict[int, Any], due_ns: list[int]) -> None:
+    """What is overtaken by the settings of when it was sent is, and nothing else, whatever the link does by then."""
+    hub = Hub(deployment_of(rule("delay: 50 ms")))
+    for tick in range(9):
+        sent = [Sent(tick + 1, "b", "data", 0, b"x")] if tick < 6 else []
+        hub.close({"a": sent}, edits=[Disrupt(json.dumps(asked[tick]))] if tick in asked else [])
+    due = {flight.sequence: flight.due_ns for flight in hub.state.in_flight()}
+    assert [due[number] for number in range(1, 7)] == due_ns
+
+
+def test_what_is_fast_again_does_not_overtake() -> None:
+    """A perfect link that was slow for a time: what is sent then comes behind it, and at once when that is through."""
+    lines = events("{at: 10 ms, set: {link: tried, delay: 50 ms}}", "{at: 30 ms, heal: settings}")
+    times = [n // 2 * MS for n in range(200)]
+    due = [f.due_ns for f in fates(fabric_of("order: fifo", 1, lines), times)]
+    assert due[:20] == times[:20] and due[160:] == times[160:]
+    assert due[20:60] == [times[n] + 50 * MS + n % 2 for n in range(20, 60)]
+    assert due[60:160] == [79 * MS + 2 + n for n in range(100)]
+    free = [f.due_ns for f in fates(fabric_of("order: free", 1, lines), times)]
+    assert free == [at_ns + 50 * MS * (10 <= n // 2 < 30) for n, at_ns in enumerate(times)]
+
+
+def test_channels_of_one_link_keep_their_order_behind_a_clog() -> None:
+    """Whether or not a rule of others names channels, a clog that is asked for and healed lets go in order."""
+    lines = {5: {"clog": {"from": "a", "to": "b"}, "for": "90 ms"}, 20: {"heal": "clogs"}}
+    found = []
+    for others in ("", "{id: other, from: c, to: d, channels: [z]}, "):
+        hub = Hub(deployment_of(f"network.links=[{others}{{id: tried, from: a, to: b, delay: 3 ms}}]"))
+        for tick in range(30):
+            sent = [Sent(3 * tick + n, "b", channel, 0, b"x") for n, channel in enumerate("xyx", 1)]
+            edits = [Disrupt(json.dumps(lines[tick]))] if tick in lines else []
+            hub.close({"a": sent}, edits=edits)
+        due = {f.sequence: f.due_ns for f in (*hub.fates, *hub.state.in_flight())}
+        found.append([due[number] for number in range(1, 91)])
+    assert found[0] == found[1] == sorted(set(found[0]))
 
 
 def test_chaos_comes_and_goes(proof: Proof) -> None:

@@ -43,7 +43,7 @@ def missing() -> str:
 
 def test_netem_and_a_link_are_alike(proof: Proof) -> None:
     if missing():
-        pytest.skip(missing())
+        proof.skip("T27", "delay and loss, netem's and ours", missing())
     n = proof.size(2000, 20_000)
     setup = f"ip link set lo up && tc qdisc add dev lo root netem {NETEM} limit 10000"
     done = in_namespace(f"{setup} && exec {sys.executable} {PROBE} {n} {PERIOD_US}")

@@ -77,7 +77,8 @@ def test_a_wall_weakens_by_what_its_material_takes(proof: Proof, material: str, 
     expected = round(100 * slab_loss_db(material, thickness_m, FREQUENCY_HZ))
     measured = [loss_cdb(built, ends=ends) - loss_cdb(clear, ends=ends) for ends in (("a", "b"), ("b", "a"))]
     assert measured[0] == measured[1]
-    proof.exact("T21", f"a wall of {material} between two (0.01 dB)", abs(measured[0] - expected) <= 1, True, 1)
+    what = f"{100 * thickness_m:g} cm of {material} between two, dB"
+    proof.within("T21", what, measured[0] / 100, expected / 100, 0.01 + 1e-9, 2)
     fabric = Fabric(built)
     fabric.turn_to(frame_with(built, AWAY))
     flight = heard(fabric)
@@ -101,10 +102,12 @@ def test_a_body_that_moves_in_and_out(proof: Proof) -> None:
     for tick, y in enumerate([5.0, 0.1, 0.0, 0.01, 0.1, 5.0, 0.0]):
         fabric.turn_to(frame_with(deployment, (0.0, y, HIGH), tick))
         losses.append(heard(fabric, sequence=tick + 1).path_loss_cdb)
-    inside = [loss > losses[0] for loss in losses]
-    expected = [False, False, True, True, False, False, True]
-    proof.exact("T21", "ball on the line of sight, by its place", inside, expected, 7)
-    assert len({loss for loss, shadowed in zip(losses, inside, strict=True) if not shadowed}) == 1
+    more_db = [round((loss - losses[0]) / 100, 2) for loss in losses]
+    on_line = [False, False, True, True, False, False, True]
+    off = [db for db, shadowed in zip(more_db, on_line, strict=True) if not shadowed]
+    on = [db for db, shadowed in zip(more_db, on_line, strict=True) if shadowed]
+    proof.exact("T21", "ball off the line of sight, dB more at each place", off, [0.0] * 4, 4)
+    proof.exact("T21", "ball on the line of sight, dB more at each place", on, [0.5] * 3, 3)
 
 
 def test_the_ends_own_bodies_are_no_obstacles(proof: Proof) -> None:
@@ -114,7 +117,9 @@ def test_the_ends_own_bodies_are_no_obstacles(proof: Proof) -> None:
     fabric.turn_to(frame_with(deployment, AWAY))
     own = [heard(fabric, ends) for ends in (("rider", "a"), ("a", "rider"), ("red.goal", "a"))]
     on_board = Fabric(deployment).link("rider", "red.goal", "data").rule
-    proof.exact("T21", "an end's own rod among its obstacles", any("red.goal" in f.walls for f in own), False, 3)
+    own_db = [flight.walls_cdb / 100 for flight in own if "red.goal" in flight.walls]
+    proof.exact("T21", "an end's own rod among its obstacles, dB", sum(own_db), 0, 3)
+    assert not own_db
     assert on_board == "on_board"
     rod = fabric.world.antenna("red.goal", (0.0, 0.0, 0.0))
     x, _, z = rod

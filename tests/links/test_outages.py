@@ -5,12 +5,16 @@ Who sends periodically sees a bad time as long as it has packets that meet it.
 
 from __future__ import annotations
 
+import json
+import sys
+from collections.abc import Callable
 from itertools import groupby
 from math import expm1, log1p, sqrt
 
 import pytest
 
-from tests.links.offered import MS, every, fabric_of, fates, uniforms
+from foosim.vhub.packet import Flight
+from tests.links.offered import MS, S, every, fabric_of, fates, uniforms
 from tests.links.proof import Proof
 from tests.links.statistics import ks, ks_exponential
 
@@ -136,3 +140,37 @@ def test_times_start_anywhere(proof: Proof) -> None:
     seeds = range(proof.seed, proof.seed + links)
     bad = sum(bool(next(fates(fabric_of(settings, seed), [0])).cause) for seed in seeds)
     proof.normal("T6", "share of links that start bad", (bad - 0.2 * links) / sqrt(0.16 * links), links)
+
+
+def calls_of(work: Callable[[], object]) -> int:
+    """How many functions are called in the course of some work."""
+    count = 0
+
+    def called(frame: object, event: str, arg: object) -> None:
+        nonlocal count
+        count += event == "call"
+
+    sys.setprofile(called)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_times_are_gone_on_in() -> None:
+    """An event elsewhere costs a link not all of its times again, nor do packets in flight across a change of its."""
+    fabric = fabric_of("burst: {loss: 5 %, mean_bad: 10 ms}, delay: 50 ms")
+    link, at_ns = fabric.link("a", "b", "data"), 600 * S
+    flights = [Flight("a", "b", "data", number, at_ns + number * MS, 0, b"x") for number in range(40)]
+    first = calls_of(lambda: link.send(flights[0]))
+    fabric.take(0, at_ns + MS, json.dumps({"partition": [["c"], ["d"]], "for": "1 s"}))
+    assert calls_of(lambda: [link.send(flight) for flight in flights[1:20]]) < first / 10
+    fabric.take(0, at_ns + 20 * MS, json.dumps({"set": {"link": "tried", "delay": "60 ms"}}))
+
+    def in_turns() -> None:
+        for later, earlier in zip(flights[20:], flights[:20], strict=True):
+            link.send(later)
+            link.arrive(earlier, "")
+
+    assert calls_of(in_turns) < first / 5

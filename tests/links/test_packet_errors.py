@@ -1,4 +1,4 @@
-"""Packet errors (T19): against ns-3's vectors, against the formulas worked out here, and that they never turn back."""
+"""Packet errors (T19): against ns-3's vectors (T28) and the formulas worked out here; they never turn back."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from foosim.vhub.radio.errors import (
 )
 from foosim.vhub.radio.frames import WifiFrames
 from foosim.vhub.radio.timings import WIFI_5
+from tests.links.proof import Proof
 from tests.links.statistics import Z_ALPHA, binomial_z
 
 # Share of frames of 2000 bytes that get through, by Mb/s and dB: numbers of ns-3's wifi-error-rate-models test (NIST).
@@ -64,15 +65,17 @@ def per(mode: str, snr_db: float, size_bytes: int) -> float:
 
 
 @pytest.mark.parametrize(("mode", "snr_db"), NS3)
-def test_vectors_of_ns3(mode: str, snr_db: float) -> None:
+def test_vectors_of_ns3(proof: Proof, mode: str, snr_db: float) -> None:
     expected, tolerance = NS3[mode, snr_db]
-    assert 1.0 - per(mode, snr_db, 2000) == pytest.approx(expected, abs=tolerance)
+    what = f"{mode} at {snr_db:g} dB, 2000 B: share that gets through, ns-3's"
+    proof.within("T28", what, 1.0 - per(mode, snr_db, 2000), expected, tolerance, 1)
 
 
 @pytest.mark.parametrize("size", NEEDED)
-def test_ten_percent_points(size: int) -> None:
+def test_ten_percent_points(proof: Proof, size: int) -> None:
     for mode, needed_db in zip(WIFI_MODES, NEEDED[size], strict=True):
-        assert snr_needed(mode, size) / 100 == pytest.approx(needed_db, abs=0.06)
+        what = f"{mode}, {size} B: dB for 10 % errors"
+        proof.within("T19", what, snr_needed(mode, size) / 100, needed_db, 0.06, 1)
         assert per(mode, snr_needed(mode, size) / 100, size) == pytest.approx(0.1, abs=0.005)
     assert snr_needed("ht_mcs7", size) / 100 == pytest.approx({100: 22.9, 1500: 23.8}[size], abs=0.06)
     assert [snr_needed("oqpsk_250", bytes_) / 100 for bytes_ in (20, 127)] == pytest.approx([-0.7, 0.2], abs=0.06)
@@ -92,9 +95,10 @@ CODES: Final = {  # points of the constellation and code
 
 @pytest.mark.parametrize("mode", CODES)
 @pytest.mark.parametrize("size", [100, 1500])
-def test_the_formula_of_ofdm(mode: str, size: int) -> None:
+def test_the_formula_of_ofdm(proof: Proof, mode: str, size: int) -> None:
     points, code = CODES[mode]
     branch, weights = WEIGHTS[code]
+    off = []
     for step in range(-6, 7):
         snr_db = snr_needed(mode, size) / 100 + step * 0.25
         s = 10 ** (round(snr_db * 100) / 1000)
@@ -106,15 +110,18 @@ def test_the_formula_of_ofdm(mode: str, size: int) -> None:
             p = (1 - 1 / sqrt(points)) / log2(sqrt(points)) * erfc(sqrt(1.5 * s / (points - 1)))
         d = 2 * sqrt(p * (1 - p))
         event = min(sum(count * d**weight for weight, count in weights.items()) / (2 * branch), 1)
-        assert per(mode, snr_db, size) == pytest.approx(1 - (1 - event) ** (8 * size), abs=0.005)
+        off.append(abs(per(mode, snr_db, size) - (1 - (1 - event) ** (8 * size))))
+    proof.below("T19", f"{mode}, {size} B: error rate less that of the formula", max(off), 0.005, len(off))
 
 
 @pytest.mark.parametrize("size", [20, 127])
-def test_the_formula_of_802154(size: int) -> None:
+def test_the_formula_of_802154(proof: Proof, size: int) -> None:
+    off = []
     for snr_db in (-3.0, -1.5, -0.7, 0.2, 1.0, 3.0):
         s = 10 ** (snr_db / 10)
         ber = 8 / 15 / 16 * sum((-1) ** k * comb(16, k) * exp(20 * s * (1 / k - 1)) for k in range(2, 17))
-        assert per("oqpsk_250", snr_db, size) == pytest.approx(1 - (1 - ber) ** (8 * size), abs=0.005)
+        off.append(abs(per("oqpsk_250", snr_db, size) - (1 - (1 - ber) ** (8 * size))))
+    proof.below("T19", f"oqpsk_250, {size} B: error rate less that of the formula", max(off), 0.005, len(off))
 
 
 @given(mode=st.sampled_from(sorted(MODES)), snr=st.integers(-4000, 7000), size=st.integers(1, 2304))

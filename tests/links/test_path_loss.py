@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from math import inf, log10, pi
+from math import inf, log, log10, pi, sqrt
 from typing import Final
 
 import pytest
@@ -21,7 +21,8 @@ from foosim.vhub.radio.path_loss import (
     range_m,
     vehicle_blockage_db,
 )
-from tests.links.statistics import ALPHA, ks_normal, mean_and_deviation
+from tests.links.proof import Proof
+from tests.links.statistics import ks_normal, mean_and_deviation
 
 C: Final = 299_792_458.0
 Formula = Callable[[float, float], float]
@@ -50,11 +51,14 @@ POINTS: Final = [(1.0, 2.437), (4.0, 5.25), (37.0, 0.868), (120.0, 5.9), (900.0,
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_straight_curves(name: str) -> None:
+def test_straight_curves(proof: Proof, name: str) -> None:
     environment, (los, nlos) = ENVIRONMENTS[name], CURVES[name]
+    off = []
     for d, f in POINTS:
-        assert environment.los_db(d, f * 1e9, (1.5, 1.5)) == pytest.approx(los(d, f), abs=1e-9)
-        assert environment.nlos_db(d, f * 1e9, (1.5, 1.5)) == pytest.approx(max(los(d, f), nlos(d, f)), abs=1e-9)
+        off.append(abs(environment.los_db(d, f * 1e9, (1.5, 1.5)) - los(d, f)))
+        off.append(abs(environment.nlos_db(d, f * 1e9, (1.5, 1.5)) - max(los(d, f), nlos(d, f))))
+    proof.below("T18", f"{name}: dB off its formula, with and without line of sight", max(off), 1e-9, len(off))
+    for _, f in POINTS:
         assert environment.los_db(0.01, f * 1e9, (1.5, 1.5)) == environment.los_db(1.0, f * 1e9, (1.5, 1.5))
 
 
@@ -67,7 +71,7 @@ CELLS: Final = {
 @pytest.mark.parametrize("name", CELLS)
 @pytest.mark.parametrize("distance_m", [10.0, 60.0, 250.0, 800.0, 4000.0])
 @pytest.mark.parametrize("heights", [(10.0, 1.5), (2.0, 25.0), (5.0, 5.0)])
-def test_cells_with_a_breakpoint(name: str, distance_m: float, heights: tuple[float, float]) -> None:
+def test_cells_with_a_breakpoint(proof: Proof, name: str, distance_m: float, heights: tuple[float, float]) -> None:
     """Before the breakpoint PL1, beyond it PL2, which joins it; compared in the plane, as the standard says."""
     offset, slope, weight, nlos, nlos_slope, nlos_f, of_h = CELLS[name]
     f = 2.0
@@ -77,24 +81,26 @@ def test_cells_with_a_breakpoint(name: str, distance_m: float, heights: tuple[fl
         los = offset + slope * log10(distance_m) + 20 * log10(f)
     else:
         los = offset + 40 * log10(distance_m) + 20 * log10(f) - weight * log10(far**2 + (high - low) ** 2)
-    assert ENVIRONMENTS[name].los_db(distance_m, 2e9, heights) == pytest.approx(los, abs=1e-9)
     without = nlos + nlos_slope * log10(distance_m) + nlos_f * log10(f) - of_h * (low - 1.5)
-    assert ENVIRONMENTS[name].nlos_db(distance_m, 2e9, heights) == pytest.approx(max(los, without), abs=1e-9)
+    off = abs(ENVIRONMENTS[name].los_db(distance_m, 2e9, heights) - los)
+    off = max(off, abs(ENVIRONMENTS[name].nlos_db(distance_m, 2e9, heights) - max(los, without)))
+    proof.below("T18", f"{name}, {distance_m:g} m, {high:g} m and {low:g} m high: dB off its formula", off, 1e-9, 2)
 
 
-def test_two_rays() -> None:
+def test_two_rays(proof: Proof) -> None:
     """Friis up to 4 pi h h / lambda, then -10 lg(h^2 h^2 / d^4); where they meet they agree."""
     two = ENVIRONMENTS["two_ray"]
     crossover = 4 * pi * 1.5 * 2.0 * 5.9e9 / C
-    for d in (1.0, 100.0, 0.999 * crossover):
-        assert two.los_db(d, 5.9e9, (1.5, 2.0)) == pytest.approx(friis(d, 5.9), abs=1e-9)
-    for d in (1.001 * crossover, 2000.0, 9000.0):
-        assert two.los_db(d, 5.9e9, (1.5, 2.0)) == pytest.approx(-10 * log10(1.5**2 * 2.0**2 / d**4), abs=1e-9)
+    expected = {d: friis(d, 5.9) for d in (1.0, 100.0, 0.999 * crossover)}
+    expected |= {d: -10 * log10(1.5**2 * 2.0**2 / d**4) for d in (1.001 * crossover, 2000.0, 9000.0)}
+    off = max(abs(two.los_db(d, 5.9e9, (1.5, 2.0)) - loss_db) for d, loss_db in expected.items())
+    proof.below("T18", "two_ray: dB off its formula", off, 1e-9, len(expected))
     assert two.los_db(1.001 * crossover, 5.9e9, (1.5, 2.0)) == pytest.approx(friis(crossover, 5.9), abs=0.05)
 
 
-def test_log_distance_as_configured() -> None:
-    assert ENVIRONMENTS["log_distance"].los_db(1.0, 5.15e9, (1.0, 1.0)) == pytest.approx(46.68, abs=0.01)
+def test_log_distance_as_configured(proof: Proof) -> None:
+    at_1_m = ENVIRONMENTS["log_distance"].los_db(1.0, 5.15e9, (1.0, 1.0))
+    proof.within("T28", "log_distance at 1 m and 5.15 GHz: dB, ns-3's", at_1_m, 46.68, 0.01, 1)
     configured = LogDistance("", exponent=2.2, reference_loss_db=40.0, reference_distance_m=2.0)
     assert configured.los_db(20.0, 2.4e9, (1.0, 1.0)) == pytest.approx(62.0)
     assert configured.los_db(1.5, 2.4e9, (1.0, 1.0)) == 40.0
@@ -181,14 +187,17 @@ def test_range_is_where_the_loss_is(name: str, nlos: bool) -> None:
     ],
 )
 def test_a_vehicle_in_between(
-    distance_m: float, heights: tuple[float, float], blocker_m: float, mean: float, deviation: float
+    proof: Proof, distance_m: float, heights: tuple[float, float], blocker_m: float, mean: float, deviation: float
 ) -> None:
-    key = draw_key(1, "vehicle")
-    drawn = [vehicle_blockage_db(distance_m, *heights, blocker_m, draw_words(key, n)[0]) for n in range(4000)]
+    key, count = draw_key(proof.seed, "vehicle"), proof.size(4_000, 100_000)
+    drawn = [vehicle_blockage_db(distance_m, *heights, blocker_m, draw_words(key, n)[0]) for n in range(count)]
     found, spread = mean_and_deviation(drawn)
-    assert min(drawn) > 0.0 and found == pytest.approx(mean, rel=0.03) and spread == pytest.approx(deviation, rel=0.06)
-    logs = [log10(x) for x in drawn]
-    assert ks_normal(logs, *mean_and_deviation(logs)) > ALPHA, "log-normal"
+    what = f"TR 37.885, a vehicle of {blocker_m:g} m at {distance_m:g} m"
+    assert min(drawn) > 0.0 and spread == pytest.approx(deviation, rel=0.06)
+    proof.ratio("T18", f"{what}: mean dB", found, mean, 0.03, count)
+    squared = log10(1 + (deviation / mean) ** 2) * log(10)
+    law = (log(mean) - squared / 2) / log(10), sqrt(squared) / log(10)
+    proof.likely("T18", f"{what}: log-normal, Kolmogorov", ks_normal([log10(x) for x in drawn], *law), count)
 
 
 def test_antennas_above_the_vehicle_see_over_it() -> None:
@@ -214,10 +223,11 @@ TABLE: Final = {  # dB at 0.868, 2.44, 5.25 and 5.9 GHz, worked out from P.2040'
 
 
 @pytest.mark.parametrize(("material", "thickness_m"), TABLE)
-def test_slabs_of_p2040(material: str, thickness_m: float) -> None:
+def test_slabs_of_p2040(proof: Proof, material: str, thickness_m: float) -> None:
     for f, expected in zip((0.868, 2.44, 5.25, 5.9), TABLE[material, thickness_m], strict=True):
         tolerance = 0.0501 if expected < 10 else 0.501
-        assert slab_loss_db(material, thickness_m, f * 1e9) == pytest.approx(expected, abs=tolerance)
+        what = f"P.2040, {100 * thickness_m:g} cm of {material} at {f:g} GHz: dB, to two digits"
+        proof.within("T18", what, slab_loss_db(material, thickness_m, f * 1e9), expected, tolerance, 1)
 
 
 def multiple_echoes(material: str, thickness_m: float, f_ghz: float) -> float:
@@ -232,11 +242,13 @@ def multiple_echoes(material: str, thickness_m: float, f_ghz: float) -> float:
 
 
 @pytest.mark.parametrize("material", [name for name in MATERIALS if name != "metal"])
-def test_a_slab_is_the_sum_of_its_echoes(material: str) -> None:
+def test_a_slab_is_the_sum_of_its_echoes(proof: Proof, material: str) -> None:
     """Another derivation with Fresnel's coefficients and the vacuum's permittivity."""
+    off = []
     for thickness_m, f_ghz in ((0.004, 2.4), (0.05, 5.9), (0.15, 0.868)):
         expected = multiple_echoes(material, thickness_m, f_ghz)
-        assert slab_loss_db(material, thickness_m, f_ghz * 1e9) == pytest.approx(expected, abs=0.02)
+        off.append(abs(slab_loss_db(material, thickness_m, f_ghz * 1e9) - expected))
+    proof.below("T18", f"P.2040, {material}: dB off the sum of its echoes", max(off), 0.02, len(off))
 
 
 def test_thicker_walls_of_what_absorbs_take_more() -> None:

@@ -1,9 +1,13 @@
-"""What kinds of radios differ in: vehicles between vehicles (T18, T21), 802.11n (T16), LoRa's gateways."""
+"""What kinds of radios differ in: vehicles between vehicles (T18, T21), 802.11n (T16), LoRa's gateways.
+
+The hall is the shipped warehouse, in which one rover between two others shadows them, too.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from typing import Final
 
 import pytest
@@ -13,12 +17,17 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import DeploymentError
 from foosim.protocol.frame import Frame
 from foosim.protocol.start import initial_frame
+from foosim.rehearsal.rehearse import rehearse
+from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import wifi_airtime_ns
 from foosim.vhub.radio.errors import DOT11N_MODES, LORA_GATEWAY_SENSITIVITY_DBM, LORA_SENSITIVITY_DBM, MODES
+from foosim.vhub.radio.path_loss import ENVIRONMENTS
 from foosim.vhub.radio.timings import WIFI_5, with_category
+from foosim.vhub.rows import PACKETS, PacketRow
 from tests.links.offered import TABLE, deployment_of
+from tests.links.proof import Proof
 
 HALL: Final = TABLE.parent / "warehouse.yaml"
 
@@ -53,15 +62,13 @@ def signal(
     return flight
 
 
-LOW: Final = "hall.rover.antenna_height=300 mm"
-"""Below the hull of another one."""
 BETWEEN: Final = {"rover01": (-10.0, 0.0), "rover02": (2.0, 0.0), "rover03": (-4.0, 0.1)}
 
 
 @pytest.mark.parametrize("environment", ["v2v_urban", "v2v_highway"])
 def test_a_vehicle_between_vehicles_blocks_as_vehicles_do(environment: str) -> None:
     """TR 37.885's loss by the draw of the three, both ways, in every frame alike; its metal is not asked for."""
-    deployment = hall(LOW, radio(environment))
+    deployment = hall(radio(environment))
     clear = signal(deployment, {**BETWEEN, "rover03": (-4.0, 5.0)})
     blocked = signal(deployment, BETWEEN)
     assert (clear.walls, clear.walls_cdb, blocked.walls) == ((), 0, ("rover03",))
@@ -73,13 +80,51 @@ def test_a_vehicle_between_vehicles_blocks_as_vehicles_do(environment: str) -> N
     assert other.walls_cdb not in (0, blocked.walls_cdb), "another vehicle, another draw"
     both = signal(deployment, {**BETWEEN, "rover04": (-1.0, 0.1)})
     assert both.walls_cdb == blocked.walls_cdb + other.walls_cdb
-    indoors = signal(hall(LOW, radio("indoor")), BETWEEN)
+    indoors = signal(hall(radio("indoor")), BETWEEN)
     assert indoors.walls_cdb == 6000, "elsewhere it is the metal that it is of"
+
+
+def shipped(*sets: str) -> Deployment:
+    """The warehouse as it is, without shadowing and fading."""
+    still = "network.radios.wifi.shadowing={on: false}", "network.radios.wifi.fading=null"
+    return load_deployment(apply_sets(HALL.read_text(), "hall.yaml", [*still, *sets]), "hall.yaml")
+
+
+def test_a_rover_parked_between_two_costs_them_decibels_in_the_warehouse(proof: Proof) -> None:
+    """In an aisle, pilots over Wi-Fi: as much as its metal takes, or the way round the line of sight; both ways."""
+    aisle = {"rover01": (-13.0, 6.25), "rover02": (-5.0, 6.25)}
+    deployment = shipped()
+    clear = signal(deployment, {**aisle, "rover03": (-9.0, 1.25)}, ("pilot01", "pilot02"))
+    for ends in (("pilot01", "pilot02"), ("pilot02", "pilot01")):
+        shadowed = signal(deployment, {**aisle, "rover03": (-9.0, 6.3)}, ends)
+        assert (clear.walls, shadowed.walls, shadowed.walls_cdb) == ((), ("rover03",), 6000)
+        more_db = (shadowed.path_loss_cdb - clear.path_loss_cdb) / 100
+        budget = Fabric(deployment).link(*ends, "beacon").setup_at(0).budget
+        assert budget is not None
+        los_db, nlos_db = ENVIRONMENTS["indoor"].both_db(8.0, 5.25e9, (0.4, 0.4))
+        proof.within("T21", f"warehouse: a rover between {' and '.join(ends)}, dB", more_db, nlos_db - los_db, 0.02, 1)
+        assert more_db > 5.0 and shadowed.received_cdbm < clear.received_cdbm
+
+
+def test_rovers_shadow_each_other_as_they_drive(tmp_path: Path) -> None:
+    """The first second of the warehouse as it is shipped: rows of beacons name rovers that were in the way."""
+    capture = tmp_path / "run.mcap"
+    rehearse(HALL.read_text(), HALL.name, 40, capture=capture)
+    rows = [
+        row for row in open_capture(capture).rows(PACKETS) if isinstance(row, PacketRow) and row.channel == "beacon"
+    ]
+    between = {(name, row.source, row.destination) for row in rows for name in row.walls if name.startswith("rover")}
+    assert between, "nobody was between two others"
+    assert all(name[-2:] not in (source[-2:], to[-2:]) for name, source, to in between), (
+        "one's own rover is no obstacle"
+    )
+    assert {"pillar-1", "wall-long-middle", "shelf-south-inner-1"} & {name for row in rows for name in row.walls}
 
 
 def test_antennas_above_the_hull_see_over_it() -> None:
     """The mast of one in between is on the line, its hull is not."""
-    over = signal(hall(radio("v2v_urban", "-50 mm")), {**BETWEEN, "rover03": (-4.0, 0.0)})
+    mast = "hall.rover.height=350 mm", "hall.rover.antenna_height=500 mm"
+    over = signal(hall(*mast, radio("v2v_urban", "-50 mm")), {**BETWEEN, "rover03": (-4.0, 0.0)})
     assert (over.walls, over.walls_cdb) == (("rover03",), 0)
 
 
@@ -129,7 +174,7 @@ def test_802_11n_has_its_rates(size: int) -> None:
 
 @pytest.mark.parametrize("radio", ["preset: dot11p", "medium: wifi, bandwidth: 40 MHz"])
 def test_802_11n_is_in_20_mhz(radio: str) -> None:
-    with pytest.raises(DeploymentError, match=r"radios\.r\.standard: has 20 MHz here, not [14]0 MHz, '802.11n'"):
+    with pytest.raises(DeploymentError, match=r"not a bandwidth of 802.11n here, which has 20 MHz, '[14]0 MHz'"):
         sent(f"{radio}, standard: 802.11n", 5, 100)
 
 

@@ -20,7 +20,10 @@ WIRED: Final = "{id: wired, from: d, to: red.goal, delay: 3 ms, jitter: {shape: 
 PORT: Final = "{id: port, from: d, to: ['blue.goal', a], rate: 60 kbit/s, queue: {packets: 3}, duplicate: 30 %}"
 SETS: Final = {
     "robots without radio": ("network.robots={a: [r], b: [r], c: [r]}", f"network.links=[{WIRED}, {PORT}]"),
-    "a robot on the air": ("network.robots={'*': [r]}", f"network.links=[{WIRED}, {PORT}]"),
+    "a robot on the air": (
+        "network.robots={'*': [r]}",
+        f"network.links=[{WIRED}, {PORT.replace('rate: 60 kbit/s, ', '')}]",
+    ),
 }
 SHARED: Final = (
     "network.radios={r: {preset: wifi_5_indoor}}",

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.vhub.radio import shadowing
 from foosim.vhub.radio.shadowing import Shadowing
-from tests.links.statistics import ALPHA, Z_ALPHA, correlation, ks_normal, mean_and_deviation
+from tests.links.proof import Proof
+from tests.links.statistics import correlation, ks_normal, mean_and_deviation
 
 KEY = draw_key(1, "shadowing")
 D_CORR = 10.0
@@ -41,45 +42,53 @@ def places(count: int, span_m: float, seed: int = 1) -> list[tuple[float, float]
     return [(span_m * (unit_interval(w[0]) - 0.5), span_m * (unit_interval(w[1]) - 0.5)) for w in drawn]
 
 
-def test_it_is_normal_over_independent_sites() -> None:
+def test_it_is_normal_over_independent_sites(proof: Proof) -> None:
     """Kolmogorov's test over links between 10,000 places that are far apart."""
-    ends = places(SITES, 1e7)
-    values = [shadowing_db(KEY, a, b, 4.0, D_CORR) for a, b in zip(ends[::2], ends[1::2], strict=True)]
-    assert ks_normal(values, 0.0, 4.0) > ALPHA
+    n = proof.size(SITES, 5 * SITES)
+    ends, key = places(n, 1e7, proof.seed), draw_key(proof.seed, "shadowing")
+    values = [shadowing_db(key, a, b, 4.0, D_CORR) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+    proof.likely("T20", "normal over independent links: Kolmogorov", ks_normal(values, 0.0, 4.0), len(values))
 
 
 @pytest.mark.parametrize("apart_m", [0.0, 0.3 * D_CORR, D_CORR, 3 * D_CORR])
-def test_its_deviation_does_not_depend_on_the_length_of_the_link(apart_m: float) -> None:
+def test_its_deviation_does_not_depend_on_the_length_of_the_link(proof: Proof, apart_m: float) -> None:
     """Both ends of a short link stand in the same shadow: their sum would be wider than that of a long one."""
-    values = [shadowing_db(KEY, (x, y), (x + apart_m, y), 4.0, D_CORR) for x, y in places(2_000, 1e7)]
+    n, key = proof.size(2_000, 20_000), draw_key(proof.seed, "shadowing")
+    values = [shadowing_db(key, (x, y), (x + apart_m, y), 4.0, D_CORR) for x, y in places(n, 1e7, proof.seed)]
     mean, deviation = mean_and_deviation(values)
-    assert abs(mean) < Z_ALPHA * 4.0 / sqrt(len(values))
-    assert deviation == pytest.approx(4.0, rel=0.05)
+    what = f"links of {apart_m / D_CORR:g} correlation distances: "
+    proof.normal("T20", what + "mean", mean / 4.0 * sqrt(n), n)
+    proof.ratio("T20", what + "deviation", deviation, 4.0, 0.05, n)
 
 
-def test_correlation_over_distance() -> None:
+def test_correlation_over_distance(proof: Proof) -> None:
     """Along straight lines of 10,000 correlation distances in all, at lags of 0.25 to 3 of them: within 0.05."""
     products = dict.fromkeys((1, 2, 3, 4, 6, 8, 10, 12), 0.0)
-    squares, count = 0.0, 0
-    for line in range(10):
-        step_x, step_y = D_CORR / 4 * cos(2 * pi * line / 10 + 0.1), D_CORR / 4 * sin(2 * pi * line / 10 + 0.1)
-        along = [field(KEY, 1e5 * line + k * step_x, 0.37 * line + k * step_y, D_CORR) for k in range(4_000)]
+    squares, count, key = 0.0, 0, draw_key(proof.seed, "shadowing")
+    lines = proof.size(10, 50)
+    for line in range(lines):
+        turn = 2 * pi * line / lines + 0.1
+        step_x, step_y = D_CORR / 4 * cos(turn), D_CORR / 4 * sin(turn)
+        along = [field(key, 1e5 * line + k * step_x, 0.37 * line + k * step_y, D_CORR) for k in range(4_000)]
         for lag in products:
             products[lag] += sum(a * b for a, b in zip(along[:-lag], along[lag:], strict=True)) * 4_000 / (4_000 - lag)
         squares += sum(a * a for a in along)
         count += len(along)
-    assert squares / count == pytest.approx(1.0, abs=0.05)
+    proof.within("T20", "variance along lines", squares / count, 1.0, 0.05, count)
     for lag, product in products.items():
-        assert product / count == pytest.approx(exp(-lag / 4), abs=0.05), f"{lag / 4} correlation distances"
+        what = f"autocorrelation at {lag / 4:g} correlation distances"
+        proof.within("T20", what, product / count, exp(-lag / 4), 0.05, count)
 
 
-def test_links_that_share_an_end_correlate_by_half() -> None:
-    hub, one, other = (places(1_500, 1e7, seed) for seed in (2, 3, 4))
-    first = [shadowing_db(KEY, a, b, 1.0, D_CORR) for a, b in zip(hub, one, strict=True)]
-    second = [shadowing_db(KEY, a, b, 1.0, D_CORR) for a, b in zip(hub, other, strict=True)]
-    apart = [shadowing_db(KEY, a, b, 1.0, D_CORR) for a, b in zip(one, other[1:] + other[:1], strict=True)]
-    assert correlation(first, second) == pytest.approx(0.5, abs=0.05)
-    assert abs(correlation(first, apart[1:] + apart[:1])) < 0.05
+def test_links_that_share_an_end_correlate_by_half(proof: Proof) -> None:
+    n, key = proof.size(1_500, 15_000), draw_key(proof.seed, "shadowing")
+    hub, one, other = (places(n, 1e7, proof.seed + place) for place in (1, 2, 3))
+    first = [shadowing_db(key, a, b, 1.0, D_CORR) for a, b in zip(hub, one, strict=True)]
+    second = [shadowing_db(key, a, b, 1.0, D_CORR) for a, b in zip(hub, other, strict=True)]
+    apart = [shadowing_db(key, a, b, 1.0, D_CORR) for a, b in zip(one, other[1:] + other[:1], strict=True)]
+    proof.within("T20", "correlation of links that share an end", correlation(first, second), 0.5, 0.05, n)
+    alone = correlation(first, apart[1:] + apart[:1])
+    proof.within("T20", "correlation of links that share none", alone, 0.0, 0.05, n)
 
 
 @given(
@@ -99,20 +108,25 @@ def test_it_is_the_same_both_ways_to_the_last_bit(
     assert there <= sum(shares) + 1e-9, "no more than the shares of both ends"
 
 
-def test_it_is_the_same_on_every_visit_in_any_order() -> None:
-    links = [(a, b) for a in places(15, 60.0) for b in places(15, 60.0, 2)]
+def test_it_is_the_same_on_every_visit_in_any_order(proof: Proof) -> None:
+    of = draw_key(proof.seed, "shadowing")
+    links = [(a, b) for a in places(15, 60.0, proof.seed) for b in places(15, 60.0, proof.seed + 1)]
 
     def asked(order: list[int]) -> list[float]:
         for cache in (made, shadowing._node):
             cache.cache_clear()
-        found = {n: shadowing_db(KEY, *links[n], 8.03, 6.0) for n in order}
+        found = {n: shadowing_db(of, *links[n], 8.03, 6.0) for n in order}
         return [found[n] for n in sorted(found)]
 
     forward = asked(list(range(len(links))))
-    assert asked(list(reversed(range(len(links))))) == forward
-    assert asked(sorted(range(len(links)), key=lambda n: draw_words(KEY, n))) == forward
-    assert [shadowing_db(KEY, *link, 8.03, 6.0) for link in links] == forward
-    assert [shadowing_db(draw_key(2, "shadowing"), *link, 8.03, 6.0) for link in links] != forward
+    orders = list(reversed(range(len(links)))), sorted(range(len(links)), key=lambda n: draw_words(KEY, n))
+    again = [asked(order) for order in orders] + [[shadowing_db(of, *link, 8.03, 6.0) for link in links]]
+    other = sum(value != first for values in again for value, first in zip(values, forward, strict=True))
+    proof.exact("T20", "values that differ on another visit, in any order", other, 0, len(again) * len(links))
+    back = [shadowing_db(of, b, a, 8.03, 6.0) for a, b in links]
+    other = sum(value != first for value, first in zip(back, forward, strict=True))
+    proof.exact("T20", "values that differ from b to a", other, 0, len(links))
+    assert [shadowing_db(draw_key(proof.seed + 1, "shadowing"), *link, 8.03, 6.0) for link in links] != forward
 
 
 def test_it_is_continuous() -> None:

@@ -7,6 +7,7 @@ from math import log, sqrt
 import pytest
 
 from foosim.protocol.draws import draw_key, draw_words, gaussian, unit_interval
+from tests.links.proof import FAILS, SKIPPED, Proof
 from tests.links.statistics import (
     ALPHA,
     Z_ALPHA,
@@ -61,3 +62,15 @@ def test_moments() -> None:
     assert mean_and_deviation([1.0, 2.0, 3.0]) == (2.0, 1.0)
     assert correlation([1.0, 2.0, 3.0], [2.0, 4.0, 7.0]) == pytest.approx(0.9933, abs=1e-4)
     assert abs(correlation(UNIFORM, NORMAL)) < Z_ALPHA / sqrt(len(UNIFORM))
+
+
+def test_what_cannot_be_made_here_leaves_a_row() -> None:
+    proof = Proof(1, is_full=True)
+    with pytest.raises(pytest.skip.Exception, match="no netem"):
+        proof.skip("T27", "delay", "no netem here")
+    with pytest.raises(AssertionError, match=r"T19 share: figure 0.6, accepted is 0.5 within 0.05"):
+        proof.within("T19", "share", 0.6, 0.5, 0.05, 7)
+    assert proof.rows == [
+        ("T27", "delay", "", "skipped: no netem here", "", 0, SKIPPED),
+        ("T19", "share", "figure", "0.6", "0.5 within 0.05", 7, FAILS),
+    ]

@@ -115,21 +115,22 @@ def test_each_rover_is_an_island_that_its_owner_solves() -> None:
         assert share.solved == tuple(entity.index for entity in mine)
 
 
-def test_the_scene_has_rovers_where_they_are_and_antennas_above_them() -> None:
+def test_the_scene_has_rovers_where_they_are_and_their_antennas() -> None:
     layout = build_layout(DEPLOYMENT)
     scene, numbers = build_scene(DEPLOYMENT, layout), initial_numbers(DEPLOYMENT, layout)
     rover, base = scene.bodies["rover03"], scene.bodies["base"]
     ((name, position, orientation),) = forward_kinematics(rover, layout["rover03"], numbers)
     assert (name, position) == ("rover03", (-6.25, 11.25, 0.0)) and orientation[2] < 0.0
-    assert (rover.antenna, base.antenna) == ((0.0, 0.0, 0.5), (0.0, 0.0, 3.0))
+    assert (rover.antenna, base.antenna) == ((0.0, 0.0, 0.4), (0.0, 0.0, 3.0))
     hulls = [shape.geometry for body in (rover, base) for shape in body.links[0].shapes[:1]]
-    assert hulls == [Cylinder(0.3, 0.35), Cylinder(0.2, 1.2)]
+    assert hulls == [Cylinder(0.3, 0.5), Cylinder(0.2, 1.2)]
 
 
 def test_obstacles_are_the_scenery_from_above() -> None:
     found = obstacles_of(DEPLOYMENT)
     assert len(found) == 4 + 1 + len(DEPLOYMENT.scenery)
     assert Rectangle(-12.5, 8.75, 1.0, 0.0, 4.25, 0.5) in found and Circle(-17.5, 0.0, 0.2) in found
+    assert Circle(-15.0, 0.0, 0.2) in found, "a pillar"
     upright = Shape(Cylinder(0.4, 3.0), "walls", (0, 0, 0, 1), (1.0, 2.0, 1.5))
     assert obstacle(upright) == Circle(1.0, 2.0, 0.4)
     lying = Shape(Cylinder(0.4, 3.0), "walls", (0, 0, 0, 1), (1.0, 2.0, 0.4), (0.5**0.5, 0.0, 0.0, 0.5**0.5))

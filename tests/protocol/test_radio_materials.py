@@ -96,8 +96,8 @@ def test_a_wall_without_a_thickness_is_refused_with_its_place(tmp_path: Path) ->
             pin_assets(text, "t", tmp_path)
         lines = text.split("\n")
         place = f"t:{len(lines) - 1}:{lines[-2].index(radio) + 1}"
-        what = "a wall without a thickness: the mesh is not closed, so its radio needs thickness or loss"
-        assert str(refusal.value).startswith(f"{place}: scenery.b.radio: {what}, ")
+        what = "a wall without a thickness: the mesh is not closed, write {is: brick, thickness: 10 cm}, 'brick'"
+        assert str(refusal.value) == f"{place}: scenery.b.radio: {what}"
 
 
 def test_a_mesh_is_closed_when_every_edge_has_two_sides() -> None:

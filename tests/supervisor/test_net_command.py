@@ -21,7 +21,8 @@ from foosim.supervisor import net_command
 from foosim.supervisor.links_shown import links_shown
 from foosim.supervisor.net_text import link_line
 from foosim.vhub.capture_reader import CaptureData, open_capture
-from foosim.vhub.explain import STAGE_NAMES, PacketName, explain_packet, parse_packet
+from foosim.vhub.explain import PacketName, explain_packet, parse_packet
+from foosim.vhub.explain_stages import STAGE_NAMES
 from foosim.vhub.rows import PACKETS, PacketRow
 from tests.supervisor.conftest import Command, Typed
 
@@ -121,7 +122,10 @@ def test_on_a_terminal_there_are_tables(command: Command, tmp_path: Path, monkey
 def test_presets_have_a_source_for_each_value(command: Command) -> None:
     assert len(json.loads(command("presets", "--json").out)) == len(PRESETS)
     out = command("presets", "lora_eu868").out
-    assert "  mtu: 222 B                   [R] at SF7 and SF8; 115 B at SF9, 51 B above\n" in out
+    assert "  spreading_factor: 7                               [J] write yours\n" in out
+    assert "  isolation of SF7: 6, -16, -18, -19, -19, -20 dB   [S] signetlabdei/lorawan" in out
+    wifi = command("presets", "wifi_5_indoor").out
+    assert "  AIFSN, CW of voice: 2, 3 to 7             [S] ns-3 wifi-mac.cc\n" in wifi
     refused = command("presets", "lora_eu")
     assert refused.code == 2 and "nearest is 'lora_eu868'" in refused.err
 
@@ -212,7 +216,8 @@ def test_a_clog_that_was_asked_for_is_in_the_delay(capture: CaptureData) -> None
 
 def test_a_partition_that_was_asked_for_is_seen_at_sending(capture: CaptureData) -> None:
     told = explain(capture, first(capture, cause="partition", arrival_tick=-1))
-    assert told["policy"] == "at sending cut: partition" and told["queue"] == "not reached"
+    assert told["policy"] == "at sending cut by request 2, from 412 ms to 492 ms: partition"
+    assert told["queue"] == "not reached"
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.protocol import limits
+from foosim.protocol.lags import Lags
 from foosim.protocol.units import Pace, parse_pace
-from foosim.supervisor.pacing import Lags, Pacer
+from foosim.supervisor.pacing import Pacer
 
 T: Final = 2_000_000
 START: Final = 1_000_000_007

@@ -23,6 +23,7 @@ from foosim.protocol.scene import forward_kinematics
 from foosim.protocol.scenes import build_scene
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import CaptureData, open_capture
+from foosim.vhub.model_hash import model_hash
 from foosim.vhub.rows import ROW_TYPES, CaptureError, EpochRow, OwnerRow, row_schema
 from foosim.vhub.viewing import VIEW_TYPES
 from tests.vhub.conftest import RECOVERED, noise
@@ -105,6 +106,7 @@ def test_packets_come_back_as_columns(capture: CaptureData, hub_run: HubRun) -> 
 def test_what_the_run_was_is_in_the_capture(capture: CaptureData, hub_run: HubRun) -> None:
     about = capture.about
     assert about.metadata == {
+        "model_hash": model_hash(hub_run.deployment),
         "run": "run-1",
         "fingerprint": "00",
         "format": "1",

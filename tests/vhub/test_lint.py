@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from math import inf
+from math import exp, inf
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,7 +18,17 @@ from foosim.protocol.impairments import Impairments
 from foosim.protocol.network import Network
 from foosim.protocol.radios import Radio
 from foosim.vhub.jitter import interpolate_ns, quantiles_ns
-from foosim.vhub.lint import Use, delay_of, meaning_of, meanings, ranges_of, residual_of, uses_alone, uses_of
+from foosim.vhub.lint import (
+    Use,
+    delay_of,
+    meaning_of,
+    meanings,
+    ranges_of,
+    reordered_of,
+    residual_of,
+    uses_alone,
+    uses_of,
+)
 from foosim.vhub.lint_text import LINES_MAX, meaning_line, start_lines
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -101,17 +111,48 @@ def test_ranges_are_where_the_formulas_say() -> None:
         ({"delay": "20 ms", "ttl": "10 ms"}, "the mean delay of 20 ms is above ttl, 10 ms"),
         ({"preset": "wifi_5_indoor", "tx_power": "-80 dBm"}, "it does not reach 1 m (0.00 m)"),
         ({"allow": False}, "nothing passes: allow is off"),
-        ({"preset": "lora_eu868", "spreading_factor": 12}, "mtu is above the 51 B of LoRaWAN at spreading factor 12"),
         ({"medium": "wired", "rate": "1 Mbit/s", "queue": {"bytes": "500 B"}},
          "a packet of 1500 B does not fit into the queue of 500 B"),
         ({"preset": "lora_eu868", "duty_cycle": "10 %"}, "duty_cycle is above the 1 % that the EU allows at 868.1 MHz"),
         ({"preset": "lora_eu868", "frequency": "869.5 MHz", "duty_cycle": "20 %"},
          "duty_cycle is above the 10 % that the EU allows at 869.5 MHz"),
+        ({"preset": "zigbee", "rate": "1 kbit/s"},
+         "rate has no effect over ieee802154: a radio's bit rate is 250 kbit/s"),
         ({"queue": {"packets": 3}}, "the queue has no effect: no rate, no medium"),
     ],
 )  # fmt: skip
 def test_what_looks_wrong_is_said(settings: Mapping[str, Any], warning: str) -> None:
     assert warning in meaning_of(Use("one", "", radio(**settings)), {}).warnings
+
+
+def test_how_many_packets_overtake() -> None:
+    """Of exponential jitter with the mean m, d apart: P(J > d + J') = exp(-d / m) / 2."""
+    spread = {"jitter": {"shape": "gamma", "mean": "15 ms", "sd": "15 ms"}}
+    late = {"reorder": {"probability": "10 %", "extra": "20 ms"}}
+    shares = [reordered_of(Impairments.model_validate(of), {}) for of in (
+        {**spread, "order": "free"}, late, {**late, **spread, "order": "free"}, spread, {"order": "free"},
+    )]  # fmt: skip
+    # With the extra delay P(J' < J + 10 ms) = 1 - exp(-10 / 15) / 2, of one in ten.
+    free, later = exp(-10 / 15) / 2, 1 - exp(-10 / 15) / 2
+    expected = [free, 0.1, 0.9 * free + 0.1 * later, None, None]
+    assert shares == [None if of is None else pytest.approx(of, rel=0.01) for of in expected]
+    internet = meaning_of(Use("one", "", radio(preset="internet")), {})
+    assert "25.7 % overtaken at 100 packets/s" in meaning_line(internet)
+
+
+def test_ranges_are_from_where_the_ends_and_their_antennas_are() -> None:
+    """A base station 25 m up is seen farther; so it is by a mount."""
+    cell = radio(preset="lte", tx_power="46 dBm")
+    low_m, behind_m = ranges_of(cell)
+    high_m, _ = ranges_of(cell, (25.0, 1.5))
+    assert low_m is not None and behind_m is not None and high_m is not None and high_m > 1.5 * low_m
+    mounted = radio(preset="lte", tx_power="46 dBm", antenna={"mount": ["0 m", "0 m", "10 m"]})
+    assert ranges_of(mounted) == ranges_of(cell, (11.5, 11.5))
+    made = deployment(
+        "{radios: {b: {preset: lte}}, robots: {player-*: [b]}, places: {player-red: [0 m, 0 m, 25 m],"
+        " player-*: [90 m, 0 m, 2 m]}}"
+    )
+    assert {use.heights_m for use in uses_of(made) if use.radio == "b"} <= {(25.0, 2.0), (2.0, 25.0)}
 
 
 def test_every_link_of_a_deployment_is_in_one_line() -> None:

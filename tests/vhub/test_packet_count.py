@@ -7,7 +7,6 @@ from typing import Any, Final
 import pytest
 
 from bench.packets import Count, Load, run
-from foosim.protocol.frame import Frame
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState
 
@@ -22,7 +21,7 @@ def count() -> Count:
 def test_every_packet_is_explained() -> None:
     found = count()
     assert found.unexplained == 0
-    assert found.dropped.keys() == {"random_loss", "rx_down"}
+    assert found.dropped.keys() == {"node_down", "random_loss", "rx_down"}
     assert found.refused.keys() == {"duplicate", "malformed", "no_route"}
     assert found.crashes == 3 and found.lost_in_crash > 0 and found.in_flight > 0 and found.delivered > 3_000
     assert found.asked == sum(
@@ -33,8 +32,8 @@ def test_every_packet_is_explained() -> None:
 def test_a_packet_that_is_lost_without_a_fate_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     arrive = HubState._arrive_at_robots
 
-    def leak(self: HubState, tick: int, frame: Frame, fates: list[Flight]) -> Any:
-        found = arrive(self, tick, frame, fates)
+    def leak(self: HubState, tick: int, fates: list[Flight]) -> Any:
+        found = arrive(self, tick, fates)
         if tick == 50:
             fates.pop()
         return found

@@ -52,7 +52,7 @@ def without_wall(row: msgspec.Struct) -> dict[str, object]:
 def test_the_run_has_everything_in_it(hub_run: HubRun) -> None:
     """Else the comparisons below would prove little."""
     causes = {flight.cause for closing in hub_run.closings for flight in closing.fates}
-    assert causes == {"", "random_loss", "rx_down", "in_flight"}
+    assert causes == {"", "node_down", "random_loss", "rx_down", "in_flight"}
     state = HubState.restore(hub_run.deployment, hub_run.snapshots[-1])
     assert state.refusals.keys() == {"no_route", "malformed", "duplicate"}
     assert sum(len(closing.joins) for closing in hub_run.closings) == 4

@@ -8,8 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.protocol import channels
+from foosim.protocol.codec import decode_json
+from foosim.protocol.messages import Tempo
 from foosim.vhub.packet import Flight
 from foosim.vhub.release import ANCHOR_WINDOW_NS, Release, Releases
+from foosim.vhub.report import report
+from tests.vhub.test_sessions import PERIODS, Hub, sent
 
 MS: Final = 1_000_000
 T: Final = 2 * MS
@@ -51,6 +56,27 @@ def test_what_leaves_together_leaves_with_its_latest() -> None:
     assert made.deadline_ns == START + 10 * T + 900
     (release,) = made.take(START + 11 * T)
     assert [flying.sequence for flying in release.flights] == [1, 2, 3] and release.tick == 10
+
+
+def test_it_counts_how_late_packets_leave() -> None:
+    """Behind their due time by the wall clock, whether their tick was closed late or they were taken late."""
+    made = releases()
+    made.committed(10, START + 10 * T)
+    made.add("watcher", 1, 10, [flight(11 * T, 1), flight(11 * T, 2), flight(11 * T, 3)], START + 10 * T)
+    made.take(START + 11 * T)
+    assert made.lateness.count == 3 and made.lateness.max_ns == 0
+    made.add("watcher", 2, 11, [flight(12 * T, 4)], START + 15 * T)
+    made.take(START + 16 * T)
+    assert made.lateness.count == 4 and made.lateness.as_json() == {"p50": 0.01, "p99": 8.0, "max": 8.0}
+    made.add("watcher", 3, 12, [flight(30 * T, 5)], START + 17 * T)
+    made.set_tempo(2.0, False)
+    made.take(START + 17 * T)
+    made.add("watcher", 4, 13, [flight(31 * T, 6)], START + 17 * T)
+    made.take(START + 40 * T)
+    made.committed(40, START + 40 * T)
+    made.add("watcher", 5, 41, [flight(90 * T, 7)], START + 40 * T)
+    made.take(START + 41 * T, everything=True)
+    assert made.lateness.count == 4, "what no clock gave a time, and what the end of the run let go, is not late"
 
 
 def test_never_before_its_tick_is_closed() -> None:
@@ -166,3 +192,22 @@ def test_nothing_is_lost_and_a_clients_downlinks_leave_in_order(
     for release in made.take(10**18):
         said[release.client].append(release.number)
     assert said == {client: list(range(1, last + 1)) for client, last in count.items()}
+
+
+def test_a_report_tells_how_late_packets_left() -> None:
+    """One tick is closed 7 ms late, so what was due within it leaves that much later than the clock said."""
+    hub = Hub()
+    hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
+    hub.begin()
+    hub.enter("ear")
+    assert decode_json(report(hub.core))["lateness_ms"] is None
+    hub.commit(0)
+    for name in PERIODS:
+        hub.done(name, 0, *([sent(1, "ear")] if name == "hand" else []))
+    hub.now_ns = T + 7 * MS
+    hub.commit(1)
+    hub.core.wake(hub.now_ns)
+    (down,) = [down for down in hub.said(channels.DOWN) if down.packets]
+    late = hub.now_ns - max(packet.due_ns for packet in down.packets)
+    assert late >= 7 * MS
+    assert decode_json(report(hub.core))["lateness_ms"] == {"p50": late / MS, "p99": late / MS, "max": late / MS}

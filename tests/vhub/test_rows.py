@@ -36,6 +36,7 @@ from foosim.vhub.rows import (
     row_schema,
 )
 from foosim.vhub.to_rows import Entry, edit_row, epoch_entry, packet_entry, plan_of, world_rows
+from tests.vhub.conftest import DOWN_FROM, DOWN_TO
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -166,12 +167,14 @@ def test_a_verdict_can_be_told_from_the_inputs_in_its_row(hub_run: HubRun, entri
     seen = set()
     for row in rows(entries, PacketRow):
         words = draw_words(draw_key(hub_run.deployment.seed, "link", row.source, row.destination), row.sequence)
-        lost = row.cause == "random_loss"
+        lost, early = row.cause == "random_loss", row.cause in ("random_loss", "node_down")
         seen.add((row.rule, row.fate, row.cause))
         assert row.size == len(row.payload)
         assert (row.fate == "dropped") == (row.cause != "")
-        assert (row.due_ns == -1) == (row.arrival_tick == -1) == lost
-        if row.rule == "slow":
+        assert (row.due_ns == -1) == (row.arrival_tick == -1) == early
+        if row.cause == "node_down":
+            assert row.source == "red.attack" and DOWN_FROM <= row.sent_ns // hub_run.deployment.tick_ns < DOWN_TO
+        elif row.rule == "slow":
             assert row.loss_word == row.jitter_word == ""
             assert row.due_ns >= row.sent_ns + 7_000_000
         elif row.rule == "steady":
@@ -183,6 +186,7 @@ def test_a_verdict_can_be_told_from_the_inputs_in_its_row(hub_run: HubRun, entri
     assert {fate for _, fate, _ in seen} == {"delivered", "dropped", "in_flight"}
     assert {rule for rule, _, _ in seen} == {"slow", "steady", "wild"}
     assert {cause for rule, _, cause in seen if rule == "slow"} == {"", "rx_down"}
+    assert "node_down" in {cause for _, _, cause in seen}
 
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
-from foosim.protocol.messages import Tempo, Up
+from foosim.protocol.codec import decode_any, decode_json
+from foosim.protocol.limits import HEARTBEAT_NS
+from foosim.protocol.messages import Farewell, Tempo, Up
+from foosim.vhub.report import LINKS_TOLD_EVERY
 from tests.vhub.test_sessions import PERIODS, Hub, sent
 
 
@@ -48,3 +51,20 @@ def test_what_is_sent_between_ticks_ends_no_wait() -> None:
     before = hub.core.lacking
     hub.say(channels.UP, "ear", Up("ear", "one", [sent(1)]))
     assert hub.core.lacking == before and before[0] is channels.COMMIT
+
+
+def test_heartbeats_share_the_lines_about_links_and_the_farewell_has_its_own() -> None:
+    hub = Hub().begin()
+    hub.enter("ear")
+    counts = []
+    for beat in range(2 * LINKS_TOLD_EVERY + 2):
+        hub.say(channels.UP, "ear", Up("ear", "one", [sent(beat + 1)]))
+        hub.close(beat)
+        hub.said()
+        hub.core.wake(beat * HEARTBEAT_NS)
+        (report,) = (decode_json(each.report) for each in hub.said(channels.HEARTBEAT))
+        counts.append((report["packets"]["offered"], sum(link[2] for link in report["links"])))
+    anew = [beat // LINKS_TOLD_EVERY * LINKS_TOLD_EVERY for beat in range(len(counts))]
+    assert counts == [(beat + 1, told + 1) for beat, told in enumerate(anew)]
+    last = decode_json(decode_any(Farewell, hub.core.farewell().payload).report)
+    assert sum(link[2] for link in last["links"]) == len(counts)

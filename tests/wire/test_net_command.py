@@ -48,5 +48,5 @@ def test_a_partition_by_request_cuts_and_a_heal_joins_again(house: House) -> Non
     one = next(row for row in lost if row.source == "camera")
     code, out, err = house.run("foosim-net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
     assert code == 0, err
-    assert "policy    at sending cut: partition\n" in out
+    assert "policy    at sending cut by request 0, from " in out and ": partition\n" in out
     assert out.endswith("dropped at sending: partition (policy)\n")

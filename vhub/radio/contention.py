@@ -32,19 +32,22 @@ Words = Callable[[int], Sequence[int]]
 Outcome = Literal["ok", "collision", "error", "busy"]
 
 
-class Access(NamedTuple):
+class Access:
     """What became of one transmission on a shared medium."""
 
-    delay_ns: int
-    """From its turn until the frame is whole at the receiver, or is given up."""
-    occupancy_ns: int
-    """From its turn until the medium is free for the next."""
-    retries: int
-    """Attempts after the first."""
-    airtime_ns: int
-    """For which its own frames were on the air, all attempts together, without acknowledgements."""
-    outcome: Outcome
-    """`ok`, or why the last attempt failed; `busy`: the channel was never free."""
+    __slots__ = ("airtime_ns", "delay_ns", "occupancy_ns", "outcome", "retries")
+
+    def __init__(self, delay_ns: int, occupancy_ns: int, retries: int, airtime_ns: int, outcome: Outcome) -> None:
+        self.delay_ns = delay_ns
+        """From its turn until the frame is whole at the receiver, or is given up."""
+        self.occupancy_ns = occupancy_ns
+        """From its turn until the medium is free for the next."""
+        self.retries = retries
+        """Attempts after the first."""
+        self.airtime_ns = airtime_ns
+        """For which its own frames were on the air, all attempts together, without acknowledgements."""
+        self.outcome = outcome
+        """`ok`, or why the last attempt failed; `busy`: the channel was never free."""
 
 
 @dataclass(frozen=True)
@@ -106,10 +109,14 @@ def contention(contenders: int, window: int, doublings: int) -> Contention:
     return Contention(tau, p, chance_threshold(p), (1.0 - p) / n, share)
 
 
-@lru_cache(maxsize=256)
 def _doublings(cw_min: int, cw_max: int) -> int:
     """How often the window doubles, from cw_min + 1 to cw_max + 1."""
     return ((cw_max + 1) // (cw_min + 1)).bit_length() - 1
+
+
+def wifi_contention(contenders: int, timing: WifiTiming, *, unicast: bool) -> Contention:
+    """Return the fixed point that 802.11 frames meet: broadcasts' window does not double."""
+    return contention(contenders, timing.cw_min + 1, _doublings(timing.cw_min, timing.cw_max) if unicast else 0)
 
 
 def wifi_access(

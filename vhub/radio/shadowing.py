@@ -20,6 +20,8 @@ ROOT_WEIGHTS: Final[tuple[float, ...]] = (sqrt(0.3), sqrt(0.4), sqrt(0.3))
 """Square roots of each lattice's share of the variance."""
 CELLS_KEPT: Final = 16_384
 """Of each lattice, at most: a robot that moves about in a cell asks for it again and again."""
+CELL_MAX: Final = 1 << 29
+"""Of cells that are further away nothing is remembered."""
 _LOW_32: Final = 0xFFFF_FFFF
 
 Bilinear = tuple[float, float, float, float]
@@ -40,21 +42,26 @@ class _Lattice:
 
     def __init__(self, key: bytes, number: int, density: float) -> None:
         self._key, self._number, self.density = key, number, density
-        self._cells: dict[tuple[int, int], Bilinear] = {}
+        self._cells: dict[int, Bilinear] = {}
+        """By one number for both of a cell's: a tuple of two costs more to make than all the rest."""
 
     def cell(self, i: int, j: int) -> Bilinear:
         """Return the coefficients of a cell, by its node that is nearest to the origin of its coordinates."""
-        found = self._cells.get((i, j))
-        return self._made(i, j) if found is None else found
+        if not -CELL_MAX < i < CELL_MAX or not -CELL_MAX < j < CELL_MAX:
+            return self._made(i, j)
+        key = i * (2 * CELL_MAX) + j
+        found = self._cells.get(key)
+        if found is None:
+            if len(self._cells) >= CELLS_KEPT:
+                self._cells.clear()
+            found = self._cells[key] = self._made(i, j)
+        return found
 
     def _made(self, i: int, j: int) -> Bilinear:
         key, number = self._key, self._number
         here, east = _node(key, number, i, j), _node(key, number, i + 1, j)
         north, far = _node(key, number, i, j + 1), _node(key, number, i + 1, j + 1)
-        if len(self._cells) >= CELLS_KEPT:
-            self._cells.clear()
-        made = self._cells[i, j] = here, east - here, north - here, here - east - north + far
-        return made
+        return here, east - here, north - here, here - east - north + far
 
 
 class Shadowing:

@@ -31,21 +31,22 @@ class Capacity(Stage):
 
     def at_sending(self, flight: Flight) -> str:
         memory = self._setup.memory
-        flying = [place for place, (_, _, is_evicted) in enumerate(memory.under_way) if not is_evicted]
+        flying = [place for place, (_, _, evicted_by) in enumerate(memory.under_way) if not evicted_by]
         if len(flying) >= self._most:
             place = flying[self._setup.words(flight, CAPACITY_BLOCK)[0] * len(flying) >> 64]
             sequence, copy, _ = memory.under_way[place]
-            memory.under_way[place] = sequence, copy, True
-        memory.under_way.append((flight.sequence, flight.copy, False))
+            memory.under_way[place] = sequence, copy, (flight.sequence, flight.copy, len(flying))
+        memory.under_way.append((flight.sequence, flight.copy, ()))
         return ""
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:
-        evicted = (flight.sequence, flight.copy, True) in self._setup.memory.under_way
-        return EVICTED if evicted else ""
+        for sequence, copy, evicted_by in self._setup.memory.under_way:
+            if evicted_by and sequence == flight.sequence and copy == flight.copy:
+                flight.decided_by = evicted_by
+                return EVICTED
+        return ""
 
 
 def leave(memory: LinkState, flight: Flight) -> None:
     """A packet has arrived, or was dropped at arrival: it is not on its way any more."""
-    for entry in (flight.sequence, flight.copy, False), (flight.sequence, flight.copy, True):
-        if entry in memory.under_way:
-            memory.under_way.remove(entry)
+    memory.under_way = [one for one in memory.under_way if one[0] != flight.sequence or one[1] != flight.copy]

@@ -36,11 +36,13 @@ class Delay(Stage):
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Delay | None:
-        """Return the stage, or None where nothing takes time: such a link is fifo by itself."""
+        """Return the stage, or None where nothing takes time, or ever has: such a link is fifo by itself."""
         settings = setup.settings
         timed = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
         late = settings.jitter is not None or settings.reorder is not None or settings.burst is not None
-        return cls(setup) if timed or late or settings.delay_ns or setup.holds or setup.model is not None else None
+        if timed or late or settings.delay_ns or setup.holds or setup.model is not None:
+            return cls(setup)
+        return Behind(setup) if settings.order == "fifo" and setup.memory.last_due_ns >= 0 else None
 
     def at_sending(self, flight: Flight) -> str:
         spent_ns = flight.phase_ns + flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
@@ -50,7 +52,7 @@ class Delay(Stage):
             due_ns += jitter_ns
         if flight.is_bad:
             due_ns += self._bad_ns
-        is_late = self._extra_ns > 0 and self._is_late(flight)
+        is_late = self._extra_ns > 0 and self.is_late(flight)
         if is_late:
             due_ns += self._extra_ns
         held_ns = self._held_ns(due_ns) if self._holds else due_ns
@@ -64,25 +66,25 @@ class Delay(Stage):
             flight.held_ns = held_ns - due_ns
         return ""
 
-    def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
+    def retime(self, flights: Iterable[tuple[Flight, bool]], now_ns: int) -> None:
         """Give packets on their way, in the order of sending, the due times that the present clogs leave them.
 
-        What is due already and waits for its receiver's tick stays.
+        Each comes with whether those behind it overtake it. What is due already, and waits for its receiver, stays.
         """
         last_ns = -1
-        for flight in flights:
+        for flight, is_late in flights:
             if flight.due_ns < now_ns:
                 continue
             free_ns = flight.due_ns - flight.held_ns
             flight.due_ns = self._held_ns(free_ns)
-            if not self._is_late(flight):
+            if not is_late:
                 last_ns = flight.due_ns = self._in_order(flight.due_ns, last_ns)
             flight.held_ns = flight.due_ns - free_ns
         if self._fifo:
             self._memory.last_due_ns = max(last_ns, min(self._memory.last_due_ns, now_ns))
 
-    def _is_late(self, flight: Flight) -> bool:
-        """Whether those behind it overtake it."""
+    def is_late(self, flight: Flight) -> bool:
+        """Whether those behind a packet that was sent by these settings overtake it."""
         return self._extra_ns > 0 and flight.words[Slot.REORDER] < self._reordered
 
     def _held_ns(self, due_ns: int) -> int:
@@ -94,3 +96,14 @@ class Delay(Stage):
 
     def _in_order(self, due_ns: int, last_ns: int) -> int:
         return max(due_ns, last_ns + 1) if self._fifo else due_ns
+
+
+class Behind(Delay):
+    """Nothing takes time any more: what is sent comes behind what was sent when something did, and else at once."""
+
+    def at_sending(self, flight: Flight) -> str:
+        memory, due_ns = self._memory, flight.sent_ns
+        if due_ns <= memory.last_due_ns:
+            due_ns = memory.last_due_ns = memory.last_due_ns + 1
+        flight.due_ns = due_ns
+        return ""

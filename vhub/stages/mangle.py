@@ -43,7 +43,7 @@ class Mangle(Stage):
 
     def at_sending(self, flight: Flight) -> str:
         words, bits = flight.words, 8 * len(flight.payload)
-        if self._error_rate and bits and words[Slot.CORRUPT] < self._threshold(bits):
+        if self._error_rate and bits and words[Slot.CORRUPT] < self.threshold(bits):
             if not self._delivers:
                 return CRC_FAIL
             self._flip(flight, bits)
@@ -52,7 +52,7 @@ class Mangle(Stage):
             self._setup.memory.copies += 1
         return ""
 
-    def _threshold(self, bits: int) -> int:
+    def threshold(self, bits: int) -> int:
         """Return the probability of any error in so many bits, in units of 2^-64."""
         found = self._thresholds.get(bits)
         if found is None:

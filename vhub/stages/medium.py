@@ -111,11 +111,12 @@ class OnAir(Stage):
 
     def __init__(self, setup: LinkSetup) -> None:
         assert setup.budget is not None and setup.air is not None
-        self._setup, self._settings = setup, setup.settings
+        self._setup, self._settings, self._shared = setup, setup.settings, setup.shared
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
         self._once, self._factor = setup.sends_once, setup.settings.spreading_factor
+        self._is_limited = setup.settings.duty_cycle < 1.0
 
     def at_sending(self, flight: Flight) -> str:
         cause = self._budget.measure(flight)
@@ -152,18 +153,22 @@ class OnAir(Stage):
         ready_ns = flight.sent_ns + flight.phase_ns
         ready_ns = max(ready_ns, sender.free_ns)
         start_ns, flight.contenders = self.turn(ready_ns)
-        (delay_ns, occupancy_ns, retries, _, outcome), air_ns = self.access(flight, broadcast, UNIT if cause else None)
-        end_ns, until_ns = start_ns + delay_ns, start_ns + occupancy_ns
+        access, air_ns = self.access(flight, broadcast, UNIT if cause else None)
+        delay_ns, outcome = access.delay_ns, access.outcome
+        end_ns, until_ns = start_ns + delay_ns, start_ns + access.occupancy_ns
         flight.air_start_ns, flight.air_end_ns = end_ns - air_ns, end_ns
         flight.airtime_ns = airtime_ns = air_ns if air_ns < delay_ns else delay_ns
         flight.access_ns = end_ns - ready_ns - airtime_ns
-        flight.retries = retries
+        flight.retries = access.retries
         if outcome == "ok":
             flight.is_settled = self.is_acknowledged and not broadcast
         else:
             flight.outcome = COLLISION if outcome in ("collision", "busy") else SNR
         sender.free_ns = until_ns
-        sender.waiting.append((until_ns, len(flight.payload)))
+        settings = self._shared if broadcast else self._settings
+        sender.waiting.append((until_ns, len(flight.payload) + settings.overhead_bytes))
+        if self._is_limited:
+            sender.tokens_ns = max(0, sender.tokens_ns - access.airtime_ns)
         of = self._budget.propagation
         what = source, flight.sequence, flight.copy, end_ns - air_ns, end_ns, until_ns
         air.register(Transmission(*what, of.place(source).at, of.power_cdbm, self._factor))
@@ -181,8 +186,9 @@ class OnAir(Stage):
 
         `lost` is the threshold for errors of a packet that cannot get through; None where the signal decides.
         """
-        rate_bps = flight.rate_bps = self._settings.rate_bps or 0
-        airtime_ns = serialisation_ns(len(flight.payload) + self._settings.overhead_bytes, rate_bps) if rate_bps else 0
+        settings = self._shared if broadcast else self._settings
+        rate_bps = flight.rate_bps = settings.rate_bps or 0
+        airtime_ns = serialisation_ns(len(flight.payload) + settings.overhead_bytes, rate_bps) if rate_bps else 0
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
     def _words(self, flight: Flight, broadcast: bool) -> Words:
@@ -295,7 +301,8 @@ class LrWpan(OnAir):
             threshold = errors.per_threshold(LRWPAN_MODE, flight.snr_cdb, size + LRWPAN_OVERHEAD_BYTES)
             flight.error_threshold = threshold
         words = self._words(flight, broadcast)
-        return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
+        access = csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing)
+        return access, min(airtime_ns, access.delay_ns)  # not before its turn; never where it found no free channel
 
 
 class LoRa(OnAir):

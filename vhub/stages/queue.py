@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Final
 
+from foosim.protocol.radios import Radio
 from foosim.vhub.memory import RadioState, Sending
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
@@ -19,16 +20,23 @@ QUEUE_FULL: Final = "queue_full"
 CODEL: Final = "queue_codel"
 
 
+class Limits:
+    """What may wait: a radio's limits for what it sends once for all, a link's for the rest."""
+
+    def __init__(self, settings: Radio) -> None:
+        queue = settings.queue
+        self.packets, self.bytes_max, self.wait_ns = queue.packets, queue.bytes_max, queue.wait_ns
+        self.codel = queue.drop == "codel"
+        self.target_ns, self.interval_ns = queue.codel_target_ns, queue.codel_interval_ns
+        self.overhead = settings.overhead_bytes
+
+
 class Queue(Stage):
     """Decides whether a packet may wait, and how long."""
 
     def __init__(self, setup: LinkSetup) -> None:
-        queue = setup.settings.queue
         self._sender = setup.sender
-        self._packets, self._bytes, self._wait_ns = queue.packets, queue.bytes_max, queue.wait_ns
-        self._codel = queue.drop == "codel"
-        self._target_ns, self._interval_ns = queue.codel_target_ns, queue.codel_interval_ns
-        self._overhead = setup.settings.overhead_bytes
+        self._own, self._shared = Limits(setup.settings), Limits(setup.shared)
         self._broadcasts = setup.sends_once
 
     @classmethod
@@ -44,6 +52,7 @@ class Queue(Stage):
             shared = sender.sending(flight.sequence, flight.copy)
             if shared is not None:
                 flight.queue_bytes, flight.queue_ns = shared.queue_bytes, shared.queue_ns
+                flight.decided_by = shared.decided_by
                 return shared.cause
         now_ns, waiting = flight.sent_ns + flight.phase_ns, sender.waiting
         while waiting and waiting[0][0] <= now_ns:
@@ -52,23 +61,34 @@ class Queue(Stage):
         for _, size in waiting:
             queued += size
         wait_ns = sender.free_ns - now_ns if sender.free_ns > now_ns else 0
-        cause = self._judge(len(waiting), queued + len(flight.payload) + self._overhead, now_ns, wait_ns)
+        limits = self._shared if broadcast else self._own
+        cause = self._judge(limits, len(waiting), queued + len(flight.payload) + limits.overhead, now_ns, wait_ns)
         flight.queue_bytes, flight.queue_ns = queued, wait_ns
+        if cause:
+            flight.decided_by = self._numbers(limits, cause, len(waiting), now_ns + wait_ns)
         if broadcast:
             sender.last = Sending(flight.sequence, flight.copy, cause, queued, wait_ns)
+            sender.last.decided_by = flight.decided_by
         return cause
 
-    def _judge(self, packets: int, size: int, now_ns: int, wait_ns: int) -> str:
-        if packets >= self._packets or size > self._bytes:
-            return QUEUE_FULL
-        if wait_ns > self._wait_ns:
-            return EXPIRED
-        return CODEL if self._codel and self._drops(now_ns + wait_ns, wait_ns, packets) else ""
+    def _numbers(self, limits: Limits, cause: str, packets: int, leaves_ns: int) -> tuple[int, ...]:
+        """Return by what a packet is dropped: how many wait; of CoDel also since when too long, and its count."""
+        if cause != CODEL:
+            return (packets,)
+        since_ns = self._sender.first_above_ns - limits.interval_ns
+        return packets, leaves_ns - since_ns, self._sender.drop_count
 
-    def _drops(self, now_ns: int, wait_ns: int, packets: int) -> bool:
+    def _judge(self, limits: Limits, packets: int, size: int, now_ns: int, wait_ns: int) -> str:
+        if packets >= limits.packets or size > limits.bytes_max:
+            return QUEUE_FULL
+        if wait_ns > limits.wait_ns:
+            return EXPIRED
+        return CODEL if limits.codel and self._drops(limits, now_ns + wait_ns, wait_ns, packets) else ""
+
+    def _drops(self, limits: Limits, now_ns: int, wait_ns: int, packets: int) -> bool:
         """Apply CoDel's law of control to a packet that leaves the queue at `now_ns` (RFC 8289, 5.5 and 5.6)."""
         sender = self._sender
-        above = self._is_above(now_ns, wait_ns, packets)
+        above = self._is_above(limits, now_ns, wait_ns, packets)
         if sender.is_dropping:
             if not above:
                 sender.is_dropping = False
@@ -76,29 +96,30 @@ class Queue(Stage):
             if now_ns < sender.drop_next_ns:
                 return False
             sender.drop_count += 1
-            sender.drop_next_ns = self._law(sender.drop_next_ns)
+            sender.drop_next_ns = self._law(limits, sender.drop_next_ns)
             return True
         if not above:
             return False
         sender.is_dropping = True
-        recent = now_ns - sender.drop_next_ns < 16 * self._interval_ns and sender.drop_count > 2
-        sender.drop_count = sender.drop_count - 2 if recent else 1
-        sender.drop_next_ns = self._law(now_ns)
+        gained = sender.drop_count - sender.last_count
+        is_recent = now_ns - sender.drop_next_ns < 16 * limits.interval_ns
+        sender.drop_count = sender.last_count = gained if is_recent and gained > 1 else 1
+        sender.drop_next_ns = self._law(limits, now_ns)
         return True
 
-    def _is_above(self, now_ns: int, wait_ns: int, packets: int) -> bool:
+    def _is_above(self, limits: Limits, now_ns: int, wait_ns: int, packets: int) -> bool:
         """Whether waits have been above the target for an interval; a queue of one packet never is."""
         sender = self._sender
-        if wait_ns < self._target_ns or packets <= 1:
+        if wait_ns < limits.target_ns or packets <= 1:
             sender.first_above_ns = 0
             return False
         if sender.first_above_ns == 0:
-            sender.first_above_ns = now_ns + self._interval_ns
+            sender.first_above_ns = now_ns + limits.interval_ns
             return False
         return now_ns >= sender.first_above_ns
 
-    def _law(self, time_ns: int) -> int:
-        return time_ns + int(self._interval_ns / sqrt(sender_count(self._sender)))
+    def _law(self, limits: Limits, time_ns: int) -> int:
+        return time_ns + int(limits.interval_ns / sqrt(sender_count(self._sender)))
 
 
 def sender_count(sender: RadioState) -> int:

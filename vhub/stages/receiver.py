@@ -14,7 +14,7 @@ RECEIVER_FULL: Final = "rx_full"
 
 
 class Receiver(Stage):
-    """Is told of a robot's flag `down` in the newest frame, of clients that have left, of full messages."""
+    """Is told of bodies that are out of service in the newest frame, of clients that have left, of full messages."""
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Receiver:

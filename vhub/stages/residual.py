@@ -11,7 +11,7 @@ from typing import Final
 
 from foosim.protocol.draws import Slot, chance_threshold, draw_key
 from foosim.protocol.impairments import Burst, GilbertElliott, Markov4
-from foosim.vhub.episodes import Episodes, episodes_of_burst, episodes_of_outages
+from foosim.vhub.episodes import Episodes
 from foosim.vhub.memory import LinkState
 from foosim.vhub.packet import Flight
 from foosim.vhub.setup import LinkSetup
@@ -22,6 +22,12 @@ RANDOM_LOSS: Final = "random_loss"
 BURST_LOSS: Final = "burst_loss"
 CHAIN_BLOCK: Final = 1
 """The block of a packet's draws of which the first word moves a chain on."""
+GOOD: Final = 0
+BAD: Final = 1
+"""The states of two; of four they are the good one and a burst, so that an event may change one model to the other."""
+BETWEEN: Final = 2
+SINGLE: Final = 3
+"""Of four states: a delivery within a burst, and a single loss. Of two these are good."""
 
 
 class Residual(Stage):
@@ -33,11 +39,15 @@ class Residual(Stage):
         self._burst = chance_threshold(good_loss), chance_threshold(bad_loss)
         self._any = tuple(chance_threshold(state + (1.0 - state) * loss) for state in (good_loss, bad_loss))
         outages = setup.settings.outages
-        self._outages = None if outages is None else episodes_of_outages(_time_key(setup, "outages"), outages)
+        self._outages = None if outages is None else setup.times.of_outages(_time_key(setup, "outages"), outages)
 
     def is_bad(self, flight: Flight) -> bool:
         """Whether the packet meets the link in its bad state."""
         return False
+
+    def is_out(self, sent_ns: int) -> bool:
+        """Whether a time is one of the link's outages, in which all is lost."""
+        return self._outages is not None and self._outages.is_bad(sent_ns)
 
     def threshold(self, *, bad: bool) -> int:
         """Return the number below which a packet's draw loses it, in the good or the bad state."""
@@ -75,22 +85,24 @@ class ByPacket(Residual):
 
     def is_bad(self, flight: Flight) -> bool:
         memory = self._memory
-        if self._setup.words(flight, CHAIN_BLOCK)[0] < self._leaves[memory.chain]:
-            memory.chain = 1 - memory.chain
-        return memory.chain == 1
+        state = BAD if memory.chain == BAD else GOOD
+        if self._setup.words(flight, CHAIN_BLOCK)[0] < self._leaves[state]:
+            state = BAD - state
+        memory.chain = state
+        return state == BAD
 
 
 class FourStates(Residual):
-    """States 0 good, 1 a delivery within a burst, 2 a burst, 3 a single loss: lost are 2 and 3."""
+    """Good, a burst, a delivery within a burst, a single loss: lost is what meets the second or the last."""
 
     def __init__(self, setup: LinkSetup, chain: Markov4) -> None:
         super().__init__(setup, 0.0, 1.0)
         self._memory: LinkState = setup.memory
         self._steps: tuple[tuple[tuple[float, int], ...], ...] = (
-            ((chain.p14, 3), (chain.p13, 2)),
-            ((chain.p23, 2),),
-            ((chain.p31, 0), (chain.p32, 1)),
-            ((1.0, 0),),
+            ((chain.p14, SINGLE), (chain.p13, BAD)),
+            ((chain.p31, GOOD), (chain.p32, BETWEEN)),
+            ((chain.p23, BAD),),
+            ((1.0, GOOD),),
         )
 
     def is_bad(self, flight: Flight) -> bool:
@@ -101,7 +113,7 @@ class FourStates(Residual):
             if word < chance_threshold(min(1.0, below)):
                 memory.chain = state
                 break
-        return memory.chain >= 2
+        return memory.chain in {BAD, SINGLE}
 
 
 def chain_of_burst(burst: Burst) -> GilbertElliott:
@@ -129,7 +141,7 @@ def make_residual(setup: LinkSetup) -> Residual | None:
         return FourStates(setup, settings.markov4)
     burst = settings.burst
     if burst is not None:
-        return InTime(setup, episodes_of_burst(_time_key(setup, "burst"), burst), burst.bad_loss)
+        return InTime(setup, setup.times.of_burst(_time_key(setup, "burst"), burst), burst.bad_loss)
     return Residual(setup) if settings.loss > 0.0 or settings.outages is not None else None
 
 

@@ -5,7 +5,7 @@ Neighbours: the table of all stages (`stages`), `links` (calls the hooks that th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from foosim.vhub.packet import Flight
 
@@ -25,11 +25,11 @@ class Stage:
         return ""
 
 
-def sending_hooks(stages: Iterable[Stage]) -> list[Callable[[Flight], str]]:
-    """Return the hooks at sending of stages that have one of their own, in their order."""
-    return [stage.at_sending for stage in stages if type(stage).at_sending is not Stage.at_sending]
+def at_sending(stages: Iterable[Stage]) -> list[Stage]:
+    """Return the stages that have a hook of their own at sending, in their order."""
+    return [stage for stage in stages if type(stage).at_sending is not Stage.at_sending]
 
 
-def arrival_hooks(stages: Iterable[Stage]) -> list[Callable[[Flight, str], str]]:
-    """Return the hooks at arrival of stages that have one of their own, in their order."""
-    return [stage.at_arrival for stage in stages if type(stage).at_arrival is not Stage.at_arrival]
+def at_arrival(stages: Iterable[Stage]) -> list[Stage]:
+    """Return the stages that have a hook of their own at arrival, in their order."""
+    return [stage for stage in stages if type(stage).at_arrival is not Stage.at_arrival]

@@ -1,0 +1,137 @@
+"""What radios do not do is refused: in what is said of a radio, of rules over it, of events and requests for these."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import pytest
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import apply_sets, load_deployment, load_network
+from foosim.protocol.errors import DeploymentError
+from foosim.protocol.network_request import BadEvent, event_text
+from foosim.protocol.presets import PRESETS
+from tests.links.offered import TABLE, deployment_of
+
+EVERYBODY: Final = ("network.robots={'*': [r]}", "network.places={'*': [0 m, 0 m, 1 m]}")
+
+
+def refusal(*sets: str) -> str:
+    with pytest.raises(DeploymentError) as caught:
+        deployment_of(*sets)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("radio", "problem"),
+    [
+        ("preset: wifi_5_indoor, rate: 1 Mbit/s",
+         "rate: has no effect over wifi: a radio's bit rate is its own: write `rates: fixed` and `fixed_rate` there"),
+        ("preset: zigbee, rate: 20 kbit/s", "rate: has no effect over ieee802154: a radio's bit rate is 250 kbit/s"),
+        ("preset: lora_eu868, rate: 20 bit/s", "over lora: a radio's bit rate is that of its `spreading_factor`"),
+        ("preset: wired_1g, medium: lte", "over lte: a radio's bit rate is that of its signal and `bandwidth`"),
+        ("preset: lte, trace: {file: t.mahi}", "trace: has no effect over lte"),
+        ("preset: acoustic, trace: {file: t.mahi}", "trace: has no effect over radio: write `rate`, a mapping of 1"),
+        ("preset: wifi_5_indoor, overhead: 1000 B", "overhead: has no effect over wifi, whose headers count already"),
+        ("preset: wifi_5_indoor, fixed_rate: 6 Mbit/s", "fixed_rate: has no effect without `rates: fixed`"),
+        ("preset: zigbee, fixed_rate: 6 Mbit/s", "fixed_rate: has no effect on ieee802154, it is of wifi"),
+        ("preset: wifi_5_indoor, spreading_factor: 9", "spreading_factor: has no effect on wifi, it is of lora"),
+        ("preset: wifi_5_indoor, bandwidth: 80 MHz",
+         "bandwidth: not a bandwidth of 802.11a/g here, which has 20 MHz or 10 MHz, '80 MHz', nearest is '20 MHz'"),
+        ("preset: wifi_5_indoor, duty_cycle: 1 %",
+         "not to be had on wifi, whose airtime is not known before it is used; lora has it, and radio, '1 %'"),
+        ("preset: range_only, duty_cycle: 1 %", "duty_cycle: has no effect without `rate`: packets take no time"),
+        ("preset: lora_eu868, spreading_factor: 9, mtu: 116 B",
+         "mtu: more than the 115 B of LoRaWAN at spreading factor 9, '116 B'"),
+    ],
+)  # fmt: skip
+def test_a_radio_is_not_asked_for_what_it_does_not_do(radio: str, problem: str) -> None:
+    assert problem in refusal(f"network.radios={{r: {{{radio}}}}}")
+    with pytest.raises(DeploymentError, match=r"radios\.r"):
+        load_network(f"network: {{radios: {{r: {{{radio}}}}}}}", "t")
+
+
+@pytest.mark.parametrize(
+    "radio",
+    [*(f"preset: {preset}" for preset in PRESETS), "preset: wifi_5_indoor, rates: fixed, fixed_rate: 12 Mbit/s",
+     "preset: dot11p, rates: ideal", "preset: wifi_5_indoor, bandwidth: 10 MHz", "preset: lte, overhead: 40 B",
+     "preset: acoustic, duty_cycle: 1 %, rate: 1 kbit/s", "preset: lora_eu868, spreading_factor: 9, mtu: 115 B"],
+)  # fmt: skip
+def test_a_radio_is_asked_for_what_it_does(radio: str) -> None:
+    deployment_of(f"network.radios={{r: {{{radio}}}}}")
+
+
+def test_the_payloads_of_lora_are_as_long_as_its_spreading_factor_lets_them() -> None:
+    for factor, longest in zip(range(7, 13), (222, 222, 115, 51, 51, 51), strict=True):
+        made = deployment_of(f"network.radios={{r: {{preset: lora_eu868, spreading_factor: {factor}}}}}")
+        assert made.network.radios["r"].payload_max == longest
+
+
+def ruled(radio: str, rule: str, *sets: str) -> tuple[str, ...]:
+    return (f"network.radios={{r: {{{radio}}}}}", f"network.links=[{{id: l, {rule}}}]", *EVERYBODY, *sets)
+
+
+@pytest.mark.parametrize("via", ["via: r, ", ""])
+@pytest.mark.parametrize(
+    ("radio", "settings", "problem"),
+    [
+        ("preset: wifi_5_indoor", "rate: 6 Mbit/s", "links[0]: via r, has no effect over wifi: a radio's bit rate is"),
+        ("preset: lora_eu868", "trace: {file: t}", "links[0]: via r, has no effect over lora"),
+        ("preset: zigbee", "overhead: 9 B", "links[0]: via r, has no effect over ieee802154, whose headers"),
+        ("preset: lora_eu868, spreading_factor: 12", "mtu: 52 B", "via r, more than the 51 B of LoRaWAN at spreading"),
+    ],
+)
+def test_a_rule_is_obeyed_by_the_radio_that_it_goes_by(via: str, radio: str, settings: str, problem: str) -> None:
+    assert problem in refusal(*ruled(radio, f"from: a, to: b, {via}{settings}"))
+    key = settings.partition(":")[0]
+    events = f"network.events=[{{at: 1 s, set: {{link: l, {settings}}}}}]"
+    assert "events[0].set: via r" in refusal(*ruled(radio, f"from: a, to: b, {via}loss: 1 %", events))
+    made = deployment_of(*ruled(radio, f"from: a, to: b, {via}loss: 1 %"))
+    value = {"file": "t"} if key == "trace" else settings.partition(": ")[2]
+    with pytest.raises(BadEvent, match=r"set: via r, "):
+        event_text(made, {"set": {"link": "l", key: value}}, 10**9)
+
+
+def test_a_rule_whose_packets_go_by_a_wire_has_a_rate() -> None:
+    """Also where others of the same ends go by radio, by another rule."""
+    radio = "network.radios={r: {preset: wifi_5_indoor}, w: {preset: wired_1g}}"
+    wire = "{id: wire, from: a, to: b, via: w, rate: 1 Mbit/s}"
+    behind = "{id: rest, from: a, to: b, rate: 1 Mbit/s}"
+    carried = "network.robots={a: [r, w], b: [w], '*': [r]}"
+    deployment_of(radio, carried, EVERYBODY[1], f"network.links=[{wire}, {behind}]")
+    sets = "network.robots={a: [w], b: [w]}", f"network.links=[{wire}]", "network.links.wire.rate='2 Mbit/s'"
+    deployment_of(radio, *sets)
+
+
+# --- who is on air is somewhere ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sets", "problem"),
+    [
+        (("network.radios={r: {preset: wifi_5_indoor}}", "network.links=[{id: l, from: a, to: b, via: r}]"),
+         "network.links[0].via: goes by radio to or from a, which is nowhere: write network.places.a or its `on`, 'r'"),
+        (("network.radios={r: {preset: wifi_5_indoor}}", "network.links=[{id: l, from: a, to: b, via: r}]",
+          "network.robots={a: [r]}", "network.places={a: [0 m, 0 m, 1 m]}"), "network.places.b"),
+        (("network.defaults={preset: zigbee}",),
+         "network.defaults.preset: goes by radio to or from a, which is nowhere: write network.places.a"),
+    ],
+)  # fmt: skip
+def test_who_goes_by_radio_has_a_place(sets: tuple[str, ...], problem: str) -> None:
+    assert problem in refusal(*sets)
+    deployment_of(*sets, "network.places={'*': [0 m, 0 m, 1 m]}")
+
+
+def test_who_never_meets_a_radio_needs_no_place() -> None:
+    """A rule before takes all of its packets."""
+    before = "{id: wire, between: ['?', '*'], delay: 1 ms}, {id: seen, between: [camera, '*'], delay: 2 ms}"
+    behind = "{id: l, from: '*', to: '*', via: r}"
+    deployment_of("network.radios={r: {preset: wifi_5_indoor}}", f"network.links=[{before}, {behind}]")
+
+
+def test_a_partition_has_two_groups() -> None:
+    what = "network.events[0].partition: fewer than two groups, as in [[a, b], [rest]], a list of 1"
+    assert what in refusal("network.events=[{at: 1 s, partition: [[camera]]}]")
+    made: Deployment = load_deployment(apply_sets(TABLE.read_text(), "t", []), "t")
+    with pytest.raises(BadEvent, match="partition: fewer than two groups"):
+        event_text(made, {"partition": [["camera"]]}, 10**9)
