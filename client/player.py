@@ -153,12 +153,12 @@ class PlayerLoop:
         self._branch = core.branch
         if core.go is not None:
             self.newest.take(core.go.packets)
-            core.done(self._act(core.go.tick))
+            self._say(core.go.tick, now_ns)
         elif self._period_ns:
             self.newest.take(core.arrivals)
             core.arrivals.clear()
             if now_ns >= self._beat_ns and not core.is_away:
-                core.send(self._act(max(core.tick, 0)), now_ns)
+                self._say(max(core.tick, 0), now_ns)
                 self._beat_ns = max(self._beat_ns + self._period_ns, now_ns)
 
     @property
@@ -198,6 +198,17 @@ class PlayerLoop:
         except Exception as error:
             what = f"{declared.class_} cannot be made: {_describe(error)}"
             raise PlayerError(f"player {self.core.name}: {what}") from error
+
+    def _say(self, tick: int, now_ns: int) -> None:
+        """Have the player act, and say it."""
+        core, packets = self.core, self._act(tick)
+        try:
+            if core.go is not None:
+                core.done(packets)
+            else:
+                core.send(packets, now_ns)
+        except PacketError as error:
+            raise PlayerError(f"player {core.name} at tick {tick}: {error}") from error
 
     def _act(self, tick: int) -> list[Outgoing]:
         """Ask the player, and check what it says and commands; commands are last, in the robots' name order."""

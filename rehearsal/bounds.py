@@ -42,6 +42,7 @@ BOUNDS: Final[Mapping[str, int]] = {
     "Fabric._links": limits.CLIENTS_MAX,
     "Fabric.radios": limits.CLIENTS_MAX,
     "HubState._receivers": limits.ENTITIES_MAX,
+    "Transit._by_source": limits.ENTITIES_MAX,
     "HubState._flights": 1 << 14,  # by tick all that arrives then: each of many clients may hear all others
     "Air._flights": 1 << 14,  # what is on air: of a broadcast one for each who hears it
     "AirState.on_air": 1 << 14,

@@ -12,8 +12,9 @@ import pytest
 
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PlayerError
+from foosim.client.packets import Outgoing
 from foosim.client.payloads import BallPosition, Command, RodPosition
-from foosim.client.player import Commands, PlayerLoop, Samples, load_player
+from foosim.client.player import Commands, PlayerLoop, Samples, Turn, load_player
 from foosim.client.players import Team
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
@@ -174,6 +175,18 @@ def test_what_a_player_must_not_do_ends_it(commands: Any, text: str) -> None:
     assert str(error.value) == f"player {NAME} at tick 5: {text}"
     assert error.value.exit_code == 1
     assert said(loop) == []
+
+
+def test_whoever_says_too_much_at_once_is_named() -> None:
+    loop = begun()
+    much = Outgoing("", "talk", bytes(32 * 1024))
+    Scripted.made[-1].commands = Turn({}, [much] * 40)
+    with pytest.raises(PlayerError, match=rf"^player {NAME} at tick 5: \d+ bytes in one answer, at most 1048576"):
+        go(loop, 1)
+    free = begun("players.player-red.lockstep=false")
+    Scripted.made[-1].commands = Turn({}, [Outgoing("", "talk", b"")] * 65_537)
+    with pytest.raises(PlayerError, match=rf"^player {NAME} at tick 0: 65537 packets at once, at most 65536"):
+        free.step(10_000_000)
 
 
 def test_a_player_that_cannot_be_made_says_why() -> None:

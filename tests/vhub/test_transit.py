@@ -11,10 +11,14 @@ import pytest
 from foosim.protocol import limits
 from foosim.protocol.journal import Journal, JournalError, read_journal
 from foosim.protocol.messages import Sent
+from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.explain import PacketName, explain_packet
 from foosim.vhub.state import HubState
 from tests.links.offered import Hub, deployment_of
+from tests.vhub.conftest import drive, write_capture
 
-MOST: Final = 64 * 1024
+KIB: Final = 1024
+MOST: Final = 64 * KIB
 SIZE: Final = 1000
 HELD: Final = MOST // 2 // (limits.FLIGHT_HEAD_BYTES + SIZE)
 CLOG: Final = "network.events=[{at: 0 s, clog: {from: a, to: b}, for: 10 ms}]"
@@ -44,6 +48,18 @@ def test_a_clog_holds_back_a_share_and_costs_others_nothing(restarts: bool, monk
     assert hub.state.packets.in_flight == 0
     hub.close({"a": words("b", range(101, 101 + HELD))})
     assert hub.state.packets.in_flight == HELD, "there is room again"
+
+
+def test_explain_says_that_there_was_no_room(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(limits, "TRANSIT_BYTES_MAX", 2 * KIB)
+    run = drive(12)
+    capture = open_capture(write_capture(tmp_path / "run.mcap", run))
+    fates = [flight for closing in run.closings for flight in closing.fates]
+    flight = next(flight for flight in fates if flight.cause == "transit_full")
+    which = PacketName(flight.source, flight.sequence, flight.destination, flight.copy)
+    explained = explain_packet(capture, which)
+    assert explained.verdict == "dropped at sending: transit_full (receiver)" and explained.agrees
+    assert explained.steps[-1].text == "what is on its way in the whole run leaves no room for it: transit_full"
 
 
 def test_a_record_that_is_too_large_is_a_journal_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
