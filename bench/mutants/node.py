@@ -74,7 +74,7 @@ def _zombie(planting: Planting) -> None:
     planting.swap(NodeCore, "_begin_anew", lambda self, epoch: None)
 
 
-@register("node keeps its own frame", "a node takes its own frame c only if D(c) fits", 1)
+@register("node keeps its own frame", "a node takes its own frame c only if D(c) fits", 2)
 def _own_frame(planting: Planting) -> None:
     def on_epoch(self: Any, epoch: Any, payload: bytes, now_ns: int) -> None:
         newest = self.frame
@@ -186,7 +186,7 @@ def _numbers_from_one(planting: Planting) -> None:
     before: Any = planting.swap(ClientCore, "_numbered", numbered)
 
 
-@register("inputs are kept for ever", "what a process keeps is bounded (node)", 1)
+@register("inputs are kept for ever", "what a process keeps is bounded (node)", 3)
 def _kept_inputs(planting: Planting) -> None:
     planting.swap(Inputs, "forget", lambda self, tick: None)
 
