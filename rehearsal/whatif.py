@@ -160,6 +160,7 @@ class _Compared:
 
     def __init__(self, capture: CaptureData) -> None:
         self._path = capture.path
+        self._is_part = bool(caveats(capture))
         self._rows: dict[Key, PacketRow] = {}
         """Those whose packets have no other fate yet."""
         self._packets = self._changed = self._inputs_changed = 0
@@ -189,7 +190,7 @@ class _Compared:
         """Take a packet whose fate is final, or that is in flight at the end."""
         key = flight.source, flight.sequence, flight.destination, flight.copy
         before = self._rows.pop(key, None)
-        if before is None and not flight.copy:
+        if before is None and not flight.copy and self._is_part:
             return  # its row is behind the end of a part: another receiver's says that it was sent
         flight.released_wall_ns = 0 if before is None else before.wall_released_ns
         after = packet_row(flight)

@@ -28,7 +28,7 @@ class Transit:
     def takes(self, flight: Flight) -> bool:
         """Whether there is room for one more, which is on its way then."""
         source, by_source = flight.source, self._by_source
-        size = FLIGHT_HEAD_BYTES + len(flight.payload) + len(flight.mangled)
+        size = _size_of(flight)
         whole, own = self._bytes + size, by_source.get(source, 0) + size
         if whole > self._common_bytes and own > self._share_bytes:
             return False
@@ -37,12 +37,16 @@ class Transit:
 
     def restored(self, flight: Flight) -> None:
         """One is on its way, as the state says that was written down."""
-        size = FLIGHT_HEAD_BYTES + len(flight.payload) + len(flight.mangled)
+        size = _size_of(flight)
         self._bytes += size
         self._by_source[flight.source] = self._by_source.get(flight.source, 0) + size
 
     def arrived(self, flight: Flight) -> None:
         """One is on its way no more."""
-        size = FLIGHT_HEAD_BYTES + len(flight.payload) + len(flight.mangled)
+        size = _size_of(flight)
         self._bytes -= size
         self._by_source[flight.source] -= size
+
+
+def _size_of(flight: Flight) -> int:
+    return FLIGHT_HEAD_BYTES + len(flight.payload) + len(flight.mangled)
