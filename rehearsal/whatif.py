@@ -240,11 +240,14 @@ def _judged(capture: CaptureData, deployment: Deployment, offers: Offers, frames
     with world_of(capture, frames) as frame_of:
         for offered in offers.ticks():
             frame = frame_of(offered)
+            owing = [row.client for row in offered.came if row.event == "leaves_owing"]
             for row in offered.came:
                 _come_and_go(state, row)
             edits = [edit_of(edit) for edit in offered.edits]
             fates: list[Flight] = []
             state.close_world(frame, [offered.robots[key] for key in sorted(offered.robots)], fates, edits)
+            for name in owing:
+                state.leave(name)
             admitted: dict[str, list[Sent]] = {}
             for (source, _), sent in sorted(offered.clients.items()):
                 admitted.setdefault(source, []).append(sent)
@@ -258,6 +261,6 @@ def _judged(capture: CaptureData, deployment: Deployment, offers: Offers, frames
 def _come_and_go(state: HubState, row: ClientRow) -> None:
     if row.event == "leaves":
         state.leave(row.client)
-    else:
+    elif row.event == "joins":
         heard = [(heard.source, heard.channel) for heard in row.subscriptions]
         state.join(Joining(row.client, row.period, heard), row.tick)

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Final
 
 from foosim.protocol.errors import Failed
-from foosim.supervisor.children import GRACE_S, child_environment, script
-from foosim.supervisor.remote import Remote
+from foosim.supervisor.children import BY_SIGNAL, GRACE_S, child_environment, script
+from foosim.supervisor.remote import SSH_FAILED, Remote
 
 POLL_S: Final = 0.02
 LINES: Final = 30
@@ -55,6 +55,12 @@ class Child:
         if self.remote is not None and code > 0:
             return f"ended: {self.remote.why(code, self._tail(LINES))}"
         return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+
+    @property
+    def is_killed(self) -> bool:
+        """Whether a signal ended it: of itself it would not have."""
+        code = self.exit_code or 0
+        return code < 0 or (self.remote is not None and code > BY_SIGNAL and code != SSH_FAILED)
 
     @property
     def is_away(self) -> bool:

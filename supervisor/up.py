@@ -341,7 +341,7 @@ class Up:
         return SUPERVISOR not in self._restarts.failed
 
     def _restart_ended(self, now_s: float, knows: bool = False) -> None:
-        """Start nodes and the vHub again that ended while the run goes on; who ends again and again is given up.
+        """Start nodes, players and the vHub again that ended while the run goes on; who ends too often is given up.
 
         `knows`: a status has just told which nodes are stopped.
         """
@@ -361,7 +361,8 @@ class Up:
         wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
         after = f"starts again in {wait_s:g} s" if wait_s else "starts again"
         if wait_s is None:
-            after = "is given up" if at_once else f"is given up; foosim-supervisor start {child.name} tries it again"
+            is_node = child.name in self.plan.deployment.nodes
+            after = f"is given up; foosim-supervisor start {child.name} tries it again" if is_node else "is given up"
         self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
 
     def _start_due(self, now_s: float) -> None:
@@ -372,7 +373,15 @@ class Up:
 
     def _comes_back(self, name: str) -> bool:
         """Whether the run waits for this process when it ends, and another one takes its place."""
-        return name == VHUB or name in self.plan.deployment.nodes
+        return name == VHUB or name in self.plan.deployment.nodes or self._plays_again(name)
+
+    def _plays_again(self, name: str) -> bool:
+        """Whether these are players whom something else has ended: one that ends by itself has failed."""
+        deployment, child = self.plan.deployment, self._launcher.children[name]
+        players = deployment.player_processes().get(name, ())
+        may_restart = bool(players) and all(deployment.players[player].restart for player in players)
+        is_lost = child.exit_code is None or child.is_killed or child.is_away
+        return may_restart and is_lost and name not in self._restarts.failed
 
     def _vhub_again(self) -> list[str]:
         """Return how the vHub is started again: where clients know it to be."""

@@ -214,11 +214,12 @@ class SubscriptionRow(Row, frozen=True):
 
 
 class ClientRow(Row, frozen=True):
-    """A client that joins or leaves at `tick`; `period` is in ticks (0: free-running)."""
+    """A client that joins or leaves at `tick`; `period` is in ticks (0: free-running). One that `leaves_owing` was told
+    its turn at that tick, and is gone without an answer."""
 
     tick: Counter
     client: str
-    event: Literal["joins", "leaves"]
+    event: Literal["joins", "leaves", "leaves_owing"]
     period: Counter
     subscriptions: list[SubscriptionRow]
 

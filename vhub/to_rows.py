@@ -267,7 +267,7 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
     for joining in closing.joins:
         subscriptions = [SubscriptionRow(source, channel) for source, channel in joining.subscriptions]
         rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions))
-    return rows
+    return [*rows, *(ClientRow(tick, name, "leaves_owing", 0, []) for name in closing.owing)]
 
 
 def edit_row(edit: Edit) -> EditRow:
