@@ -7,6 +7,7 @@ after `client_back`: it leaves at the tick whose Done it owes, and comes back at
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
 
@@ -51,7 +52,7 @@ class Run:
                 also(system)
 
         settings = Settings(on_journal=lambda name, record: self.records.append(record) if name == "vhub" else None)
-        kind = Pace("fast") if pace == "fast" else Pace("realtime", 1)
+        kind = Pace("fast") if pace == "fast" else Pace("realtime", Fraction(1))
         told: dict[str, Any] = {"prepare": prepare, "capture": path, "pace": kind}
         self.json = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, (*SETS, *sets), settings, **told).json
 
