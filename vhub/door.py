@@ -1,7 +1,8 @@
 """What clients say to the vHub: hello, join, packets, Done; and that they are gone.
 
 A client that is gone may come back: one that the run waits for within `deadlines.client_back`, any other at any time as
-one that joins. After a restart of the vHub all that it knew are away, and come back in the same way.
+one that joins. Before the first tick, and after a restart of the vHub, when all that it knew are away, they have
+`deadlines.start`: their processes may have to be started.
 Neighbours: `core` closes the ticks, `sessions` has the clients.
 """
 
@@ -41,7 +42,7 @@ class Door:
         here = {name for name, member in core.state.members.items() if member.active}
         if written is not None:
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        core.sessions.expect(here, now_ns + core.deployment.deadlines.client_back_ns)
+        core.sessions.expect(here, now_ns + self._start_ns)  # theirs may have ended as well, and be started again
 
     def _known(self, name: str) -> Member | Joining | None:
         """Return what is known of a client, the latest first: as it joins, or as the state has it."""
@@ -166,7 +167,7 @@ class Door:
         if session is None or core.state is None or core.deployment is None or core.ended is not None:
             return
         if self._is_waited_for(name):
-            session.away_ns = now_ns + core.deployment.deadlines.client_back_ns
+            session.away_ns = now_ns + (core.deployment.deadlines.client_back_ns if core.epoch else self._start_ns)
             return
         self._leave(name)
 
@@ -187,6 +188,13 @@ class Door:
         """Whether the run waits for a client: it is in lockstep, or a tick still waits for its Done."""
         known = self._known(name)
         return self._core.waits_for(name) or (known is not None and known.period > 0)
+
+    @property
+    def _start_ns(self) -> int:
+        """How long a client has to come whose process is being started."""
+        assert self._core.deployment is not None
+        deadlines = self._core.deployment.deadlines
+        return max(deadlines.client_back_ns, deadlines.start_ns)
 
     def _leave(self, name: str) -> None:
         core = self._core
