@@ -25,7 +25,7 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import result
-from foosim.vhub.capture_file import origin_metadata
+from foosim.vhub.capture_file import ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.records import Closing
@@ -77,6 +77,7 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     `start` is a frame of another run to begin with (`vhub.branching.read_branch`). `prepare` is called with the built
     system before it runs: a test's or notebook's place to ask for things at ticks.
     `folder` is the one that the text's file is in: where the files are that it refers to (None: the present one).
+    A player that fails ends the run in order, as in processes: the result has `failed` and the reason.
     Raises DeploymentError for a bad text, AssetError for a bad file, CaptureError when `capture` exists or cannot be
     written, BadValue for a `start` that does not fit.
     """
@@ -103,10 +104,13 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     begun_ns = time.perf_counter_ns()
     try:
         system.run()
+        if writer is not None:
+            end = system.supervisor.end
+            writer.finish({} if end is None else ending_metadata(end))
     finally:
         system.close()
         if writer is not None:
-            writer.finish()
+            writer.leave()  # who is interrupted leaves it without an end
     if writer is not None:
         _check_room(writer, Level.OUT)
     wall_ns = time.perf_counter_ns() - begun_ns

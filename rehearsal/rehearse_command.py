@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -74,7 +76,8 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
         for line in (*([plan.branch.text] if plan.branch else []), *start_lines(meanings(plan.deployment), str(file))):
             typer.echo(line)
     inputs: dict[str, Any] = {"capture": capture, "start": plan.start, "folder": file.parent}
-    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=Settings(on_say=_show), **inputs).json
+    with redirect_stdout(sys.stderr):  # where players print: standard output has the result
+        result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=Settings(on_say=_show), **inputs).json
     typer.echo(encode_json(result).decode() if json else _told(result))
     raise typer.Exit(FAILED if result["failed"] else DONE)
 
