@@ -16,11 +16,11 @@ from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import ClientHello, Done, Go, Join, Up
+from foosim.vhub.members import Member, may_lockstep
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import InputsRecord
-from foosim.vhub.sessions import Session, may_lockstep
-from foosim.vhub.state import Member
+from foosim.vhub.sessions import Session
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore
@@ -105,6 +105,8 @@ class Door:
             return
         if join.period and not may_lockstep(core.state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
+        if join.offset >= max(1, join.period):
+            raise Malformed(f"{join.name} joins with an offset of {join.offset} ticks, its period is {join.period}")
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
@@ -227,4 +229,5 @@ def _is_member(known: Member | Joining, join: Join) -> bool:
     """Whether a client takes part as it asks to."""
     wanted = {(item.source, item.channel) for item in join.subscriptions}
     active = isinstance(known, Joining) or known.active
-    return active and known.period == join.period and {(source, name) for source, name in known.subscriptions} == wanted
+    is_timed_so = (known.period, known.offset) == (join.period, join.offset)
+    return active and is_timed_so and {(source, name) for source, name in known.subscriptions} == wanted

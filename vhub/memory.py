@@ -185,11 +185,16 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A client that joins (again): its period in ticks (0: free-running) and what it subscribes to."""
+    """A client that joins (again): period and offset in ticks (0: free-running), and what it subscribes to."""
 
     name: str
     period: int
     subscriptions: list[tuple[str, str]]
+    offset: int = 0
+
+    def suits(self, tick: int) -> bool:
+        """Whether it can join at a tick."""
+        return self.period == 0 or tick % self.period == self.offset
 
 
 class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -198,7 +203,7 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     closed: int
     packets: tuple[int, int, int, int, int]
     refusals: list[tuple[str, int]]
-    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int]]
+    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int, int]]
     links: list[tuple[str, str, str, LinkState]]
     radios: list[tuple[str, str, RadioState]]
     airs: list[tuple[str, AirState]]
