@@ -29,15 +29,23 @@ class PlayerFailed(PlayerError):
         self.trace = trace
 
 
+class Unanswered(BaseException):
+    """Raised in a player that does not return, to end it; the text says how long it was waited for."""
+
+
 def failed(where: str, error: BaseException, module: str) -> PlayerFailed:
     """Return what ends a player of the class of `module`; `where` says who failed and when."""
-    trace = "".join(traceback.format_exception(error)).rstrip()
-    return PlayerFailed(f"{where}: {describe(error)}{_place(error, module)}", trace)
+    return PlayerFailed(f"{where}: {describe(error)}{_place(error, module)}", _trace_of(error))
 
 
-def tell_failure(core: ClientCore, error: PlayerError) -> None:
+def tell_failure(core: ClientCore, error: PlayerError | Unanswered) -> None:
     """Have a player's core say why its process ends."""
-    core.fail(str(error), error.trace if isinstance(error, PlayerFailed) else "")
+    trace = error.trace if isinstance(error, PlayerFailed) else ""
+    core.fail(str(error), _trace_of(error) if isinstance(error, Unanswered) else trace)
+
+
+def _trace_of(error: BaseException) -> str:
+    return "".join(traceback.format_exception(error)).rstrip()
 
 
 def describe(error: BaseException) -> str:

@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple, Protocol, cast
 
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PacketError, PlayerError, UnknownName
-from foosim.client.failing import describe, failed
+from foosim.client.failing import Unanswered, describe, failed
 from foosim.client.packets import Outgoing, check_packet
 from foosim.client.payloads import Command, Drive, Value, channel_kind, command_channel, decode_payload, encode_command
 from foosim.protocol.deployment import Deployment
@@ -196,7 +196,7 @@ class PlayerLoop:
             return factory(deployment, declared.parameters)
         except Refused as error:
             raise PlayerError(f"player {self.core.name}: {error}") from error
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, Unanswered):
             raise
         except BaseException as error:
             when = f"at tick {self.core.tick}" if self.core.tick >= 0 else "before its first tick"
@@ -219,7 +219,7 @@ class PlayerLoop:
         where = f"{self.core.name} failed at tick {tick}"
         try:
             turn = self._player.act(tick, self.newest.samples)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, Unanswered):
             raise
         except BaseException as error:  # SystemExit, too: whatever it is, the run cannot go on without the player
             raise failed(where, error, _module_of(self._declaration)) from error

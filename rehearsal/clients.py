@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
-from foosim.client.failing import tell_failure
+from foosim.client.failing import Unanswered, tell_failure
 from foosim.client.player import PlayerLoop, load_player
 from foosim.protocol import channels
 from foosim.rehearsal.settings import Process
@@ -43,10 +43,14 @@ class Clients:
         loop = self.players[name] = PlayerLoop(core, load_player)
 
         def turn(now_ns: int) -> None:
-            system.at_work.tick = -1 if core.go is None else core.go.tick
+            at_work = system.at_work
+            at_work.tick = -1 if core.go is None else core.go.tick
             try:
+                at_work.acts = True
                 loop.step(now_ns)
-            except PlayerError as error:
+                at_work.acts = False
+            except (PlayerError, Unanswered) as error:
+                at_work.acts = False
                 tell_failure(core, error)
                 system.soon(lambda: system.leave(name))
 

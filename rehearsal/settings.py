@@ -48,6 +48,8 @@ class AtWork:
     name: str = ""
     tick: int = -1
     """The tick that a player acts at; -1 while it is at none."""
+    acts: bool = False
+    """Whether it is a player's own code."""
     turns: int = 0
     """How many there have been; while it is the same number, it is the same turn."""
 
