@@ -54,7 +54,9 @@ class Meter:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.when == "teardown":
-            self._by_folder[folder_of(report.nodeid)] += dict(report.user_properties)[SPENT]
+            spent_s = dict(report.user_properties)[SPENT]
+            assert isinstance(spent_s, float)
+            self._by_folder[folder_of(report.nodeid)] += spent_s
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.section("processor time")
