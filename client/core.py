@@ -109,7 +109,7 @@ class ClientCore:
         """How often the vHub was gone. What one of before said to a hello of before is no answer."""
         self._unrecorded: deque[Sent] = deque()
         self._resend_ns = NEVER_NS
-        self._period = 0
+        self._period = self._offset = 0
         self._sequence = self.first_sequence = 0
         """The number of its last packet; and of the last one of processes before it, whose place it takes."""
         self._downlink = 0
@@ -193,19 +193,21 @@ class ClientCore:
 
     # --- what the client does --------------------------------------------------------------------------------------
 
-    def join(self, period_ticks: int, subscriptions: Iterable[tuple[str, str]]) -> None:
+    def join(self, period_ticks: int, subscriptions: Iterable[tuple[str, str]], offset_ticks: int = 0) -> None:
         """Take part: in lockstep every `period_ticks`, or free-running with 0; hear these (endpoint, channel).
+
+        Its ticks are those that leave the remainder `offset_ticks`, which is below the period.
 
         Raises UnknownName for an endpoint or a robot's channel that the deployment does not have.
         """
         assert self.deployment is not None and self.welcome is not None, "join before a welcome"
-        assert period_ticks >= 0, period_ticks
+        assert 0 <= offset_ticks < max(1, period_ticks), (offset_ticks, period_ticks)
         wanted = sorted(set(subscriptions))
         for source, channel in wanted:
             check_subscription(self.deployment, source, channel)
         items = [Subscription(source, channel) for source, channel in wanted]
-        self._join = encode(Join(self.name, self.boot, period_ticks, items))
-        self._period = period_ticks
+        self._join = encode(Join(self.name, self.boot, period_ticks, items, offset_ticks))
+        self._period, self._offset = period_ticks, offset_ticks
         if not self.is_away:
             self._publish(self._join)
         self._again_after_ns = AGAIN_NS
@@ -363,8 +365,9 @@ class ClientCore:
             return
         if not self._is_new(go):
             return
-        if self._period == 0 or go.tick % self._period != 0:
-            raise Malformed(f"Go for tick {go.tick} to a client with a period of {self._period} ticks")
+        if self._period == 0 or go.tick % self._period != self._offset:
+            timing = f"a period of {self._period} ticks and an offset of {self._offset}"
+            raise Malformed(f"Go for tick {go.tick} to a client with {timing}")
         if go.tick <= self.tick or self.ended:
             self._repeated += 1
             return

@@ -180,7 +180,8 @@ class PlayerLoop:
         wanted = deployment.heard_by(name)
         self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in wanted})
         if declared.lockstep:
-            self.core.join(deployment.ticks(declared.rate_hz), wanted)
+            period, offset = deployment.turns(declared)
+            self.core.join(period, wanted, offset)
         else:
             self.core.join(0, wanted)
             self._period_ns = int(NS_PER_S / declared.rate_hz)

@@ -94,6 +94,7 @@ class Handshake:
         process = core.roster.by_name.get(heartbeat.sender)
         if process is None:
             if heartbeat.sender in core.roster.expected:
+                core.beginning.found_living = True
                 core.actions.append(Publish(channels.RECALL, channels.SUPERVISOR, encode(Recall(core.boot))))
             core.count_repeat()
             return

@@ -39,8 +39,10 @@ from foosim.vhub.capture_parts import (
     parts_at,
 )
 from foosim.vhub.capture_split import OWN, Split
+from foosim.vhub.earlier_crc import EarlierCrc
 from foosim.vhub.in_force import HOLDING
 from foosim.vhub.link_models import model_versions
+from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import Book, Message
 from foosim.vhub.mcap_scan import Scanned, read_messages
 from foosim.vhub.mcap_writer import McapWriter
@@ -323,10 +325,11 @@ class CaptureFile:
             raise CaptureError(f"{path}: cannot be created, {error.strerror}") from None
 
     def _writer(self, file: int, book: Book | None = None) -> McapWriter:
-        return McapWriter(lambda content: write_all(file, content), PROFILE, book)
+        earlier = None if book is None else EarlierCrc(file, book.offset)
+        return McapWriter(lambda content: write_all(file, content), PROFILE, book, earlier)
 
     def _describe(self, mcap: McapWriter, own: Mapping[str, str]) -> dict[str, int]:
-        """Write what a run depended on beside its inputs, and what is this file's `own`; the versions last.
+        """Write what a run depended on beside its inputs, and what is this file's `own`; its digests last.
 
         Return the channels of its topics.
         """
@@ -347,6 +350,7 @@ class CaptureFile:
         for path, file in deployment.asset_files.items():
             mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
         mcap.add_attachment(VERSIONS, "application/json", self._versions)
+        mcap.add_checks()
         return channels
 
     @cached_property
@@ -438,7 +442,7 @@ class CaptureFile:
         if (run_of(left) or run) != run:
             raise CaptureError(f"{left.path}: is that of run {run_of(left)}, not of run {run}")
         if left.found.book.chunks and not _is_described(left.found):
-            raise CaptureError(f"{left.path}: no capture of foosim, it lacks {VERSIONS}")
+            raise CaptureError(f"{left.path}: no capture of foosim, it lacks {CHECKS}")
         if left.problem and journal_tick > self.done.tick + 1:
             raise CaptureError(f"{left.problem}, no journal has tick {self.done.tick + 1}")
 
@@ -463,7 +467,7 @@ class CaptureFile:
 
 
 def _is_described(found: Scanned) -> bool:
-    return VERSIONS in {attachment.name for attachment in found.book.attachments}
+    return CHECKS in found.metadata
 
 
 def sync_folder(folder: Path) -> None:

@@ -1,7 +1,8 @@
 """What clients say to the vHub: hello, join, packets, Done; and that they are gone.
 
 A client that is gone may come back: one that the run waits for within `deadlines.client_back`, any other at any time as
-one that joins. After a restart of the vHub all that it knew are away, and come back in the same way.
+one that joins. Before the first tick, and after a restart of the vHub, when all that it knew are away, they have
+`deadlines.start`: their processes may have to be started.
 Neighbours: `core` closes the ticks, `sessions` has the clients.
 """
 
@@ -17,11 +18,12 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import ClientHello, Done, Go, Join, Tempo, Up
 from foosim.protocol.units import parse_pace
 from foosim.vhub.absences import Absences
+from foosim.vhub.members import Member, may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import Closing, InputsRecord
-from foosim.vhub.sessions import Session, may_lockstep, may_restart
-from foosim.vhub.state import HubState, Member
+from foosim.vhub.sessions import Session
+from foosim.vhub.state import HubState
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore
@@ -47,7 +49,8 @@ class Door:
         here = {name for name, member in core.state.members.items() if member.active}
         if written is not None:
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        core.sessions.expect({name: now_ns + self._back_ns(name) for name in sorted(here)})
+        # Theirs may have ended as well, and be started again.
+        core.sessions.expect(dict.fromkeys(sorted(here), now_ns + self._start_ns))
 
     def _known(self, name: str) -> Member | Joining | None:
         """Return what is known of a client, the latest first: as it joins, or as the state has it."""
@@ -124,6 +127,8 @@ class Door:
             return
         if join.period and not may_lockstep(core.state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
+        if join.offset >= max(1, join.period):
+            raise Malformed(f"{join.name} joins with an offset of {join.offset} ticks, its period is {join.period}")
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
         self.absences.end(join.name)
         self.tell()
@@ -237,9 +242,8 @@ class Door:
         """Return for how long the run waits for a client that is away."""
         core = self._core
         assert core.deployment is not None
-        deadlines = core.deployment.deadlines
         is_started_again = may_restart(core.deployment, name) and not self._may_go_on_without(name)
-        return max(deadlines.start_ns, deadlines.client_back_ns) if is_started_again else deadlines.client_back_ns
+        return self._start_ns if is_started_again or not core.epoch else core.deployment.deadlines.client_back_ns
 
     def _may_go_on_without(self, name: str) -> bool:
         """Whether the run goes on while a client is started again: in realtime, once it has begun."""
@@ -249,9 +253,10 @@ class Door:
         return may_restart(core.deployment, name) and is_realtime and core.epoch > 0
 
     def _turn_to_pace(self, now_ns: int) -> None:
-        """The run goes by the wall clock now, or does not any more: who is away has the time that it has then."""
+        """The run goes by the wall clock now, or does not any more: players that are away have the time of then."""
+        deployment = self._core.deployment
         for name, session in self._core.sessions.by_name.items():
-            if session.away_ns >= 0:
+            if session.away_ns >= 0 and deployment is not None and may_restart(deployment, name):
                 session.away_ns = now_ns + self._back_ns(name)
 
     @property
@@ -311,6 +316,13 @@ class Door:
         is_here = isinstance(known, Joining) or (known is not None and known.active and name not in self._leaves)
         return self._core.waits_for(name) or (known is not None and is_here and known.period > 0)
 
+    @property
+    def _start_ns(self) -> int:
+        """How long a client has to come whose process is being started."""
+        assert self._core.deployment is not None
+        deadlines = self._core.deployment.deadlines
+        return max(deadlines.client_back_ns, deadlines.start_ns)
+
     def _leave(self, name: str) -> None:
         core = self._core
         core.sessions.leave(name)
@@ -322,4 +334,5 @@ def _is_member(known: Member | Joining, join: Join) -> bool:
     """Whether a client takes part as it asks to."""
     wanted = {(item.source, item.channel) for item in join.subscriptions}
     active = isinstance(known, Joining) or known.active
-    return active and known.period == join.period and {(source, name) for source, name in known.subscriptions} == wanted
+    is_timed_so = (known.period, known.offset) == (join.period, join.offset)
+    return active and is_timed_so and {(source, name) for source, name in known.subscriptions} == wanted

@@ -20,7 +20,7 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.message_types import Counter
 from foosim.protocol.messages import Add, Delivered, Disrupt, Edit, Freeze, Push, Remove, Thaw
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 """Version of the rows and of the capture's metadata; a reader refuses another one."""
 PROFILE: Final = "foosim"
 
@@ -214,14 +214,15 @@ class SubscriptionRow(Row, frozen=True):
 
 
 class ClientRow(Row, frozen=True):
-    """A client that joins or leaves at `tick`; `period` is in ticks (0: free-running). One that `leaves_owing` was told
-    its turn at that tick, and is gone without an answer."""
+    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks. One that
+    `leaves_owing` was told its turn at that tick, and is gone without an answer."""
 
     tick: Counter
     client: str
     event: Literal["joins", "leaves", "leaves_owing"]
     period: Counter
     subscriptions: list[SubscriptionRow]
+    offset: Counter = 0
 
 
 class OwnerRow(Row, frozen=True):

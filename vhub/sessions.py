@@ -28,19 +28,9 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.names import nearest_name
 from foosim.vhub.downlinks import Downlinks
+from foosim.vhub.members import may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.state import HubState
-
-
-def may_lockstep(deployment: Deployment, name: str) -> bool:
-    """Whether the run waits for this client: no other can hold it up."""
-    declared = deployment.players.get(name) or deployment.clients.get(name)
-    return declared is not None and declared.lockstep
-
-
-def may_restart(deployment: Deployment, name: str) -> bool:
-    """Whether a client's process is started again when it has ended."""
-    return name in deployment.players and deployment.players[name].restart
 
 
 @dataclass(slots=True)
@@ -220,13 +210,13 @@ class Sessions:
         return min((session.away_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
 
     def join(self, join: Join) -> None:
-        """Note a join; it takes effect when the hub closes a tick that suits its period."""
+        """Note a join; it takes effect when the hub closes a tick that suits it."""
         subscriptions = [(wanted.source, wanted.channel) for wanted in join.subscriptions]
-        self.joins[join.name] = Joining(join.name, join.period, sorted(set(subscriptions)))
+        self.joins[join.name] = Joining(join.name, join.period, sorted(set(subscriptions)), join.offset)
 
     def take_joins(self, tick: int) -> list[Joining]:
         """Take the joins that take effect at `tick`, in name order."""
-        due = [name for name, j in sorted(self.joins.items()) if j.period == 0 or tick % j.period == 0]
+        due = [name for name, joining in sorted(self.joins.items()) if joining.suits(tick)]
         return [self.joins.pop(name) for name in due]
 
     def leave(self, name: str) -> None:

@@ -37,8 +37,9 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.start import initial_frame
 from foosim.vhub.core import HubCore
+from foosim.vhub.members import may_lockstep
 from foosim.vhub.memory import Joining
-from foosim.vhub.sessions import Sessions, may_lockstep
+from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -61,10 +62,10 @@ BUILD: Final = Build("vhub", "boot", "first", "run", "table.yaml", TEXT, "fast",
 class Hub:
     """A vHub, its supervisor and nodes played by hand. `said` is what it published since the last look."""
 
-    def __init__(self) -> None:
+    def __init__(self, build: Build = BUILD) -> None:
         self.core = HubCore("boot", bytes(32), 0)
         self.now_ns = 0
-        self.say(channels.BUILD, "vhub", BUILD)
+        self.say(channels.BUILD, "vhub", build)
         self.core.begin(None, 0)
 
     def say(self, channel: Channel, name: str, message: msgspec.Struct | bytes) -> None:
