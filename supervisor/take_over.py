@@ -53,6 +53,11 @@ class TakeOver:
         core = self._core
         if self._standing is not None and self._standing.boot == standing.boot:
             return False
+        if core.end is not None:
+            self._standing = standing
+            core.watch.ended_ns = now_ns
+            core.branches.proceed(standing)
+            return True
         if core.branches.is_behind(standing):
             core.branches.begin(standing, now_ns)
         elif core.branches.is_further(standing):
@@ -65,9 +70,13 @@ class TakeOver:
         return True
 
     def stops(self) -> bool:
-        """Somebody asks for the end of the run: return whether that waits for the vHub, which has to end the capture."""
+        """Somebody asks for the end of the run: return whether that waits for the vHub, which closes the capture."""
         self._is_stopped = True
         return self._standing is None
+
+    def waits_for_hub(self, now_ns: int) -> bool:
+        """Whether a run that had ended already still waits for the vHub, which has a capture to close."""
+        return self._standing is None and now_ns <= self._hub_ns
 
     def lose_hub(self) -> None:
         """The vHub is gone again: the next one tells where it stands."""
