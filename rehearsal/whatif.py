@@ -259,5 +259,6 @@ def _come_and_go(state: HubState, row: ClientRow) -> None:
     if row.event == "leaves":
         state.leave(row.client)
     else:
-        heard = [(heard.source, heard.channel) for heard in row.subscriptions]
-        state.join(Joining(row.client, row.period, heard, row.offset), row.tick)
+        both = row.subscriptions, row.arrivals
+        heard, calling = ([(item.source, item.channel) for item in items] for items in both)
+        state.join(Joining(row.client, row.period, heard, row.offset, calling), row.tick)

@@ -184,16 +184,33 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A client that joins (again): period and offset in ticks (0: free-running), and what it subscribes to."""
+    """A client that joins (again): period and offset in ticks (0: free-running), what it subscribes to, and of that at
+    the arrival of what it acts, if it does."""
 
     name: str
     period: int
     subscriptions: list[tuple[str, str]]
     offset: int = 0
+    arrivals: list[tuple[str, str]] = []
 
     def suits(self, tick: int) -> bool:
         """Whether it can join at a tick."""
-        return self.period == 0 or tick % self.period == self.offset
+        return self.period == 0 or bool(self.arrivals) or tick % self.period == self.offset
+
+
+class MemberState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A client that takes part, as it is written down: what a `members.Member` is."""
+
+    period: int
+    subscriptions: tuple[tuple[str, str], ...]
+    joined_tick: int
+    sequence: int = 0
+    downlink: int = 0
+    active: bool = True
+    branched: int = 0
+    offset: int = 0
+    arrivals: tuple[tuple[str, str], ...] = ()
+    called_tick: int = -1
 
 
 class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -202,7 +219,7 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     closed: int
     packets: tuple[int, int, int, int, int]
     refusals: list[tuple[str, int]]
-    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int, int]]
+    members: list[tuple[str, MemberState]]
     links: list[tuple[str, str, str, LinkState]]
     radios: list[tuple[str, str, RadioState]]
     airs: list[tuple[str, AirState]]

@@ -214,7 +214,10 @@ class SubscriptionRow(Row, frozen=True):
 
 
 class ClientRow(Row, frozen=True):
-    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks."""
+    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks.
+
+    One with `arrivals` acts when a packet of these channels reaches it, and when it has not for a period.
+    """
 
     tick: Counter
     client: str
@@ -222,6 +225,7 @@ class ClientRow(Row, frozen=True):
     period: Counter
     subscriptions: list[SubscriptionRow]
     offset: Counter = 0
+    arrivals: list[SubscriptionRow] = []
 
 
 class OwnerRow(Row, frozen=True):

@@ -68,8 +68,11 @@ class HubState:
         self._robots = frozenset(deployment.robots)
         self._transit = Transit(len(self._endpoints))
         clients = [*deployment.players, *deployment.clients]
-        self._absent = {name for name in clients if may_lockstep(deployment, name)}
-        """Clients declared to be in lockstep that take no part: they may join at any tick that their timing suits."""
+        self._lockstep = tuple(name for name in clients if may_lockstep(deployment, name))
+        self._is_complete = not self._lockstep
+        """Whether all of these take part; one that does not may join at any tick that its timing suits."""
+        self._on_arrival: dict[str, Member] = {}
+        """Those who act when something arrives, in name order."""
         self._receivers: dict[tuple[str, str], tuple[str, ...]] | None = None
         """Who hears each (endpoint, channel), in name order; None when it is to be found anew."""
 
@@ -92,21 +95,24 @@ class HubState:
     def join(self, joining: Joining, tick: int) -> None:
         """Take a client in, from `tick` on; one that comes back keeps its numbers."""
         known = self.members.get(joining.name)
-        subscriptions = tuple((robot, channel) for robot, channel in joining.subscriptions)
-        member = self.members[joining.name] = Member(joining.period, subscriptions, tick, offset=joining.offset)
+        member = self.members[joining.name] = Member.of(joining, tick)
         if known is not None:
             member.sequence, member.downlink, member.branched = known.sequence, known.downlink, known.branched
-        self._absent.discard(joining.name)
-        self._receivers = None
+        self._sort_members()
 
     def leave(self, name: str) -> None:
         """Let a client go: nothing is offered to it any more."""
         if name in self.members:
             self.members[name].subscriptions = ()
             self.members[name].active = False
-            if may_lockstep(self.deployment, name):
-                self._absent.add(name)
-            self._receivers = None
+            self._sort_members()
+
+    def _sort_members(self) -> None:
+        """Somebody came or went: find out anew who is here."""
+        here = {name: member for name, member in sorted(self.members.items()) if member.active}
+        self._is_complete = all(name in here for name in self._lockstep)
+        self._on_arrival = {name: member for name, member in here.items() if member.arrivals}
+        self._receivers = None
 
     def due_members(self, tick: int) -> list[str]:
         """Return the lockstep clients that are due at `tick`, in name order."""
@@ -188,6 +194,7 @@ class HubState:
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
         self.was_final = tick < self.final
         if self.was_final:
+            assert not any(member.is_due(tick) for member in self.members.values()), f"tick {tick} asks a client"
             assert not deliveries, f"deliveries {tick + 1} were final without packets"
             return Deliveries(tick + 1, [], branch=self.branch)
         following = self._following(tick)
@@ -219,31 +226,40 @@ class HubState:
         """Return for how many ticks behind the next one it is certain that nothing reaches robots.
 
         That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
-        filled, no lockstep client is due, none may join, and no other client is here.
+        filled, no lockstep client is due, or may be by what is in flight, none may join, and no other client is here.
         """
-        if self._absent:
+        if not self._is_complete:
             return 0
         members = [member for member in self.members.values() if member.active]
         if any(member.period == 0 for member in members):
             return 0
-        if self._is_clogged(tick):
+        if self._is_clogged(tick) or (self._on_arrival and any(map(self._calls, self._sendings.waiting))):
             return 0
         if are_answered(self.deliveries[tick]) or are_answered(self.deliveries[tick + 1]):
             return 0
         for following in range(limits.RELEASE_AHEAD):
             sent, arrival = tick + 1 + following, tick + 2 + following
-            if self.sampling.is_due(sent) or any(member.is_due(sent) for member in members):
+            if self.sampling.is_due(sent) or any(member.may_be_due(sent) for member in members):
+                return following
+            if self._on_arrival and any(map(self._calls, self._flights.get(sent, ()))):
                 return following
             if any(flight.destination in self._robots for flight in self._flights.get(arrival, ())):
                 return following
         return limits.RELEASE_AHEAD
 
     def _is_clogged(self, tick: int) -> bool:
-        """Whether a clog holds something back from a robot: a heal may let it go at any tick."""
+        """Whether a clog holds something back from a robot, or from who acts at its arrival: a heal may let it go at
+        any tick."""
         if not self.fabric.timeline.has_holds:
             return False
         flights = (flight for arrival, those in self._flights.items() if arrival > tick for flight in those)
-        return any(flight.held_ns > 0 and flight.destination in self._robots for flight in flights)
+        held = (flight for flight in flights if flight.held_ns > 0)
+        return any(flight.destination in self._robots or self._calls(flight) for flight in held)
+
+    def _calls(self, flight: Flight) -> bool:
+        """Whether its receiver acts when it arrives."""
+        member = self._on_arrival.get(flight.destination)
+        return member is not None and (flight.source, flight.channel) in member.arrivals
 
     def _admit(self, source: str, sent: Sent) -> bool:
         """Refuse at the door what is no packet of this run: a repeat, or to nobody."""
@@ -371,21 +387,40 @@ class HubState:
 
     def _arrive_at_clients(self, tick: int, fates: list[Flight]) -> dict[str, list[Flight]]:
         released: dict[str, list[Flight]] = {}
+        turns = self._on_arrival
+        for client in turns.values():
+            if client.is_over(tick):
+                client.called_tick = tick
         arriving = self._take_arrivals(tick, to_robots=False)
         if not arriving:
             return released
         room, world = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False), self.fabric.world
+        judged: list[Flight] = []
+        if turns:  # what makes them act is judged first: with it comes what else is there
+            arriving.sort(key=self._calls, reverse=True)
         for flight in arriving:
             member = self.members.get(flight.destination)
             if member is not None and member.active and member.release_tick(tick) != tick:
                 flight.arrival_tick = member.release_tick(tick)
                 self._flights.setdefault(flight.arrival_tick, []).append(flight)
                 continue
+            is_call = flight.destination in turns and self._calls(flight)
+            if flight.destination in turns and not is_call and turns[flight.destination].called_tick != tick:
+                flight.arrival_tick = tick + 1
+                self._flights.setdefault(tick + 1, []).append(flight)
+                continue
             down = member is None or not member.active or world.is_down(flight.destination)
             hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
             if self._arrive(flight, hindered):
                 released.setdefault(flight.destination, []).append(flight)
-            fates.append(flight)
+                if is_call:
+                    turns[flight.destination].called_tick = tick
+            judged.append(flight)
+        if turns:
+            judged.sort(key=order_of)
+            for flights in released.values():
+                flights.sort(key=order_of)
+        fates += judged
         return released
 
     def _arrive_at_robots(self, tick: int, fates: list[Flight]) -> list[Delivered]:
@@ -418,9 +453,7 @@ class HubState:
                 "closed": self.closed,
                 "packets": [p.offered, p.delivered, p.dropped, p.refused, p.copies],
                 "refusals": sorted(self.refusals.items()),
-                "members": [
-                    [name, *member.as_written()] for name, member in sorted(self.members.items())
-                ],
+                "members": [[name, member.state()] for name, member in sorted(self.members.items())],
                 "links": [[*key, fabric.states[key]] for key in sorted(fabric.states)],
                 "radios": [[*key, fabric.radios[key]] for key in sorted(fabric.radios)],
                 "airs": [[name, fabric.airs[name].state] for name in sorted(fabric.airs)],
@@ -440,10 +473,9 @@ class HubState:
         state.closed = content.closed
         state.packets = Packets(*content.packets)
         state.refusals = dict(content.refusals)
-        for name, period, subscriptions, *rest in content.members:
-            member = state.members[name] = Member(period, tuple(subscriptions), *rest)
-            if member.active:
-                state._absent.discard(name)
+        for name, written in content.members:
+            state.members[name] = Member(written)
+        state._sort_members()
         state.fabric.restore(content.links, content.radios, content.airs, content.asked)
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final

@@ -265,8 +265,11 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
     tick = closing.frame.tick
     rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
     for joining in closing.joins:
-        subscriptions = [SubscriptionRow(source, channel) for source, channel in joining.subscriptions]
-        rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions, joining.offset))
+        heard, calling = (
+            [SubscriptionRow(source, channel) for source, channel in pairs]
+            for pairs in (joining.subscriptions, joining.arrivals)
+        )
+        rows.append(ClientRow(tick, joining.name, "joins", joining.period, heard, joining.offset, calling))
     return rows
 
 
