@@ -5,10 +5,13 @@ Neighbours: `state`, which holds them; `sessions` is about their processes.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from msgspec import convert
 
 from foosim.protocol.deployment import Deployment
 from foosim.vhub.memory import Joining, MemberState
+from foosim.vhub.packet import Flight
 
 
 def may_lockstep(deployment: Deployment, name: str) -> bool:
@@ -67,3 +70,33 @@ class Member:
         """Return the first tick, from `tick` on, at which something can be released to the client, as far as its period
         says."""
         return tick if self.period == 0 or self.arrivals else tick + (self.offset - tick) % self.period
+
+
+class Here:
+    """What follows from who takes part, found anew when somebody comes or goes."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        clients = [*deployment.players, *deployment.clients]
+        self._lockstep = tuple(name for name in clients if may_lockstep(deployment, name))
+        self.is_complete = not self._lockstep
+        """Whether all that are declared to be in lockstep take part: one that does not may join at any tick."""
+        self.on_arrival: dict[str, Member] = {}
+        """Those who act when something arrives, in name order."""
+        self.receivers: dict[tuple[str, str], tuple[str, ...]] = {}
+        """Who hears each (endpoint, channel), in name order."""
+
+    def renew(self, members: Mapping[str, Member]) -> None:
+        """Somebody came or went."""
+        here = {name: member for name, member in sorted(members.items()) if member.active}
+        self.is_complete = all(name in here for name in self._lockstep)
+        self.on_arrival = {name: member for name, member in here.items() if member.arrivals}
+        heard: dict[tuple[str, str], list[str]] = {}
+        for name, member in here.items():
+            for pair in member.subscriptions:
+                heard.setdefault(pair, []).append(name)
+        self.receivers = {pair: tuple(names) for pair, names in heard.items()}
+
+    def calls(self, flight: Flight) -> bool:
+        """Whether a packet's receiver acts when it arrives."""
+        member = self.on_arrival.get(flight.destination)
+        return member is not None and (flight.source, flight.channel) in member.arrivals

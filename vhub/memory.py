@@ -183,6 +183,35 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """The numbers by which a stage dropped it that it has nowhere else; `to_rows.DECIDING` has their names."""
 
 
+Counts = dict[int, int]
+"""How often each age was seen, in ticks."""
+
+
+class HeardState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    """A channel that a client hears, or has heard: when its newest packet was sent, and ages at use.
+
+    Those up to the last row, and those since.
+    """
+
+    source: str
+    channel: str
+    sent_ns: int
+    """-1 while nothing has come."""
+    is_heard: bool
+    """Whether it still hears it."""
+    whole: Counts
+    recent: Counts
+
+
+class Age(msgspec.Struct, frozen=True):
+    """The ages at use of one channel at one client, of some time or of the whole run."""
+
+    client: str
+    source: str
+    channel: str
+    counts: Counts
+
+
 class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A client that joins (again): period and offset in ticks (0: free-running), what it subscribes to, and of that at
     the arrival of what it acts, if it does."""
@@ -226,5 +255,6 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     asked: list[tuple[int, str]]
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
+    ages: list[tuple[str, list[HeardState]]]
     branch: tuple[int, int]
     flights: list[FlightState]
