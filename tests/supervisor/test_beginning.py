@@ -165,7 +165,7 @@ def test_a_run_that_had_ended_waits_for_the_vhub_that_closes_its_capture() -> No
     def end() -> None:
         run.system.kill_hub("now", 3600 * S)
         run.core.finish("enough", failed=False)
-        run.system._turn(run.system.processes[SUPERVISOR])
+        run.system.take_turn(run.system.processes[SUPERVISOR])
         run.system.kill(SUPERVISOR)
         run.start_later({SUPERVISOR: 0.1, VHUB: 40.0})
 
