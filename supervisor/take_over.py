@@ -68,7 +68,7 @@ class TakeOver:
         return True
 
     def waits_for_hub(self, now_ns: int) -> bool:
-        """Whether a run that has ended, before this start or since, waits for the vHub, which has a capture to close."""
+        """Whether a run that has ended, perhaps before this start, waits for the vHub to close its capture."""
         return self._standing is None and now_ns <= self._hub_ns
 
     def lose_hub(self) -> None:
