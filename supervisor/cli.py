@@ -24,7 +24,7 @@ from foosim.supervisor.install import install, is_root_there, write_units
 from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
 from foosim.supervisor.new_capture import check_capture, default_capture
-from foosim.supervisor.outcome import Outcome, detached_outcome, ended_outcome, result_without_supervisor
+from foosim.supervisor.outcome import Outcome, detached_outcome, ended_outcome, refused_result
 from foosim.supervisor.pki_hosts import files_for, send_files
 from foosim.supervisor.plan import Plan, RunOptions, check_certificates, check_models_here, make_plan, plan_again
 from foosim.supervisor.remote import Remote, unit_name
@@ -106,28 +106,29 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     --resume RUN goes on with a run whose launcher died, from its last committed frame, with the options that it had.
     """
     display = Display(sys.stderr if json else sys.stdout)
+    begun: Up | Outcome | None = None
     try:
         if resumed is not None:
             begins = pace, duration, seed, sets, engine, listen, branch, run, capture
             if file is not None or insecure or balance or no_capture or detached or any(map(bool, begins)):
                 raise BadValue("--resume takes FILE and its options from the run", resumed)
-            outcome = _go_on(open_run(resumed), display)
+            begun = _go_on(open_run(resumed), display)
         elif file is None:
             raise BadValue("a deployment FILE is needed, or --resume RUN", "")
         elif no_capture and capture is not None:
             raise BadValue("--capture and --no-capture exclude each other", str(capture))
         else:
             options = _options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance)
-            outcome = _begin(options, capture, not no_capture, run, detached, display)
+            begun = _begin(options, capture, not no_capture, run, detached, display)
+        outcome = begun.run() if isinstance(begun, Up) else begun
     except Killed as killed:
         print(killed, file=sys.stderr)
         _print_result(killed.result, json)
         raise typer.Exit(INTERRUPTED) from None
-    except Refused as refused:
-        _print_result(result_without_supervisor({"run": resumed or run}, str(refused)), json)
-        raise
-    except MemoryError:
-        _print_result(result_without_supervisor({"run": resumed or run}, "too little memory"), json)
+    except (Refused, MemoryError) as error:
+        reason = "too little memory" if isinstance(error, MemoryError) else str(error)
+        result = begun.unended(reason) if isinstance(begun, Up) else refused_result(resumed, run, reason)
+        _print_result(result, json)
         raise
     for line in outcome.lines:
         display.say(line)
@@ -142,8 +143,9 @@ def _print_result(result: Mapping[str, Any], json: bool) -> None:
 
 def _begin(
     options: RunOptions, capture: Path | None, captures: bool, run: str | None, detached: bool, display: Display
-) -> Outcome:
-    """Run a deployment, or leave it running; `captures` without a `capture` is where captures go by default."""
+) -> Up | Outcome:
+    """Return a run of a deployment to be run, or leave it running; without a `capture` it is where captures go by
+    default, where any is wanted (`captures`)."""
     plan = make_plan(options)
     check_models_here(plan)
     found = capture or default_capture(plan.deployment.world)
@@ -151,17 +153,17 @@ def _begin(
     _prepare(plan, display, None)
     if detached:
         return detached_outcome(detach(plan, path, run), plan.deployment, path)
-    return Up(plan, path, display, run).run()
+    return Up(plan, path, display, run)
 
 
-def _go_on(folder: RunFolder, display: Display) -> Outcome:
-    """Go on with a run; of one that has ended return how."""
+def _go_on(folder: RunFolder, display: Display) -> Up | Outcome:
+    """Return a run that is to go on; of one that has ended return how."""
     if folder.result() is not None:
         recover_leftovers(display.say)
         return ended_outcome(folder)
     plan, path = plan_again(folder)
     _prepare(plan, display, folder.name)
-    return Up(plan, path, display, None, folder).run()
+    return Up(plan, path, display, None, folder)
 
 
 def _prepare(plan: Plan, display: Display, resumed: str | None) -> None:

@@ -254,8 +254,7 @@ class SupervisorCore:
         The last commit says that it is the last, so that the vHub does not close its tick: no other may be.
         """
         if not self.is_open or self.end is not None:
-            if self.take_over is None or not self.take_over.stops():
-                self.finish("stopped", failed=False)
+            self.finish("stopped", failed=False)
             return self.frame.tick
         last = max(self.released, self.frame.tick + 1)
         self.stop_at = min(self.stop_at or last, last)

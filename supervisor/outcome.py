@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from foosim.protocol.deployment import Deployment
 from foosim.supervisor.display import recording_text
-from foosim.supervisor.run_folder import RunFolder
+from foosim.supervisor.run_folder import RunFolder, open_run, run_exists
 from foosim.supervisor.status import NO_PACKETS, NOT_RECORDED, UNFINISHED
 from foosim.vhub.capture_parts import first_there, has_end, parts_at
 from foosim.vhub.capture_reader import Scan
@@ -52,6 +52,15 @@ def ended_outcome(folder: RunFolder) -> Outcome:
     result = ended if capture is None else with_capture(ended, capture)
     lines = f"run {folder.name} has ended: {result['reason']}", *capture_lines(capture, result)
     return Outcome(result, bool(result["failed"]), lines)
+
+
+def refused_result(resumed: str | None, run: str | None, reason: str) -> dict[str, Any]:
+    """Return the result of what was not begun: of a run that was to be resumed, with its capture, or of a new one."""
+    if resumed is None or not run_exists(resumed):
+        return result_without_supervisor({"run": resumed or run}, reason)
+    launch = open_run(resumed).launch()
+    capture = None if launch is None or not launch.capture else Path(launch.capture)
+    return with_capture(result_without_supervisor({"run": resumed}, reason), capture)
 
 
 def detached_outcome(folder: RunFolder, deployment: Deployment, capture: Path | None) -> Outcome:

@@ -371,7 +371,7 @@ class Up:
         """Look after the children and the Ctrl-C; False when the supervisor has ended."""
         if self._interrupts > 1:
             self._launcher.kill()
-            raise Killed("\n".join(["killed", *self._capture_lines()]), self._unended("killed by a second Ctrl-C"))
+            raise Killed("\n".join(["killed", *self._capture_lines()]), self.unended("killed by a second Ctrl-C"))
         supervisor = self._launcher.children[SUPERVISOR]
         now_s = time.monotonic()
         if supervisor.exit_code is not None:
@@ -430,7 +430,7 @@ class Up:
         if self._lost is self._launcher.children[SUPERVISOR] and self._lost.exit_code == REFUSED:
             reason = self._lost.how.last_words
         if ended is None:
-            result = self._unended(reason)
+            result = self.unended(reason)
             may_resume = self._is_resumed or self._has_begun
             then = f"; foosim-supervisor up --resume {self.folder.name} goes on with it" if may_resume else ""
             line = f"the run did not end in order{then}"
@@ -444,7 +444,7 @@ class Up:
         lines = [*map(recovery_text, result["recoveries"][self._told :]), line]
         return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(), *self._capture_lines()))
 
-    def _unended(self, reason: str) -> dict[str, Any]:
+    def unended(self, reason: str) -> dict[str, Any]:
         """Return the result of a run that nobody has ended."""
         known = {"run": self.folder.name, **plan_facts(self.plan.deployment), **self._status}
         return with_capture(result_without_supervisor(known, reason), self.capture)

@@ -114,6 +114,30 @@ def test_a_resumed_run_waits_for_all_as_long_as_for_a_start(sets: tuple[str, ...
     assert told == [("supervisor", "supervisor")], "nobody is lost who only starts slowly"
 
 
+@pytest.mark.parametrize("when", ["before the first tick", "with the vHub"])
+def test_a_client_whose_process_is_started_again_has_the_time_of_a_start(when: str) -> None:
+    run = Run()
+    system = run.system
+
+    def gone() -> None:
+        system.hub.client_gone("player-red", system.bus.now_ns)
+        system.players["player-red"].core.hub_gone(system.bus.now_ns)
+        system.pause("player-red", 10 * S)
+
+    def both_gone() -> None:
+        system.kill_hub()
+        system.pause("player-red", 10 * S)
+
+    if when == "with the vHub":
+        system.at_tick(60, both_gone)
+    else:
+        system.pause("player-blue", 15 * S)
+        system.later(2 * S, gone)
+    run.go()
+    assert run.seen.json["reason"] == "done" and run.seen.digests == undisturbed()
+    assert system.bus.now_ns > 10 * S
+
+
 def test_a_supervisor_that_alone_was_started_again_waits_no_longer_than_before() -> None:
     run = Run()
 

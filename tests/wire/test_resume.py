@@ -49,6 +49,7 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
     why = f"run far cannot go on: the vHub's journal is gone from {folder.journals}; foosim-supervisor up {house.table}"
     assert code == 3 and err.startswith(why) and last_json(out)["reason"] == err.strip()
+    assert last_json(out)["capture"] == str(house.folder / "far.mcap")
     journal.with_suffix(".away").rename(journal)
     tear(folder.journals, channels.VHUB, 60)
     tear(folder.journals, channels.SUPERVISOR, 9)
