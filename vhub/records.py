@@ -21,7 +21,7 @@ from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Build, Commit, Delivered, Edit, Epoch, Recovered, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
 from foosim.protocol.start import first_chain
-from foosim.vhub.memory import Joining
+from foosim.vhub.memory import Age, Joining
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState
 
@@ -101,6 +101,8 @@ class Closing:
     """Over the frames up to this one, without the one that the run began with."""
     owing: list[str] = field(default_factory=list)
     """Clients that left while the tick waited for their Dones."""
+    ages: Sequence[Age] = ()
+    """Ages at use since they were told last, where this closing tells them."""
 
 
 def closing_of(
@@ -228,6 +230,7 @@ class Fold:
         for name in record.owing:
             state.leave(name)
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
+        closing.ages = state.aged
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
         self.commit, self.inputs = record.commit, None
