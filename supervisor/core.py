@@ -215,7 +215,7 @@ class SupervisorCore:
         if process is None:
             return
         process.gone_ns = now_ns
-        if not process.farewell and not process.lost and self.end is None:
+        if not (process.farewell or process.lost or self.end is not None or self.watch.doubts(process, now_ns)):
             self._lose({name: "its connection closed"}, now_ns)
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:

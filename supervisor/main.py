@@ -83,6 +83,7 @@ class SupervisorProcess:
         self._loop.on_unwritten = self._on_unwritten
         self._room = JournalRoom(folder.journals, plan.deployment.capture.reserve_bytes)
         self._loop.took = self.core.watch.took
+        self._loop.stood = lambda stood_ns, now_ns: self.core.watch.rest(self.core, stood_ns, now_ns)
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
         wire.read(channels.SUPERVISOR_READS, channels.SUPERVISOR_WAITS)

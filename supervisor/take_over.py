@@ -59,6 +59,11 @@ class TakeOver:
         self._standing = standing
         return True
 
+    def rest(self, stood_ns: int) -> None:
+        """The supervisor stood still for so long: nobody could come back to it."""
+        self._nodes_ns += stood_ns
+        self._hub_ns += stood_ns
+
     def lose_hub(self) -> None:
         """The vHub is gone again: the next one tells where it stands."""
         self._standing = None

@@ -45,6 +45,7 @@ from foosim.protocol.messages import (
     Up,
     Want,
 )
+from foosim.protocol.orphan import Orphan
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain
@@ -84,7 +85,7 @@ class HubCore:
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
-        self.door, self.footing = Door(self), Footing(self, machine)
+        self.door, self.footing, self.orphan = Door(self), Footing(self, machine), Orphan()
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
@@ -158,10 +159,8 @@ class HubCore:
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
         self.member.wake(now_ns, self._heartbeat)
-        if self._waited and self.releases is not None:
+        if self._waited:
             self.sessions.repeat(self._waited, now_ns)
-            for late in self.sessions.overdue(self._waited, self.releases.paused, now_ns):
-                self.lose(late.name, f"no Done of tick {late.go_tick} within its deadline")
         self.door.wake(now_ns)
         if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)

@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from foosim.protocol import limits
-from foosim.protocol.actions import Journal
+from foosim.protocol.actions import Journal, Say
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import ClientHello, Done, Go, Join, Up
+from foosim.protocol.standstill import TOLD_NS, told
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import InputsRecord
@@ -32,6 +33,7 @@ class Door:
         self.written: InputsRecord | None = None
         """Who joins and leaves at the tick that is closed next, where that is written already."""
         self._leaves: list[str] = []
+        self._looked_ns = 0
 
     def go_on(self, written: InputsRecord | None, now_ns: int) -> None:
         """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick."""
@@ -139,6 +141,7 @@ class Door:
             core.repeated += 1
             return
         core.take_done(done.name)
+        session.answered()
         session.done = done
 
     def _session(self, message: Join | Up | Done) -> Session | None:
@@ -170,11 +173,43 @@ class Door:
             return
         self._leave(name)
 
+    @property
+    def holds(self) -> bool:
+        """Whether the vHub waits for its supervisor: nothing can go on, and nobody is let in."""
+        return self._core.orphan.is_alone or self._core.footing.waits
+
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The vHub's own loop stood still for so long: that counts against no client, and not against the supervisor.
+
+        Where connections may have closed by it, clients have their whole time from now on (`standstill`).
+        """
+        core = self._core
+        core.orphan.rest(stood_ns, now_ns)
+        if stood_ns >= TOLD_NS:
+            core.actions.append(Say("warning", told(stood_ns)))
+        self._rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
+        self._looked_ns = now_ns
+
+    def _rest(self, for_ns: int, now_ns: int) -> None:
+        if self._core.deployment is not None:
+            self._core.sessions.rest(for_ns, self._core.deployment.deadlines.client_back_ns, now_ns)
+
     def wake(self, now_ns: int) -> None:
-        """Give up who was away for too long."""
+        """Lose who has not answered in time, and give up who was away for too long.
+
+        Both clocks rest while the run is paused; they begin anew when the vHub has waited for its supervisor, since
+        what closed that connection may have closed those of clients as well.
+        """
         core = self._core
         if core.state is None:
             return
+        passed_ns, self._looked_ns = now_ns - self._looked_ns, now_ns
+        if self.holds:
+            self._rest(limits.COUNTER_MAX, now_ns)
+        elif core.releases is not None and core.releases.paused:
+            self._rest(passed_ns, now_ns)
+        for overdue in core.sessions.overdue(now_ns):
+            core.lose(overdue.name, f"no Done of tick {overdue.go_tick} within its deadline")
         for name in core.sessions.late(now_ns):
             session = core.sessions.by_name[name]
             if self._is_waited_for(name):

@@ -25,7 +25,6 @@ from foosim.protocol.addresses import LOOPBACK, Address, check_listen, parse_add
 from foosim.protocol.admission import Admission
 from foosim.protocol.certificates import Credentials, check_host, load_credentials, passwords_file, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
-from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Level
@@ -35,9 +34,8 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, JournalError, read_journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.messages import Build, End
+from foosim.protocol.messages import Build
 from foosim.protocol.notify import Notify
-from foosim.protocol.orphan import Orphan
 from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
 from foosim.protocol.session import Session
@@ -99,9 +97,8 @@ class HubProcess:
         self._capture: CaptureWriter | None = None
         self._room: RoomWatch | None = None
         self._forget_ns = self._look_ns = 0
-        self._is_abandoned = False
-        self._orphan = Orphan()
-        self._why_abandoned = "the vHub was told to end"
+        self._why_abandoned = ""
+        """Why it ends though the run has not."""
         self._log: logging.Logger = start_log(VHUB)
         warn_of_end(credentials, self._log)
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
@@ -110,7 +107,7 @@ class HubProcess:
         self._loop.show_progress(options.progress)
         self._loop.notify = Notify()
         self._loop.turn = self._turn
-        self._loop.took = self.core.waits.took
+        self._loop.took, self._loop.stood = self.core.waits.took, self.core.door.rest
         self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
         self.core.speak = self._speak
@@ -123,7 +120,8 @@ class HubProcess:
     def run(self) -> int:
         """Take part until the end, close the capture, say farewell; return the exit code.
 
-        Whatever else ends it leaves the capture without an end, and the journal.
+        Whatever else ends it, its supervisor's absence among them, leaves the capture without an end, and the journal:
+        a vHub that is started again goes on with both.
         """
         sys.setswitchinterval(SWITCH_S)
         try:
@@ -135,26 +133,35 @@ class HubProcess:
         if self.core.finished:
             self._close()
         else:
+            if self._is_abandoned:
+                self.core.actions.append(Say("error", self._why_abandoned))
+                self._loop.perform()
             self._leave()
         if self.core.member.refusal:
             return REFUSED
         if self.core.failure:
             self._log.error(self.core.failure)
             return FAILED
+        if self._is_abandoned:
+            return FAILED
         farewell = self.core.farewell()
         self._wire.put(farewell.channel, farewell.name, farewell.payload)
-        return FAILED if self._is_abandoned else DONE
+        return DONE
 
     def stop(self) -> None:
-        """Have `run` end what it has and return; a signal handler may call this."""
-        self._is_abandoned = True
+        """Have `run` leave what it has and return; a signal handler may call this."""
+        self._why_abandoned = self._why_abandoned or "was told to end while the run goes on"
         self._inbox.wake()
 
     def _is_over(self) -> bool:
         core = self.core
-        if core.state is None and (self._is_abandoned or core.ended is not None):
+        if core.ended is not None and core.state is None:
             return True
-        return core.finished or bool(core.member.refusal or core.failure)
+        return core.finished or self._is_abandoned or bool(core.member.refusal or core.failure)
+
+    @property
+    def _is_abandoned(self) -> bool:
+        return bool(self._why_abandoned) and self.core.ended is None
 
     # --- rounds of the loop ------------------------------------------------------------------------------------------
 
@@ -164,13 +171,8 @@ class HubProcess:
         self._admission.check(now_ns)
         if core.member.build is not None and self._journal is None:
             self._begin(core.member.build, now_ns)
-        if self._orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._is_abandoned:
+        if core.orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._why_abandoned:
             self._why_abandoned = "lost the supervisor, and it has not come back"
-            core.actions.append(Say("error", self._why_abandoned))
-            self._is_abandoned = True
-        if self._is_abandoned and core.ended is None and core.state is not None:
-            end = End(core.state.closed + 1, self._why_abandoned, True)
-            core.receive(channels.END, SUPERVISOR, encode(end), now_ns)
         core.advance(now_ns)
         reminder = "" if self._exposure is None else self._exposure.due(now_ns)
         if reminder:
@@ -298,13 +300,13 @@ class HubProcess:
             self._admission.heard(name, is_alive)
         if is_alive:
             if name == SUPERVISOR:
-                self._orphan.hear(True, time.monotonic_ns())
+                self.core.orphan.hear(True, time.monotonic_ns())
             return
         if plane is Plane.RADIO:
             self.core.client_gone(name, time.monotonic_ns())
         elif name == SUPERVISOR and self.core.ended is None:
             self.core.actions.append(Say("warning", "lost the supervisor: holds until it is back"))
-            self._orphan.hear(False, time.monotonic_ns())
+            self.core.orphan.hear(False, time.monotonic_ns())
 
     def _close(self) -> None:
         """Finish the capture; only then is the journal done with."""
