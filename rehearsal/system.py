@@ -138,6 +138,7 @@ class System:
             core = ClientCore(name, "boot", self._now_of(name))
             loop = self.players[name] = PlayerLoop(core, load_player)
             self._enter(name, core, loop.step, channels.CLIENT_READS)
+            self.processes[name].stood = core.rest
         for name, client in sorted(self.settings.clients.items()):
             core = ClientCore(name, "boot", self._now_of(name))
             self._enter(name, core, client(core), channels.CLIENT_READS)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 DOUBT_NS: Final = 1_000_000_000
 """For how long behind a standstill of the supervisor connections end that it has itself kept silent on."""
+CUT_SEEN_NS: Final = 1_500_000_000
+"""By then the connection of a process that is cut off has closed: a lease, and what it takes to notice its end."""
 LATE_EVERY_NS: Final = 1_000_000_000
 """How often late ticks are logged at most."""
 
@@ -170,6 +172,16 @@ class Watch:
         hub = self.roster.by_name.get(VHUB)
         return [] if hub is None or hub.heartbeat is None else _names(hub.heartbeat.waiting_for)
 
+    def _has_sensed(self, name: str) -> bool:
+        """Whether a node that the vHub waits for has said what its robots measure: it is at that tick, or further.
+
+        Then perhaps the vHub does not hear it, which shows when its connection closes.
+        """
+        node, hub = self.roster.by_name.get(name), self.roster.by_name.get(VHUB)
+        if node is None or node.role != "node" or node.heartbeat is None or hub is None or hub.heartbeat is None:
+            return False
+        return hub.heartbeat.waiting_for.startswith(SAMPLES_OF) and node.heartbeat.tick >= hub.heartbeat.tick
+
     def lost(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
         """Return who is lost, and why."""
         self.now_ns = now_ns
@@ -190,7 +202,10 @@ class Watch:
             return {}
         waited = ", ".join(names)
         overdue_ns = now_ns - self._progress_ns
-        if overdue_ns > deadlines.tick_lost_ns:
+        lost_ns = deadlines.tick_lost_ns
+        if names and all(map(self._has_sensed, names)):
+            lost_ns = max(lost_ns, CUT_SEEN_NS)
+        if overdue_ns > lost_ns:
             return dict.fromkeys(names, f"tick {core.frame.tick} is overdue by {overdue_ns / 1e9:.1f} s")
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
