@@ -29,10 +29,10 @@ COMPILED: Final = {
     "node/sensors": ("__init__", "ball", "battery", "encoder", "fitting", "odometry", "pose", "proximity"),
     "protocol": (
         *("actions", "assign", "barrier", "channels", "codec", "draws", "frame", "layout", "limits", "member"),
-        *("obstacles", "patience", "refusals", "sampling", "scene", "start"),
+        *("obstacles", "patience", "refusals", "sampling", "scene", "standstill", "start"),
     ),
     "rehearsal": (
-        *("bounds", "bus", "clock", "hub_journal", "laws", "machines", "packet_laws", "replica", "settings"),
+        *("bounds", "bus", "clock", "hub_journal", "laws", "machines", "packet_laws", "people", "replica", "settings"),
         *("system", "whatif", "whatif_reading", "world_bounds"),
     ),
     "supervisor": (

@@ -1,4 +1,4 @@
-"""How long a process's own loop stood still: stopped, without the processor, asleep with its machine, or busy in a turn.
+"""How long a process's own loop stood still: stopped, without the processor, its machine asleep, or busy in a turn.
 
 Such a process has not looked, so it cannot know what others did meanwhile, and blames nobody for that time: every
 deadline that it keeps for another one rests. It sees this by its own monotonic clock alone, since its loop knows when
