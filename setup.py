@@ -36,8 +36,8 @@ COMPILED: Final = {
         *("system", "whatif", "whatif_reading", "world_bounds"),
     ),
     "supervisor": (
-        *("absence", "arrivals", "balance", "branches", "core", "handshake", "head", "issued", "pacing", "recovery"),
-        *("requests", "roster", "take_over", "watch"),
+        *("absence", "arrivals", "balance", "branches", "core", "ending", "handshake", "head", "issued", "pacing"),
+        *("recovery", "requests", "roster", "take_over", "watch"),
     ),
     "vhub": (
         *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "numbers", "packet"),

@@ -186,6 +186,7 @@ class Deadlines(Part):
     """Nodes and vHub end when their supervisor has been gone for so long."""
     vhub_back_ns: Deadline = _default("30 s", "vhub_back")
     client_back_ns: Deadline = _default("2 s", "client_back")
+    close_ns: Deadline = _default("30 s", "close")
 
 
 def _int_only(value: object) -> object:

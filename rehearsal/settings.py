@@ -92,5 +92,7 @@ class Settings:
     """
     on_supervisor_loss: Callable[[Sequence[bytes]], None] | None = None
     """Told of the supervisor's journal that is left when its machine is lost."""
+    closing: Callable[[HubCore, int], bool] = lambda hub, passed_ns: True
+    """Whether the vHub has closed its capture, and in its `recording` how far it is, so long after the run's end."""
     on_say: Callable[[str, str, str], None] | None = None
     on_journal: Callable[[str, bytes], None] | None = None

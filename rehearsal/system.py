@@ -30,6 +30,7 @@ from foosim.rehearsal.people import OPERATOR, People
 from foosim.rehearsal.settings import Process, Settings
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
+from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 
@@ -303,9 +304,20 @@ class System:
         if process.core is self.supervisor and self._frames:
             self._tell_commits(was_cut=left is not None)
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
-            farewell = self.hub.farewell()
-            self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
-            self._leave(process.name)
+            self._close(process, leaves_ns)
+
+    def _close(self, process: Process, begun_ns: int) -> None:
+        """The vHub closes its capture, shows how far it is, and says farewell."""
+        hub = self.hub
+
+        def turn(now_ns: int) -> None:
+            if self.settings.closing(hub, self.bus.now_ns - begun_ns) and channels.VHUB in self.processes:
+                said, at_ns = hub.farewell(), max(begun_ns, self.bus.now_ns)
+                self.bus.put(process.name, said.channel, said.name, said.payload, at_ns)
+                self._leave(process.name)
+
+        process.core, process.turn = ClosingCore(hub), turn
+        turn(begun_ns)
 
     def _leave(self, name: str) -> None:
         """A process has ended: what is on its way to it is lost."""

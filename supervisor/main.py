@@ -99,7 +99,7 @@ class SupervisorProcess:
         self._loop.perform()
         self._folder.write_result(result(self.core))
         end = self.core.end
-        return FAILED if end is None or end.failed else DONE
+        return FAILED if end is None or end.failed or self.core.ending.cut_off else DONE
 
     def stop(self) -> None:
         """Have the run end in order, as the command `down` does; a signal handler may call this."""

@@ -34,7 +34,7 @@ class SupervisorStatistics:
 
 DISRUPTIONS_SHOWN: Final = 16
 """Events of the network that a status has, the last that were asked for."""
-NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0}
+NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
 NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
 
 
@@ -43,6 +43,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
     frame = core.frame
     hub = core.roster.by_name.get(VHUB)
     report = {} if hub is None else hub.report
+    cut_off = core.ending.cut_off
     wall_ns = core.committed_ns - core.started_ns
     origin = core.settings.origin
     return {
@@ -70,9 +71,9 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         "moves": core.account.moves,
         "handovers": core.account.handovers,
         "score": _score(frame),
-        "capture": (report.get("capture") or None) if hub is not None and hub.farewell else None,
-        "reason": core.end.reason if core.end is not None else None,
-        "failed": core.end.failed if core.end is not None else False,
+        "capture": (report.get("capture") or None) if hub is not None and (hub.farewell or cut_off) else None,
+        "reason": "; ".join(part for part in (core.end.reason, cut_off) if part) if core.end is not None else None,
+        "failed": core.end is not None and (core.end.failed or bool(cut_off)),
     }
 
 

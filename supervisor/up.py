@@ -283,6 +283,9 @@ class Up:
         self._tell_recoveries(status["recoveries"])
         if not self._has_ended:
             self.display.show(status, now_s)
+        else:  # the supervisor waits as long as there is progress, and so do we
+            self.display.show_closing(status)
+            self._ending_s = now_s if self._ending_s else 0.0
         self._has_begun = self._has_begun or status["state"] != "starting"
         self._has_ended = status["state"] in ENDED
         self._stopped = {name for name, process in status["processes"].items() if process["stopped"]}
@@ -458,6 +461,8 @@ class Up:
         with suppress(CaptureError):
             is_finished = has_end(there[-1])
         lines = [f"capture {there[0]}{count}" if is_finished else f"capture {there[0]}{count} (unfinished)"]
+        if not is_finished and result is not None and VHUB not in self._launcher.remotes:
+            lines.append(f"complete it with: foosim-replay recover {there[0]} --journals {self.folder.journals}")
         return [*lines, wrong] if wrong else lines
 
     @contextmanager

@@ -158,7 +158,7 @@ class HubCore:
 
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
-        self.member.wake(now_ns, self._heartbeat)
+        self.member.wake(now_ns, self.heartbeat)
         if self._waited:
             self.sessions.repeat(self._waited, now_ns)
         self.door.wake(now_ns)
@@ -466,9 +466,10 @@ class HubCore:
         if not self.lost:
             self.lost = f"{name}: {why}"
             self.actions.append(Say("error", f"lost {self.lost}"))
-            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self._heartbeat())))
+            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self.heartbeat())))
 
-    def _heartbeat(self) -> Heartbeat:
+    def heartbeat(self) -> Heartbeat:
+        """Return what it says of itself."""
         tick = 0 if self.state is None else self.state.closed + 1
         return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, report(self))
 

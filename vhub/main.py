@@ -43,6 +43,7 @@ from foosim.protocol.session_settings import Security
 from foosim.vhub.capture_file import check_new, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.link_models import check_link_models
@@ -97,6 +98,8 @@ class HubProcess:
         self._capture: CaptureWriter | None = None
         self._room: RoomWatch | None = None
         self._forget_ns = self._look_ns = 0
+        self._is_closing = False
+        """Whether the run has ended, and the capture takes nothing any more."""
         self._why_abandoned = ""
         """Why it ends though the run has not."""
         self._log: logging.Logger = start_log(VHUB)
@@ -157,7 +160,26 @@ class HubProcess:
         core = self.core
         if core.ended is not None and core.state is None:
             return True
-        return core.finished or self._is_abandoned or bool(core.member.refusal or core.failure)
+        if core.finished:
+            return self._has_closed()
+        return self._is_abandoned or bool(core.member.refusal or core.failure)
+
+    def _has_closed(self) -> bool:
+        """Begin to close the capture, once all that goes into it is handed over; return whether that is done.
+
+        Until then the vHub shows that it lives, and how far it is.
+        """
+        capture, ended = self._capture, self.core.ended
+        if capture is None:
+            return True
+        if not self._is_closing:
+            assert ended is not None
+            self._loop.perform()
+            self._is_closing, closing = True, ClosingCore(self.core)
+            self._loop.core, self._loop.deadline_ns = closing, lambda now_ns: closing.deadline_ns()
+            capture.on_end = self._inbox.wake
+            capture.begin_finish({"reason": ended.reason, "ended": wall.now_text()})
+        return capture.has_ended
 
     @property
     def _is_abandoned(self) -> bool:
@@ -198,7 +220,7 @@ class HubProcess:
         core = self.core
         core.actions += [Say(level, text) for level, text in room.look(now_ns)]
         core.recording = room.recording
-        if room.ends is not None and not core.lost:
+        if room.ends is not None and not core.lost and not core.finished:
             core.lose(*room.ends)
 
     def _on_unwritten(self, error: JournalError) -> None:
@@ -289,7 +311,7 @@ class HubProcess:
             self._capture.keep(action.closing if isinstance(action, Keep) else action.epoch)
 
     def _on_say(self, say: Say) -> None:
-        if self._capture is not None:
+        if self._capture is not None and not self._is_closing:
             self._capture.log(say.level, say.text, self.core.statistics().closed + 1)
 
     def _say(self, level: str, text: str) -> None:
@@ -309,10 +331,10 @@ class HubProcess:
             self.core.orphan.hear(False, time.monotonic_ns())
 
     def _close(self) -> None:
-        """Finish the capture; only then is the journal done with."""
+        """Take notice of the end of the capture; only then is the journal done with."""
         assert self.core.ended is not None
         if self._capture is not None:
-            self._capture.finish({"reason": self.core.ended.reason, "ended": wall.now_text()})
+            self._capture.finish()
             self.core.capture = str(first_there(Path(self.core.capture)))
         if self._room is not None:
             self.core.recording = self._room.recording
