@@ -40,7 +40,7 @@ from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
-from foosim.vhub.capture_file import check_new, origin_metadata
+from foosim.vhub.capture_file import check_new, ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.closing import ClosingCore
@@ -178,7 +178,7 @@ class HubProcess:
             self._is_closing, closing = True, ClosingCore(self.core)
             self._loop.core, self._loop.deadline_ns = closing, lambda now_ns: closing.deadline_ns()
             capture.on_end = self._inbox.wake
-            capture.begin_finish({"reason": ended.reason, "ended": wall.now_text()})
+            capture.begin_finish({**ending_metadata(ended), "ended": wall.now_text()})
         return capture.has_ended
 
     @property

@@ -20,7 +20,7 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.message_types import Counter
 from foosim.protocol.messages import Add, Delivered, Disrupt, Edit, Freeze, Push, Remove, Thaw
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 """Version of the rows and of the capture's metadata; a reader refuses another one."""
 PROFILE: Final = "foosim"
 
@@ -214,13 +214,14 @@ class SubscriptionRow(Row, frozen=True):
 
 
 class ClientRow(Row, frozen=True):
-    """A client that joins or leaves at `tick`; `period` is in ticks (0: free-running)."""
+    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks."""
 
     tick: Counter
     client: str
     event: Literal["joins", "leaves"]
     period: Counter
     subscriptions: list[SubscriptionRow]
+    offset: Counter = 0
 
 
 class OwnerRow(Row, frozen=True):

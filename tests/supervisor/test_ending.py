@@ -76,7 +76,7 @@ def test_without_progress_it_is_cut_off_which_is_an_error_where_there_is_a_captu
 
 def test_a_vhub_that_ends_while_it_closes_its_capture_cuts_it_off() -> None:
     def kill(system: System) -> None:
-        system._leave(VHUB)
+        system.leave(VHUB)
         system._supervisor_sees_gone(VHUB)
 
     slow = Slow(takes_s=1000)
