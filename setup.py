@@ -36,12 +36,13 @@ COMPILED: Final = {
         *("system", "whatif", "whatif_reading", "world_bounds"),
     ),
     "supervisor": (
-        *("absence", "arrivals", "balance", "branches", "core", "ending", "handshake", "head", "issued", "pacing"),
+        *("absence", "arrivals", "balance", "branches", "closing", "core", "handshake", "head", "issued", "pacing"),
         *("recovery", "requests", "roster", "take_over", "watch"),
     ),
     "vhub": (
-        *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "members", "numbers", "packet"),
-        *("propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit", "world"),
+        *("ages", "air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "members", "numbers"),
+        *("packet", "propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit"),
+        *("world",),
     ),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss", "shadowing"),

@@ -48,7 +48,7 @@ from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.balance import Balancer
 from foosim.supervisor.beginning import Beginning
 from foosim.supervisor.branches import Branches
-from foosim.supervisor.ending import Ending
+from foosim.supervisor.closing import Closing
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
@@ -90,9 +90,8 @@ class SupervisorCore:
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.recovery, self.absence, self.branches = Recovery(self), Absence(self), Branches(self)
         self.balancer = Balancer(self.deployment.owners()) if settings.balance else None
-        self.requests, self.handshake, self.ending = Requests(self), Handshake(self), Ending(self)
-        self.frame: Frame = first_frame(self.deployment, settings.start)
-        self.chain = first_chain(settings.origin)
+        self.requests, self.handshake, self.closing = Requests(self), Handshake(self), Closing(self)
+        self.frame, self.chain = first_frame(self.deployment, settings.start), first_chain(settings.origin)
         self.first_tick = self.frame.tick
         self.beginning = Beginning(self.deployment, self.first_tick)
         self.epoch, self.is_open = 0, False
@@ -176,8 +175,8 @@ class SupervisorCore:
             if now_ns >= self._prepare_ns:
                 self.requests.prepare()
                 self._prepare_ns = now_ns + PREPARE_NS
-        elif self.end is not None and not self.finished:
-            self.finished = self.ending.is_over(now_ns)
+        elif not (self.finished or (self.take_over is not None and self.take_over.waits_for_hub(now_ns))):
+            self.finished = self.closing.is_over(now_ns)
 
     @property
     def lacking(self) -> tuple[Channel, int]:
@@ -249,8 +248,7 @@ class SupervisorCore:
         The last commit says that it is the last, so that the vHub does not close its tick: no other may be.
         """
         if not self.is_open or self.end is not None:
-            if self.take_over is None or not self.take_over.stops():
-                self.finish("stopped", failed=False)
+            self.finish("stopped", failed=False)
             return self.frame.tick
         last = max(self.released, self.frame.tick + 1)
         self.stop_at = min(self.stop_at or last, last)

@@ -1,56 +1,65 @@
-"""When a run that has ended is over: once its vHub has closed the capture, which may take as long as it goes on.
+"""How a process of a run ended, in words, and whether another one may take its place. Pure.
 
-The account of the capture in the vHub's heartbeats shows whether it does. One that stands still for
-`deadlines.close`, or whose vHub ends meanwhile, is cut off: an error, though the run itself may have been in order.
-Neighbours: `core` asks, `status` has the result, `vhub.closing` is the other side.
+Neighbours: `launcher` knows exit codes and logs, `restarts` says when another one is started.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
 
-from foosim.protocol.channels import VHUB
-from foosim.supervisor.roster import Process
+from foosim.protocol.command import REFUSED
+from foosim.supervisor.children import BY_SIGNAL
 
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
-
-GONE_NS: Final = 500_000_000
-"""How long what a process said last may take after the news that it is gone: the two come by different ways."""
+NO_MEMORY: Final = ("MemoryError", "Cannot allocate memory", "std::bad_alloc", "memory allocation of")
+"""What Python, the system, C++ and Rust say when they get no memory."""
+WORDS_MAX: Final = 300
 
 
+@dataclass(frozen=True, slots=True)
 class Ending:
-    """Waits for the vHub of one run that has ended."""
+    """How a process ended: its exit code (-N: signal N), the end of its log, and what else is known.
 
-    def __init__(self, core: SupervisorCore) -> None:
-        self.cut_off = ""
-        """Why the capture has no end; empty where it has, or where there is none."""
-        self._core = core
-        self._account: Any = None
-        self._moved_ns = 0
+    `killed_by_us` is why its launcher killed it, empty when it did not; `out_of_memory` says that the kernel has killed
+    processes for want of memory while this one lived.
+    """
 
-    def rest(self, stood_ns: int, now_ns: int) -> None:
-        """The supervisor stood still for so long: it could not hear of any progress (`protocol.standstill`)."""
-        self._moved_ns = min(now_ns, self._moved_ns + stood_ns)
+    code: int
+    signal: str = ""
+    """The name of the signal that ended it."""
+    log: Sequence[str] = ()
+    killed_by_us: str = ""
+    out_of_memory: bool = False
+    is_remote: bool = False
 
-    def is_over(self, now_ns: int) -> bool:
-        """Whether nothing is waited for any more."""
-        core = self._core
-        hub, deadlines = core.roster.by_name.get(VHUB), core.deployment.deadlines
-        if hub is None or hub.farewell:
-            return True
-        account = hub.report.get("recording")
-        if account != self._account:
-            self._account, self._moved_ns = account, now_ns
-        if hub.gone_ns and now_ns > hub.gone_ns + GONE_NS and not hub.in_doubt:
-            self._cut_off(hub, "its vHub ended before it was closed")
-            return True
-        if now_ns > max(self._moved_ns, core.watch.ended_ns) + deadlines.close_ns:
-            wait_s = deadlines.close_ns / 1e9
-            self._cut_off(hub, f"its vHub has made no progress in closing it for {wait_s:g} s (deadlines.close)")
-            return True
-        return False
+    @property
+    def is_by_signal(self) -> bool:
+        """Whether a signal ended it: of itself it would not have."""
+        return self.code < 0 or (self.is_remote and self.code > BY_SIGNAL)
 
-    def _cut_off(self, hub: Process, why: str) -> None:
-        if hub.report.get("capture"):
-            self.cut_off = f"the capture is cut off: {why}"
+    @property
+    def text(self) -> str:
+        """`was killed by SIGKILL, not by foosim`: to stand behind the name of the process."""
+        if self.killed_by_us:
+            return f"was killed by up: {self.killed_by_us}"
+        if self.code < 0:
+            if self.out_of_memory or self._lacked_memory:
+                return f"was killed by {self.signal}: too little memory"
+            return f"was killed by {self.signal}, not by foosim"
+        if self._lacked_memory:
+            return f"ended with exit code {self.code}: too little memory"
+        if self.code == REFUSED and self.last_words:
+            return f"ended with exit code {self.code}, refused: {self.last_words}"
+        return f"ended with exit code {self.code}"
+
+    @property
+    def last_words(self) -> str:
+        """The last line of its log, without time and name; it may say why it ended."""
+        line = self.log[-1].strip() if self.log else ""
+        head, found, words = line.partition(": ")
+        return (words if found and head[:4].isdigit() and "Z " in head else line)[:WORDS_MAX]
+
+    @property
+    def _lacked_memory(self) -> bool:
+        return any(said in line for line in self.log for said in NO_MEMORY)

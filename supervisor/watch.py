@@ -75,7 +75,7 @@ class Watch:
         self._progress_ns = min(now_ns, self._progress_ns + stood_ns)
         self.ended_ns = min(now_ns, self.ended_ns + stood_ns)
         core.absence.rest(stood_ns)
-        core.ending.rest(stood_ns, now_ns)
+        core.closing.rest(stood_ns, now_ns)
         if core.take_over is not None:
             core.take_over.rest(stood_ns)
         if stood_ns >= TOLD_NS:

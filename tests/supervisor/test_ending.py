@@ -1,97 +1,57 @@
-"""A run that has ended waits for its capture as long as there is progress; one that is cut off is an error."""
+"""How a process ended, in words: who killed it, whether memory was short, what it said last."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import pytest
 
-from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.status import result, status
-from foosim.vhub.core import HubCore
+from foosim.supervisor import memory
+from foosim.supervisor.ending import Ending
+from foosim.supervisor.memory import oom_kills
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-S: Final = 1_000_000_000
+REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 
 
-class Slow:
-    """A vHub that takes long to close its capture: rows are written until `stalls_s`, and all are after `takes_s`."""
-
-    def __init__(self, takes_s: float, stalls_s: float = 1e9, capture: str = "run.mcap") -> None:
-        self.takes_ns, self.stalls_ns, self.capture = int(takes_s * S), int(stalls_s * S), capture
-        self.at: dict[float, Callable[[System], object]] = {}
-        """What happens when, in s behind the end of the run."""
-        self.seen: list[dict[str, Any]] = []
-        self.waited: set[str] = set()
-        self.ended_ns = 0
-
-    def __call__(self, hub: HubCore, passed_ns: int) -> bool:
-        if not self.ended_ns:
-            self.ended_ns = self.system.bus.now_ns
-            for at_s, do in self.at.items():
-                self.system.later(int(at_s * S), partial(do, self.system))
-        hub.capture = self.capture
-        hub.recording = {"state": "closing", "problem": "", "written": min(passed_ns, self.stalls_ns) // (S // 2)}
-        self.waited |= {hub.waiting_for}
-        told = status(self.system.supervisor, 0)
-        self.seen.append({"written": told["recording"]["written"], "waits": told["processes"][VHUB]["waiting_for"]})
-        return passed_ns >= self.takes_ns
-
-    def run(self) -> dict[str, Any]:
-        def prepare(system: System) -> None:
-            self.system = system
-
-        settings = Settings(closing=self)
-        rehearse(TABLE.read_text(), TABLE.name, 10, 1, ["engine=pure"], settings, prepare=prepare)
-        self.took_s = (self.system.bus.now_ns - self.ended_ns) / S
-        return result(self.system.supervisor)
+@pytest.mark.parametrize(
+    ("ending", "text"),
+    [
+        (Ending(-9, "SIGKILL"), "was killed by SIGKILL, not by foosim"),
+        (Ending(-9, "SIGKILL", killed_by_us="it had no answer"), "was killed by up: it had no answer"),
+        (Ending(-9, "SIGKILL", out_of_memory=True), "was killed by SIGKILL: too little memory"),
+        (
+            Ending(-6, "SIGABRT", ["memory allocation of 4096 bytes failed"]),
+            "was killed by SIGABRT: too little memory",
+        ),
+        (Ending(-11, "SIGSEGV", ["anything"]), "was killed by SIGSEGV, not by foosim"),
+        (Ending(1, "", ["  File ...", "MemoryError"]), "ended with exit code 1: too little memory"),
+        (Ending(1, "", ["no journal of this version"]), "ended with exit code 1"),
+        (
+            Ending(3, "", ["before", REFUSED]),
+            "ended with exit code 3, refused: refused by the supervisor: a node red is already here",
+        ),
+        (Ending(3, "", ["a.mcap: exists already"]), "ended with exit code 3, refused: a.mcap: exists already"),
+        (Ending(3), "ended with exit code 3"),
+    ],
+)
+def test_a_reason_names_who_ended_a_process(ending: Ending, text: str) -> None:
+    assert ending.text == text
 
 
-def test_as_long_as_there_is_progress_it_is_waited_for_and_shown() -> None:
-    slow = Slow(takes_s=55)
-    found = slow.run()
-    assert (found["reason"], found["failed"], found["capture"]) == ("done", False, "run.mcap")
-    assert 55 <= slow.took_s < 56
-    written = [seen["written"] for seen in slow.seen]
-    assert written == sorted(written) and len(set(written)) > 100 and slow.seen[-1]["waits"] == "capture"
+def test_a_signal_is_known_on_another_machine_too() -> None:
+    assert Ending(-9, "SIGKILL").is_by_signal and Ending(137, is_remote=True).is_by_signal
+    assert not Ending(137).is_by_signal and not Ending(1, is_remote=True).is_by_signal
 
 
-@pytest.mark.parametrize("capture", ["run.mcap", ""])
-def test_without_progress_it_is_cut_off_which_is_an_error_where_there_is_a_capture(capture: str) -> None:
-    slow = Slow(takes_s=1000, stalls_s=20, capture=capture)
-    found = slow.run()
-    assert 50 <= slow.took_s < 51, "20 s, and deadlines.close"
-    if not capture:
-        assert (found["reason"], found["failed"], found["capture"]) == ("done", False, None)
-        return
-    why = "its vHub has made no progress in closing it for 30 s (deadlines.close)"
-    assert found["reason"] == f"done; the capture is cut off: {why}"
-    assert found["failed"] and found["capture"] == "run.mcap"
-
-
-def test_a_vhub_that_ends_while_it_closes_its_capture_cuts_it_off() -> None:
-    def kill(system: System) -> None:
-        system.leave(VHUB)
-        system._supervisor_sees_gone(VHUB)
-
-    slow = Slow(takes_s=1000)
-    slow.at[15] = kill
-    found = slow.run()
-    assert found["reason"] == "done; the capture is cut off: its vHub ended before it was closed"
-    assert found["failed"] and 15 <= slow.took_s < 17
-
-
-def test_a_supervisor_that_stood_still_meanwhile_cuts_nothing_off() -> None:
-    """It hears of no progress for 100 s, and then that the connection has ended and is there again."""
-    slow = Slow(takes_s=55)
-    slow.at[10] = lambda system: system.set_forward(SUPERVISOR, 100 * S)
-    slow.at[20] = lambda system: system.pause(SUPERVISOR, 31 * S)
-    slow.at[51.1] = lambda system: system._supervisor_sees_gone(VHUB)
-    found = slow.run()
-    assert (found["reason"], found["failed"], found["capture"]) == ("done", False, "run.mcap")
-    assert 55 <= slow.took_s < 56
+def test_the_kernel_says_how_many_it_has_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "vmstat").write_text("pgfault 12\noom_kill 3\n")
+    (tmp_path / "group").write_text("0::/user/run\n")
+    (tmp_path / "user" / "run").mkdir(parents=True)
+    (tmp_path / "user" / "run" / "memory.events").write_text("low 0\noom 9\noom_kill 2\n")
+    for name, place in (("_VMSTAT", "vmstat"), ("_OWN_GROUP", "group"), ("_GROUPS", "")):
+        monkeypatch.setattr(memory, name, tmp_path / place)
+    assert oom_kills() == 5
+    (tmp_path / "user" / "run" / "memory.events").unlink()
+    (tmp_path / "vmstat").unlink()
+    assert oom_kills() == 0, "where it does not say"
