@@ -339,7 +339,7 @@ def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _give_up_waiting(system: System, name: str) -> None:
-    """The time is over that a run in realtime has for a player: those of a swarm's deployment are as long as it lasts."""
+    """The time is over that a run in realtime waits for a player: in a swarm deadlines are as long as it lasts."""
     session, releases = system.hub.sessions.by_name.get(name), system.hub.releases
     if session is not None and session.away_ns >= 0 and releases is not None and releases.factor:
         session.away_ns = system.now_of(channels.VHUB)

@@ -35,6 +35,8 @@ class Departures:
         core, told = self._core, hub.report.get("absences")
         if told is None or not core.is_open or core.end is not None:
             return
+        if told["boot"] != hub.boot:
+            return  # it comes late, of a vHub before this one
         if not self._boot:
             self._known = {(entry.what, entry.name, entry.reason, entry.tick) for entry in core.recovery.recovered}
         if hub.boot != self._boot:
