@@ -400,10 +400,9 @@ class System:
         self.leave(name)
         if name in self.players:
             self.clients.gone(name)
-        if name not in self.solvers:
-            return
-        self.solvers.pop(name).close()
-        self._supervisor_sees_gone(name)
+        elif name in self.solvers:
+            self.solvers.pop(name).close()
+            self._supervisor_sees_gone(name)
 
     def end_amid(self, name: str, actions: int) -> None:
         """End the supervisor amid its next turn, when it has performed so many of its actions."""
