@@ -178,8 +178,8 @@ def _history(plan: Plan, folder: RunFolder) -> History | None:
     """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
     if folder.result() is not None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
-    if not journal_files(folder.journals, SUPERVISOR):
-        return None
+    if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
+        return None  # the one before may have ended when it had only made the file
     try:
         history = fold(plan.deployment, read_newest(folder.journals, SUPERVISOR))
     except (JournalError, Malformed) as error:
