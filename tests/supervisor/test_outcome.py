@@ -145,7 +145,7 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
 def test_a_supervisor_goes_on_from_no_journal_that_has_nothing_and_from_none_that_is_damaged(left: Left) -> None:
     plan, folder = make_plan(RunOptions(TABLE, sets=("engine=pure",))), left.folder
     damage(left.journal(SUPERVISOR))
-    with pytest.raises(Refused, match="run mine cannot go on: .*record"):
+    with pytest.raises(Refused, match=r"run mine cannot go on: .*record"):
         history_of(plan, folder)
     left.journal(SUPERVISOR).write_bytes(b"")
     assert history_of(plan, folder) is None, "the one before was killed when it had made the file: the run begins"
