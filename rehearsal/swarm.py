@@ -32,10 +32,12 @@ from foosim.rehearsal.faults import (
     KINDS,
     MS,
     ONCE,
+    PLAYERS_EVERY,
     TICKS,
     Dice,
     Fault,
     ask,
+    lose_player,
     revive,
     when_answered,
 )
@@ -119,6 +121,10 @@ def plan_of(seed: int, ticks: int = TICKS) -> Plan:
     once = [kind for place, kind in enumerate(chosen) if kind not in ONCE or kind not in chosen[:place]]
     late = max(0, ticks - TICKS)
     faults = [_later(FAULT_OF[kind](dice, names), dice.between(0, late) if late else 0) for kind in once]
+    if seed % PLAYERS_EVERY == PLAYERS_EVERY - 1:
+        of_players = Dice(seed, "players")
+        lost = [lose_player(of_players, names) for _ in range(of_players.between(1, 3) * times)]
+        faults += [_later(fault, of_players.between(0, late) if late else 0) for fault in lost]
     faults.sort(key=lambda fault: fault.tick)
     here = (*names, channels.SUPERVISOR, channels.VHUB, PROBER)
     clocks = tuple((name, Clock(dice.between(0, 2 * HOUR_NS), dice.between(-1000, 1000))) for name in here)
@@ -293,6 +299,8 @@ class Flight:
         for number in range(1, self.plan.nodes + 1):
             ask(system, "start", node=f"n{number}")
             revive(system, f"n{number}")
+        for name in sorted(system.players):
+            revive(system, name)
 
 
 @lru_cache(maxsize=4 * WORLDS)

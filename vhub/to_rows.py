@@ -283,7 +283,7 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
             for pairs in (joining.subscriptions, joining.arrivals)
         )
         rows.append(ClientRow(tick, joining.name, "joins", joining.period, heard, joining.offset, calling))
-    return rows
+    return [*rows, *(ClientRow(tick, name, "leaves_owing", 0, []) for name in closing.owing)]
 
 
 def edit_row(edit: Edit) -> EditRow:

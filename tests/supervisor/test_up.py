@@ -148,6 +148,47 @@ def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monk
     up._launcher.close()
 
 
+@pytest.mark.parametrize(
+    ("ends", "sets", "starts", "ends_run"),
+    [
+        ("kill -9 $$", (), 2, False),
+        ("kill -9 $$", ("players.player-red.restart=false",), 1, True),
+        ("exit 1", (), 1, True),
+    ],
+)
+def test_a_player_is_started_again_when_a_signal_has_ended_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, sets: tuple[str, ...], starts: int, ends_run: bool
+) -> None:
+    """One that ends by itself has failed. The sixth time within a minute it is given up, and the run ends."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE, sets=sets)), None, Display(said), "run")
+    (tmp_path / "player").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
+    (tmp_path / "player").chmod(0o755)
+    up._launch("player-red", [str(tmp_path / "player")])
+    up._has_begun = True
+    now_s = 0.0
+
+    def ended() -> bool:
+        child: Child = up._launcher.children["player-red"]
+        child.process.wait()
+        return up._ends_run(child)
+
+    def go_on() -> int:
+        nonlocal now_s
+        up._restart_ended(now_s, knows=True)
+        now_s += max(WAITS_S)
+        up._restart_ended(now_s, knows=True)
+        up._launcher.children["player-red"].process.wait()
+        return (tmp_path / "player.log").read_text().count("started")
+
+    assert ended() == ends_run and go_on() == starts
+    if not ends_run:
+        assert [go_on() for _ in range(5)][-1] == 6 and ended()
+        assert "player-red was killed by SIGKILL" in said.getvalue() and "is given up; its log" in said.getvalue()
+    up._launcher.close()
+
+
 def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
