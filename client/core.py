@@ -187,6 +187,11 @@ class ClientCore:
         if self.is_away:
             self._again_ns = now_ns
 
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The client's own loop stood still for so long: the vHub could not come back to it (`standstill`)."""
+        if self._lost_ns != NEVER_NS and self.deployment is not None:
+            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self.deployment.deadlines.vhub_back_ns)
+
     def statistics(self) -> ClientStatistics:
         downlinks = self._downlinks, self._repeated, self._missing, self._malformed, self._overflowed
         packets = self._received, self._sent, self._answered, self._unsent

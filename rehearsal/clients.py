@@ -56,6 +56,7 @@ class Clients:
                 system.soon(lambda: system.leave(name))
 
         system.enter(name, core, turn, channels.CLIENT_READS)
+        system.processes[name].stood = core.rest
 
     def start(self, name: str) -> None:
         """Start a player's process again, with new memory."""

@@ -287,12 +287,12 @@ class Flight:
         self._healed_ns = self._last_commit_ns = system.bus.now_ns
         system.healed = True
         system.bus.heal()
-        system.give_up("rate")  # or one that was lost before comes after this one
+        system.people.give_up("rate")  # or one that was lost before comes after this one
         ask(system, "rate", pace=HEALED_PACE)
         for name, process in list(system.processes.items()):
             process.slow_ns = 0
             system.resume(name)
-        stops = [identity for identity, verb in system.asked.items() if verb == "stop"]
+        stops = [identity for identity, verb in system.people.asked.items() if verb == "stop"]
         when_answered(system, stops, self._start_all)
 
     def _start_all(self, system: System) -> None:

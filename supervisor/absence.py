@@ -87,6 +87,10 @@ class Absence:
         elif self._entry is not None:
             self._entry.outage_ns, self._entry = max(self._gap_ns, now_ns - before_ns), None
 
+    def rest(self, stood_ns: int) -> None:
+        """The supervisor stood still for so long: that is no time in which the vHub could be heard."""
+        self._since_ns += stood_ns
+
     def is_over(self, now_ns: int) -> bool:
         """Whether the vHub was away for longer than a run waits; then the run is over, which is said."""
         core = self._core

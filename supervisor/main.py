@@ -83,6 +83,7 @@ class SupervisorProcess:
         self._loop.on_unwritten = self._on_unwritten
         self._room = JournalRoom(folder.journals, plan.deployment.capture.reserve_bytes)
         self._loop.took = self.core.watch.took
+        self._loop.stood = lambda stood_ns, now_ns: self.core.watch.rest(self.core, stood_ns, now_ns)
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
         wire.read(channels.SUPERVISOR_READS, channels.SUPERVISOR_WAITS)
@@ -101,7 +102,7 @@ class SupervisorProcess:
             return REFUSED
         self._folder.write_result(result(self.core))
         end = self.core.end
-        return FAILED if end is None or end.failed else DONE
+        return FAILED if end is None or end.failed or self.core.closing.cut_off else DONE
 
     def stop(self) -> None:
         """Have the run end in order, as the command `down` does; a signal handler may call this."""

@@ -258,6 +258,9 @@ class Up:
         self._tell_recoveries(status["recoveries"])
         if not self._has_ended:
             self.display.show(status, now_s)
+        else:  # the supervisor waits as long as there is progress, and so do we
+            self.display.show_closing(status)
+            self._ending_s = now_s if self._ending_s else 0.0
         self._has_begun = self._has_begun or status["begun"]
         self._has_ended = status["state"] in ENDED
         self._stopped = {name for name, process in status["processes"].items() if process["stopped"]}
@@ -467,7 +470,8 @@ class Up:
 
     def _capture_lines(self) -> list[str]:
         """Say where the capture is, and whether it has its end: who was killed, or failed, did not finish it."""
-        lines = capture_lines(self.capture, self.folder.result())
+        journals = None if VHUB in self._launcher.remotes else self.folder.journals
+        lines = capture_lines(self.capture, self.folder.result(), journals)
         return lines or ([self._not_home] if self._not_home else [])
 
     @contextmanager

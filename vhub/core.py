@@ -46,6 +46,7 @@ from foosim.protocol.messages import (
     Up,
     Want,
 )
+from foosim.protocol.orphan import Orphan
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain
@@ -84,7 +85,7 @@ class HubCore:
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
-        self.door, self.footing = Door(self), Footing(self, machine)
+        self.door, self.footing, self.orphan = Door(self), Footing(self, machine), Orphan()
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
@@ -158,7 +159,7 @@ class HubCore:
 
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
-        self.member.wake(now_ns, self._heartbeat)
+        self.member.wake(now_ns, self.heartbeat)
         self.door.wake(now_ns)
         if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
@@ -464,9 +465,10 @@ class HubCore:
 
     def say_heartbeat(self) -> None:
         """Say at once what the next heartbeat would."""
-        self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self._heartbeat())))
+        self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self.heartbeat())))
 
-    def _heartbeat(self) -> Heartbeat:
+    def heartbeat(self) -> Heartbeat:
+        """Return what it says of itself."""
         tick = 0 if self.state is None else self.state.closed + 1
         return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, report(self))
 

@@ -11,11 +11,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from foosim.protocol import limits
-from foosim.protocol.actions import Journal
+from foosim.protocol.actions import Journal, Say
 from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import ClientHello, Done, Go, Join, Tempo, Up
+from foosim.protocol.standstill import TOLD_NS, told
 from foosim.protocol.units import parse_pace
 from foosim.vhub.absences import Absences
 from foosim.vhub.members import Member, may_lockstep, may_restart
@@ -40,6 +41,7 @@ class Door:
         self._owing: list[str] = []
         """Who leaves at the tick that waits for their Dones."""
         self.absences = Absences()
+        self._looked_ns = 0
 
     def go_on(self, written: InputsRecord | None, now_ns: int) -> None:
         """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick."""
@@ -166,6 +168,7 @@ class Door:
             core.repeated += 1
             return
         self.take_done(done.name)
+        session.answered()
         session.done = done
 
     def take_done(self, client: str) -> None:
@@ -263,15 +266,44 @@ class Door:
         """The tick that is closed next."""
         return 0 if self._core.state is None else self._core.state.closed + 1
 
+    @property
+    def holds(self) -> bool:
+        """Whether the vHub waits for its supervisor: nothing can go on, and nobody is let in."""
+        return self._core.orphan.is_alone or self._core.footing.waits
+
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The vHub's own loop stood still for so long: that counts against no client, and not against the supervisor.
+
+        Where connections may have closed by it, clients have their whole time from now on (`standstill`).
+        """
+        core = self._core
+        core.orphan.rest(stood_ns, now_ns)
+        if stood_ns >= TOLD_NS:
+            core.actions.append(Say("warning", told(stood_ns)))
+        self._rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
+        self._looked_ns = now_ns
+
+    def _rest(self, for_ns: int, now_ns: int) -> None:
+        if self._core.deployment is not None:
+            self._core.sessions.rest(for_ns, self._back_ns, now_ns)
+
     def wake(self, now_ns: int) -> None:
-        """Say Go again, and give up who has not answered or was away for too long."""
+        """Say Go again, lose who has not answered in time, and give up who was away for too long.
+
+        Both clocks rest while the run is paused; they begin anew when the vHub has waited for its supervisor, since
+        what closed that connection may have closed those of clients as well.
+        """
         core = self._core
         if core.state is None:
             return
-        if core.waited and core.releases is not None:
-            core.sessions.repeat(core.waited, now_ns)
-            for late in core.sessions.overdue(core.waited, core.releases.paused, now_ns):
-                core.give_up(late.unanswered)
+        core.sessions.repeat(core.waited, now_ns)
+        passed_ns, self._looked_ns = now_ns - self._looked_ns, now_ns
+        if self.holds:
+            self._rest(limits.COUNTER_MAX, now_ns)
+        elif core.releases is not None and core.releases.paused:
+            self._rest(passed_ns, now_ns)
+        for late in core.sessions.overdue(now_ns):
+            core.give_up(late.unanswered)
         for name in core.sessions.late(now_ns):
             session = core.sessions.by_name[name]
             if not self._is_waited_for(name):
@@ -297,6 +329,7 @@ class Door:
         core.sessions.joins.pop(name, None)
         if core.waits_for(name):
             core.waited.remove(name)
+            core.sessions.by_name[name].answered()  # nothing that it still owes is waited for
             self._owing.append(name)
         else:
             self._leaves.append(name)

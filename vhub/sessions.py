@@ -7,7 +7,7 @@ world must remember of a client is in `state`. Neighbours: `core`, `door` (what 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from foosim.protocol import channels, limits
@@ -53,7 +53,8 @@ class Session:
     before: set[str] = field(default_factory=set)
     """Boots of processes that are gone for good: what comes late of them is of nobody."""
     away_ns: int = -1
-    """Until when a client that is away may come back, and one that was started again may join; -1 while it is here."""
+    """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
+    here."""
     next_sequence: int = 1
     """The number of its next packet: nothing behind a gap is taken."""
     heard: int = 0
@@ -64,6 +65,7 @@ class Session:
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
+    """By when it is to answer; 0 while no answer is waited for."""
     allowed_ns: int = 0
     deadline: str = ""
     """Which one of the deployment's that is."""
@@ -87,6 +89,23 @@ class Session:
         self.boot, self.received, self.is_behind, self.is_gone = boot, received, True, False
         self.away_ns = self.away_ns if joins_first else -1
         self.next_sequence = max(self.next_sequence, sequence + 1)
+
+    @property
+    def lost_ns(self) -> int:
+        """When a client that is away is lost: its process may be gone, or only stand still, so the later time counts
+        of those for coming back and for its answer."""
+        return max(self.away_ns, self.deadline_ns)
+
+    def answered(self) -> None:
+        """No answer is waited for."""
+        self.deadline_ns = 0
+
+    def rest(self, for_ns: int, back_ns: int, now_ns: int) -> None:
+        """For so long the client could do nothing: move its deadlines, at most to where they would begin now."""
+        if self.away_ns >= 0:
+            self.away_ns = max(self.away_ns, min(self.away_ns + for_ns, now_ns + back_ns))
+        if self.deadline_ns:
+            self.deadline_ns = min(self.deadline_ns + for_ns, now_ns + self.allowed_ns)
 
     def take(self, packets: Sequence[Sent]) -> int:
         """Take what the client sends, each number once and in order; return how many were taken before."""
@@ -202,12 +221,13 @@ class Sessions:
 
     def late(self, now_ns: int) -> list[str]:
         """Return the clients that were away for too long, in name order."""
-        return [name for name, session in sorted(self.by_name.items()) if 0 <= session.away_ns <= now_ns]
+        away = [(name, session) for name, session in sorted(self.by_name.items()) if session.away_ns >= 0]
+        return [name for name, session in away if session.lost_ns <= now_ns]
 
     @property
     def late_ns(self) -> int | None:
         """When the next client has been away for too long."""
-        return min((session.away_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
+        return min((session.lost_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
 
     def join(self, join: Join) -> None:
         """Note a join; it takes effect when the hub closes a tick that suits it."""
@@ -278,7 +298,7 @@ class Sessions:
         session.is_present = True
         session.away_ns = -1
         if session.is_behind:
-            session.deadline_ns = now_ns + session.allowed_ns
+            session.deadline_ns = now_ns + session.allowed_ns if waits else 0
             session.is_behind = False
             missed = [*self.downlinks.behind(session.name, session.received), *([session.go] if waits else [])]
             self._actions += [Publish(channels.DOWN, session.name, payload) for payload in missed]
@@ -293,13 +313,15 @@ class Sessions:
                 session.heard, session.heard_ns = member.sequence, now_ns
                 self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence, state.branch))))
 
-    def overdue(self, waited: Sequence[str], paused: bool, now_ns: int) -> list[Session]:
-        """Return those whose deadline has passed; while the run is paused none passes."""
-        sessions = [self.by_name[name] for name in waited]
-        if paused:
-            for session in sessions:
-                session.deadline_ns = max(session.deadline_ns, now_ns + limits.WANT_EVERY_NS_MAX)
-        return [session for session in sessions if now_ns >= session.deadline_ns and session.away_ns < 0]
+    def rest(self, for_ns: int, back_ns: Callable[[str], int], now_ns: int) -> None:
+        """For so long no client could do anything; `back_ns` tells what one that is away has to come back."""
+        for name, session in self.by_name.items():
+            session.rest(for_ns, back_ns(name), now_ns)
+
+    def overdue(self, now_ns: int) -> list[Session]:
+        """Return those who are here and have not answered in time, in name order."""
+        waited = [session for _, session in sorted(self.by_name.items()) if session.deadline_ns]
+        return [session for session in waited if now_ns >= session.deadline_ns and session.away_ns < 0]
 
     def again_ns(self, waited: Sequence[str]) -> int:
         """When the next Go is said again."""

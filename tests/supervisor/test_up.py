@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import time
 from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Final
 
 import pytest
@@ -18,7 +20,8 @@ from foosim.supervisor.liveness import UNANSWERED_MAX
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.supervisor.restarts import WAITS_S
 from foosim.supervisor.run_folder import RunInfo
-from foosim.supervisor.up import Killed, Up
+from foosim.supervisor.status import NOT_RECORDED
+from foosim.supervisor.up import END_S, Killed, Up
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -216,5 +219,40 @@ def test_a_supervisor_that_runs_and_lets_nobody_in_is_an_error(tmp_path: Path, m
     up.folder.write_info(RunInfo("run", "table", str(TABLE), pid, "", "tcp/127.0.0.1:1"))
     with ExitStack() as stack, pytest.raises(ConnectError, match="no router answers at"):
         up._connect(stack)
+    up._launcher.kill()
+    up._launcher.close()
+
+
+def test_a_capture_that_was_cut_off_is_an_error_with_the_command_that_completes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    capture = tmp_path / "run.mcap"
+    up = Up(make_plan(RunOptions(TABLE)), capture, Display(io.StringIO()), "run")
+    capture.write_bytes(b"\x89MCAP0\r\n")
+    reason = "done; the capture is cut off: its vHub ended before it was closed"
+    up.folder.write_result({"reason": reason, "failed": True, "recoveries": [], "recording": NOT_RECORDED})
+    outcome = up._outcome()
+    assert outcome.failed and outcome.lines == (
+        f"the run has ended: {reason}",
+        f"capture {capture} (unfinished)",
+        f"complete it with: foosim-replay recover {capture} --journals {up.folder.journals}",
+    )
+    up._launcher.close()
+
+
+def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says_that_it_closes_its_capture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up._launch(SUPERVISOR, ["sleep", "100"])
+    told = {"state": "ended", "recoveries": [], "processes": {}, "starts": {}, "recording": NOT_RECORDED}
+    closing = SimpleNamespace(status=lambda timeout_s, give_up: told)
+    up._has_begun = up._has_ended = up._is_told = True
+    up._interrupts, up._ending_s = 1, time.monotonic() - END_S - 1
+    assert not up._goes_on(), "it would be cut off"
+    up._show(closing)  # type: ignore[arg-type]
+    assert up._goes_on()
     up._launcher.kill()
     up._launcher.close()

@@ -199,8 +199,8 @@ class _BlindNode(NodeCore):
 def test_who_keeps_the_vhub_waiting_for_samples_is_lost_not_the_vhub() -> None:
     seen = Seen(sets=DEADLINES, ticks=300)
     seen.settings.node = _BlindNode
-    reason, tick = ended(seen.go())
-    assert reason == f"lost n2: tick {tick} is overdue by 1.0 s" and 60 <= tick <= 62
+    reason, tick = ended(seen.go())  # by its heartbeats it may be the vHub that hears nobody: that would show by then
+    assert reason == f"lost n2: tick {tick} is overdue by 1.6 s" and 60 <= tick <= 62
 
 
 class _StuckHub(HubCore):
