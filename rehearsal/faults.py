@@ -339,10 +339,11 @@ def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _give_up_waiting(system: System, name: str) -> None:
-    """The time is over that a player has to come back: those of a swarm's deployment are as long as it lasts."""
-    session = system.hub.sessions.by_name.get(name)
-    if session is not None and session.away_ns >= 0:
+    """The time is over that a run in realtime waits for a player: in a swarm deadlines are as long as it lasts."""
+    session, releases = system.hub.sessions.by_name.get(name), system.hub.releases
+    if session is not None and session.away_ns >= 0 and releases is not None and releases.factor:
         session.away_ns = system.now_of(channels.VHUB)
+        session.answered()
 
 
 FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {

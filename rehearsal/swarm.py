@@ -74,6 +74,7 @@ PATIENT: Final[tuple[str, ...]] = (
     "deadlines.lockstep_fast=24 h",
     "deadlines.lockstep_realtime=24 h",
     "deadlines.client_back=24 h",
+    "deadlines.start=24 h",
 )
 """A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
 RESTART_NS: Final = 500 * MS

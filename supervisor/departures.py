@@ -24,6 +24,8 @@ class Departures:
         """The start of the vHub that has told last."""
         self._heard = 0
         """The number of what it told last."""
+        self._known: set[tuple[str, str, str, int]] = set()
+        """What the account had when this supervisor heard of the vHub first: a supervisor before it has noted that."""
         self._gaps_ns: dict[str, int] = {}
         """Of those that are away: the longest time between two commits since."""
         self._open: list[tuple[Recovered, int]] = []
@@ -33,12 +35,15 @@ class Departures:
         core, told = self._core, hub.report.get("absences")
         if told is None or not core.is_open or core.end is not None:
             return
-        known = {(e.what, e.name, e.reason, e.tick) for e in core.recovery.recovered} if not self._boot else set()
+        if told["boot"] != hub.boot:
+            return  # it comes late, of a vHub before this one
+        if not self._boot:
+            self._known = {(entry.what, entry.name, entry.reason, entry.tick) for entry in core.recovery.recovered}
         if hub.boot != self._boot:
             self._boot, self._heard = hub.boot, 0
         gaps_ns, self._gaps_ns = self._gaps_ns, {name: self._gaps_ns.get(name, 0) for name in told["away"]}
         for number, what, name, reason, tick in told["over"]:
-            if number > self._heard and (what, name, reason, tick) not in known:
+            if number > self._heard and (what, name, reason, tick) not in self._known:
                 entry = core.recovery.note(what, name, reason, core.epoch, tick)
                 self._open.append((entry, gaps_ns.get(name, 0)))
             self._heard = max(self._heard, number)

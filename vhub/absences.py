@@ -16,27 +16,29 @@ class Absences:
     """Who is away, and what is over of it, as of this start of the vHub."""
 
     def __init__(self) -> None:
-        self._away: dict[str, tuple[str, int]] = {}
-        """Why each one is away, and the tick that was to be closed next when it went."""
+        self._away: dict[str, tuple[str, str, int]] = {}
+        """Of each that is away: its process, why it is, and the tick that was to be closed next when it went."""
         self._over: list[tuple[int, str, str, str, int]] = []
         self._count = 0
         self.is_new = False
         """Whether there is something of which no heartbeat has told."""
 
-    def begin(self, name: str, reason: str, tick: int) -> None:
-        """A player is away, and waited for."""
-        self._away.setdefault(name, (reason, tick))
+    def begin(self, name: str, boot: str, reason: str, tick: int) -> None:
+        """A player's process, which was started as `boot`, is away, and waited for."""
+        self._away.setdefault(name, (boot, reason, tick))
         self.is_new = True
 
-    def end(self, name: str) -> None:
-        """A player is here again before it was given up."""
+    def end(self, name: str, boot: str) -> None:
+        """A player is here again before it was given up; where it is the same process, only its connection was cut."""
         if name in self._away:
-            self._note("player", name, *self._away.pop(name))
+            before, reason, tick = self._away.pop(name)
+            if before != boot:
+                self._note("player", name, reason, tick)
 
     def leave(self, name: str, tick: int) -> None:
         """The run goes on without a player that was waited for, from a tick on, which is written."""
         if name in self._away:
-            reason, _ = self._away.pop(name)
+            _, reason, _ = self._away.pop(name)
             self._note("player", name, f"{reason}; the run goes on without it", tick)
 
     def come_back(self, name: str, tick: int) -> None:

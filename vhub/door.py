@@ -115,7 +115,7 @@ class Door:
                 core.repeated += 1
                 return
             if session is not None and not session.boot and not hello.returns and known is not None and known.active:
-                self._miss(hello.name, "its process was lost while the vHub was away")
+                self._miss(hello.name, "", "its process was lost while the vHub was away")
             core.sessions.hello(hello, core.member.build, core.deployment, core.state, self._said(hello.name))
 
     def join(self, join: Join, payload: bytes, now_ns: int) -> None:
@@ -131,7 +131,7 @@ class Door:
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
         _check_timing(join)
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
-        self.absences.end(join.name)
+        self.absences.end(join.name, join.boot)
         self.tell()
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
@@ -223,15 +223,15 @@ class Door:
         session.is_gone = True
         if self._is_waited_for(name):
             session.away_ns = now_ns + self._back_ns(name)
-            self._miss(name, "its connection closed")
+            self._miss(name, session.boot, "its connection closed")
             return
         self._leave(name)
 
-    def _miss(self, name: str, reason: str) -> None:
-        """Note that a player is away from a run that has begun."""
+    def _miss(self, name: str, boot: str, reason: str) -> None:
+        """Note that a player's process is away from a run that has begun."""
         core = self._core
         if core.deployment is not None and may_restart(core.deployment, name) and core.epoch > 0:
-            self.absences.begin(name, reason, self._tick)
+            self.absences.begin(name, boot, reason, self._tick)
             self.tell()
 
     def tell(self) -> None:
@@ -327,9 +327,9 @@ class Door:
         """A player leaves until it is started again: at the tick whose Done it owes, or at the next one."""
         core = self._core
         core.sessions.joins.pop(name, None)
+        core.sessions.by_name[name].answered()
         if core.waits_for(name):
             core.waited.remove(name)
-            core.sessions.by_name[name].answered()  # nothing that it still owes is waited for
             self._owing.append(name)
         else:
             self._leaves.append(name)

@@ -314,7 +314,7 @@ class Sessions:
                 self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence, state.branch))))
 
     def rest(self, for_ns: int, back_ns: Callable[[str], int], now_ns: int) -> None:
-        """For so long no client could do anything; `back_ns` tells what one that is away has to come back."""
+        """For so long no client could do anything; `back_ns` is what each that is away has to come back."""
         for name, session in self.by_name.items():
             session.rest(for_ns, back_ns(name), now_ns)
 

@@ -26,6 +26,7 @@ from foosim.vhub.rows import CLIENTS, ClientRow
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 RED: Final = "player-red"
 SETS: Final = ("engine=pure", "substeps=1", "table.rules.kickoff_delay=20 ms")
+SOON: Final = ("deadlines.client_back=200 ms", "deadlines.lockstep_realtime=100 ms", "deadlines.tick_lost=5 s")
 MS: Final = 1_000_000
 TICKS: Final = 400
 
@@ -84,7 +85,7 @@ def test_in_fast_the_run_waits_and_the_new_process_answers_the_open_go(tmp_path:
 
 
 def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_later_one(tmp_path: Path) -> None:
-    run = Run(tmp_path / "run.mcap", "realtime", 500, "deadlines.client_back=200 ms", "deadlines.tick_lost=5 s")
+    run = Run(tmp_path / "run.mcap", "realtime", 500, *SOON)
     run.check()
     (joined, left, back) = run.comings()
     assert joined == (0, "joins") and left[1] == "leaves_owing" and back[1] == "joins"
@@ -107,8 +108,7 @@ def test_a_vhub_that_dies_before_the_record_gives_the_player_its_time_again(tmp_
         def also(system: System, ending: Any = ending) -> None:
             system.at_tick(100, lambda: system.later(190 * MS, lambda: system.kill_hub(ending, 50 * MS)))
 
-        sets = "deadlines.client_back=200 ms", "deadlines.tick_lost=5 s"
-        run = Run(tmp_path / f"{ending}.mcap", "realtime", 500, *sets, also=also)
+        run = Run(tmp_path / f"{ending}.mcap", "realtime", 500, *SOON, also=also)
         run.check()
         (_, left, back) = run.comings()
         assert (left[1], back[1]) == ("leaves_owing", "joins") and left[0] < back[0]
