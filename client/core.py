@@ -23,6 +23,7 @@ from foosim.client.packets import Outgoing, check_packet, check_subscription, sp
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
+from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
@@ -258,6 +259,13 @@ class ClientCore:
             return
         for part in split(sent, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part, self.branch)))
+
+    def fail(self, reason: str, trace: str = "") -> None:
+        """Say that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
+        if trace:
+            self.actions.append(Say("error", trace))
+        self.actions.append(Say("error", reason))
+        self._publish(encode(Failure(self.name, self.boot, reason)))
 
     # --- messages --------------------------------------------------------------------------------------------------
 

@@ -203,8 +203,8 @@ JOIN_OF: Final = "join of "
 
 
 class Heartbeat(Message, frozen=True):
-    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` a client
-    that is gone (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people.
+    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` says why the
+    run cannot go on (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people.
 
     Without a report it is the vHub's word, before late deliveries, on whom they waited for."""
 

@@ -22,6 +22,7 @@ from foosim.vhub.capture_parts import END_METADATA, METADATA, Joined
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
 from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_REASON, CUT_TICK, OWN
 from foosim.vhub.in_force import InForce
+from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK, CaptureError
@@ -140,6 +141,9 @@ class _Copy:
 
     def _describe(self, content: records.Metadata) -> None:
         if content.name == END_METADATA:
+            return
+        if content.name == CHECKS:
+            self._mcap.add_checks()
             return
         metadata = content.metadata
         if content.name == METADATA:

@@ -56,7 +56,7 @@ class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A sender's radio, or port of a wire: its queue, when it is free, how much of its duty cycle is left."""
+    """A sender's radio, or port of a wire: its queue, when it is free, what its duty cycle counts."""
 
     free_ns: int = 0
     waiting: list[tuple[int, int]] = []
@@ -67,9 +67,10 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     last_count: int = 0
     is_dropping: bool = False
     """CoDel's variables, by the names of RFC 8289."""
-    tokens_ns: int = -1
-    tokens_at_ns: int = 0
-    """Airtime that the duty cycle leaves, as of a time; -1 before the first packet."""
+    sent: list[tuple[int, int, int]] = []
+    """Where a duty cycle limits it: (start, end, airtime) of what it sent; of many, neighbours are taken together."""
+    sent_ns: int = 0
+    """The airtime of these together."""
     opportunity: int = 0
     opportunity_bytes: int = 0
     """How far a trace of capacity is used up."""

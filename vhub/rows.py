@@ -20,7 +20,7 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.message_types import Counter
 from foosim.protocol.messages import Add, Delivered, Disrupt, Edit, Freeze, Push, Remove, Thaw
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 """Version of the rows and of the capture's metadata; a reader refuses another one."""
 PROFILE: Final = "foosim"
 

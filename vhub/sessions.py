@@ -59,6 +59,8 @@ class Session:
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
     allowed_ns: int = 0
+    deadline: str = ""
+    """Which one of the deployment's that is."""
     done: Done | None = None
     inbox: list[Sent] = field(default_factory=list)
     inbox_bytes: int = 0
@@ -82,6 +84,12 @@ class Session:
             elif packet.sequence < self.next_sequence:
                 repeated += 1
         return repeated
+
+    @property
+    def unanswered(self) -> str:
+        """What is said when the deadline has passed."""
+        told = f"{self.name} has not answered tick {self.go_tick} for {self.allowed_ns / 1e9:g} s"
+        return f"{told} (deadlines.{self.deadline})"
 
     def wait(self, now_ns: int, allowed_ns: int, again_after_ns: int) -> None:
         """Begin to wait for a Done."""

@@ -8,11 +8,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.journal import Journal
 from foosim.rehearsal.diff import diff_captures
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.vhub import capture_file, capture_writer
+from foosim.vhub.branching import BadBranch, read_branch
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from tests.replay.conftest import TABLE, damaged, messages_of, replay
@@ -39,10 +41,14 @@ def test_info_of_an_unfinished_one_says_so(run: Path, tmp_path: Path) -> None:
     assert shown.code == 0 and "not finished, " in shown.out
 
 
-def test_info_refuses_what_is_no_capture(bad_files: list[Path]) -> None:
+def test_what_is_no_capture_is_refused_before_anything_is_simulated(bad_files: list[Path]) -> None:
+    deployment = load_deployment(TABLE.read_text(), TABLE.name)
     for bad in bad_files:
-        done = replay("info", bad)
-        assert done.code == 2 and done.err.startswith(f"{bad}: ") and done.err.count("\n") == 1
+        for command in ("info", "verify", "whatif"):
+            done = replay(command, bad)
+            assert done.code == 2 and done.err.startswith(f"{bad}: ") and done.err.count("\n") == 1, command
+        with pytest.raises(BadBranch, match=f"--from: {bad}: "):
+            read_branch(f"{bad}@0.1s", deployment)
 
 
 def test_a_finished_capture_is_clean(run: Path) -> None:

@@ -109,7 +109,7 @@ def test_what_the_run_was_is_in_the_capture(capture: CaptureData, hub_run: HubRu
         "model_hash": model_hash(hub_run.deployment),
         "run": "run-1",
         "fingerprint": "00",
-        "format": "1",
+        "format": "2",
         "world": "table",
         "seed": "1",
         "tick_ns": "2000000",
@@ -208,7 +208,7 @@ def test_the_mcap_library_reads_it_with_checksums_and_index(path: Path, hub_run:
         times = [message.log_time for _, _, message in reader.iter_messages("/tick", starting_at=50_000_000)]
         assert times == list(range(50_000_000, 130_000_000, 2_000_000))
         assert {a.name: a.data.decode() for a in reader.iter_attachments()}["deployment.yaml"] == hub_run.text
-        assert {m.name for m in reader.iter_metadata()} == {"foosim", "foosim.end"}
+        assert {m.name for m in reader.iter_metadata()} == {"foosim", "foosim.digests", "foosim.end"}
     with path.open("rb") as file:
         assert sum(1 for _ in StreamReader(file, validate_crcs=True).records) > sum(counts.values())
 
