@@ -205,8 +205,9 @@ class HeardState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class Age(msgspec.Struct, frozen=True):
-    """The ages at use of one channel at one client, of some time or of the whole run."""
+    """The ages at use of one channel at one client, of some time or of the whole run, up to the closing of a tick."""
 
+    tick: int
     client: str
     source: str
     channel: str

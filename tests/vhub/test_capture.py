@@ -164,6 +164,7 @@ def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
         "in_flight": account.in_flight,
     }
     assert info.topics == {
+        "/ages": 12,
         "/clients": 5,
         "/epochs": 2,
         "/frame": 8,
