@@ -140,6 +140,30 @@ def test_generated_parts_are_current(page: Path) -> None:
     assert reference().regenerated(text) == text, "write it anew: python docs/reference.py"
 
 
+NO_DEADLINES = {
+    "POLL_S",
+    "WATCH_S",
+    "LATE_EVERY_NS",
+    "AGAIN_S",
+    "QUERY_S",
+    "SWITCH_S",
+    "FORGET_EVERY_NS",
+    "LOOK_EVERY_NS",
+}
+"""How often something is done or said again, and what is no wait for another process."""
+
+
+def test_every_constant_that_waits_for_somebody_is_in_the_table_of_deadlines() -> None:
+    told = set(reference().CONSTANTS)
+    files = {module: (ROOT / f"{module.replace('.', '/')}.py").read_text() for module, _ in told}
+    found = {
+        (m, name)
+        for m, text in files.items()
+        for name in re.findall(r"^([A-Z_]+_(?:NS|MS|US|S)(?:_MAX)?)\b", text, re.M)
+    }
+    assert {(module, name) for module, name in found - told if name not in NO_DEADLINES} == set()
+
+
 def test_every_part_that_can_be_generated_stands_in_a_page() -> None:
     text = "".join(page.read_text() for page in PAGES)
     assert sorted(re.findall(r"<!-- generated: (\w+) -->", text)) == sorted(reference().WRITERS)

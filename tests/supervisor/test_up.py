@@ -17,6 +17,7 @@ from foosim.supervisor import control
 from foosim.supervisor.display import Display
 from foosim.supervisor.launcher import Child
 from foosim.supervisor.liveness import UNANSWERED_MAX
+from foosim.supervisor.outcome import capture_lines
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.supervisor.restarts import WAITS_S
 from foosim.supervisor.run_folder import RunInfo
@@ -223,22 +224,14 @@ def test_a_supervisor_that_runs_and_lets_nobody_in_is_an_error(tmp_path: Path, m
     up._launcher.close()
 
 
-def test_a_capture_that_was_cut_off_is_an_error_with_the_command_that_completes_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    capture = tmp_path / "run.mcap"
-    up = Up(make_plan(RunOptions(TABLE)), capture, Display(io.StringIO()), "run")
+def test_a_capture_that_was_cut_off_is_named_with_the_command_that_completes_it(tmp_path: Path) -> None:
+    capture, journals = tmp_path / "run.mcap", tmp_path / "journals"
     capture.write_bytes(b"\x89MCAP0\r\n")
-    reason = "done; the capture is cut off: its vHub ended before it was closed"
-    up.folder.write_result({"reason": reason, "failed": True, "recoveries": [], "recording": NOT_RECORDED})
-    outcome = up._outcome()
-    assert outcome.failed and outcome.lines == (
-        f"the run has ended: {reason}",
+    assert capture_lines(capture, {"recording": NOT_RECORDED}, journals) == [
         f"capture {capture} (unfinished)",
-        f"complete it with: foosim-replay recover {capture} --journals {up.folder.journals}",
-    )
-    up._launcher.close()
+        f"complete it with: foosim-replay recover {capture} --journals {journals}",
+    ]
+    assert capture_lines(capture, None, journals) == [f"capture {capture} (unfinished)"], "the run can be resumed"
 
 
 def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says_that_it_closes_its_capture(
@@ -247,7 +240,7 @@ def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
     up._launch(SUPERVISOR, ["sleep", "100"])
-    told = {"state": "ended", "recoveries": [], "processes": {}, "starts": {}, "recording": NOT_RECORDED}
+    told = {"state": "ended", "begun": True, "recoveries": [], "processes": {}, "starts": {}, "recording": NOT_RECORDED}
     closing = SimpleNamespace(status=lambda timeout_s, give_up: told)
     up._has_begun = up._has_ended = up._is_told = True
     up._interrupts, up._ending_s = 1, time.monotonic() - END_S - 1
