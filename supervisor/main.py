@@ -24,13 +24,14 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, JournalError, journal_files, read_newest, remove_journal
+from foosim.protocol.journal import Journal, JournalError, journal_files, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.notify import Notify
 from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.journal_check import supervisor_records
 from foosim.supervisor.journal_room import JournalRoom
 from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.records import History, fold
@@ -177,7 +178,7 @@ def _history(plan: Plan, folder: RunFolder) -> History | None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
     if not journal_files(folder.journals, SUPERVISOR):
         return None
-    history = fold(plan.deployment, read_newest(folder.journals, SUPERVISOR))
+    history = fold(plan.deployment, supervisor_records(folder, plan.options))
     if history.run.deployment != plan.text:
         raise Refused(f"run {folder.name} was started with another deployment than {plan.options.file} is now")
     return history

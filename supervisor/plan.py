@@ -24,6 +24,7 @@ from foosim.protocol.journal import journal_files
 from foosim.protocol.messages import Origin
 from foosim.protocol.start import Start
 from foosim.protocol.units import Pace, parse_ns, parse_pace
+from foosim.supervisor.journal_check import check_journals
 from foosim.supervisor.run_folder import RESULT_FILE, Launch, RunFolder
 from foosim.vhub.branching import Branch, read_branch
 from foosim.vhub.link_models import check_link_models
@@ -208,4 +209,5 @@ def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
         raise Refused(f"run {folder.name} has no journal to go on from in {folder.journals}")
     if folder.is_live() or not folder.is_left():
         raise Refused(f"run {folder.name} is alive: its processes are started again by themselves")
+    check_journals(folder, options_of(launch))
     return make_plan(options_of(launch)), Path(launch.capture) if launch.capture else None

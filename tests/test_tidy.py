@@ -89,6 +89,7 @@ SHELLS = {
     "supervisor/reach.py",
     "supervisor/journal_room.py",
     "supervisor/launcher.py",
+    "supervisor/journal_check.py",
     "supervisor/leftovers.py",
     "supervisor/main.py",
     "supervisor/net_command.py",

@@ -33,7 +33,7 @@ from foosim.protocol.errors import BadValue, DeploymentError
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, JournalError, read_journal, remove_journal
+from foosim.protocol.journal import Journal, JournalDamaged, JournalError, read_journal, read_whole, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
 from foosim.protocol.notify import Notify
@@ -42,6 +42,7 @@ from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
+from foosim.vhub.branching import branch_command
 from foosim.vhub.capture_file import check_new, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
@@ -51,7 +52,7 @@ from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 from foosim.vhub.records import Closing, first_head
-from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_captured
+from foosim.vhub.resume import Captured, end_of, first_tick_of, last_tick_of, recall, was_captured
 from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
@@ -224,7 +225,10 @@ class HubProcess:
             return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
         self._journal = self._loop.journal = Journal(folder, VHUB)
-        records = list(read_journal(folder, VHUB))
+        records, damaged = read_whole(read_journal(folder, VHUB))
+        if damaged is not None:
+            self._refuse(build, records, damaged)
+            return
         captured = self._open_capture(build, deployment, records)
         self._room = RoomWatch(self._capture, folder, deployment.capture.reserve_bytes)
         core.recording = self._room.recording
@@ -235,6 +239,15 @@ class HubProcess:
         for line in start_lines(meanings(deployment), build.deployment_name) if past is None else ():
             self._log.info(line)
         self._listen(deployment)
+
+    def _refuse(self, build: Build, records: list[bytes], damaged: JournalDamaged) -> None:
+        """Go on from no damaged journal: the run ends, and all stays as it is."""
+        self._loop.journal = None
+        before = was_captured(records)
+        capture = self._options.capture if before is None else Path(before) if before else None
+        what = f"{damaged}; tick {last_tick_of(records)} is the last before it"
+        self.core.failure = f"cannot go on: {what}. {branch_command([build.deployment_name], capture)}"
+        self.core.lose("the journal", what)
 
     def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:
         """Begin the capture, or go on with the one that the vHub before has begun; return how far it is."""
