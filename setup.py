@@ -40,7 +40,7 @@ COMPILED: Final = {
         *("requests", "roster", "take_over", "watch"),
     ),
     "vhub": (
-        *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "numbers", "packet"),
+        *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "members", "numbers", "packet"),
         *("propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit", "world"),
     ),
     "vhub/radio": (

@@ -23,6 +23,7 @@ from foosim.client.packets import Outgoing, check_packet, check_subscription, sp
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
+from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
@@ -108,7 +109,7 @@ class ClientCore:
         """How often the vHub was gone. What one of before said to a hello of before is no answer."""
         self._unrecorded: deque[Sent] = deque()
         self._resend_ns = NEVER_NS
-        self._period = 0
+        self._period = self._offset = 0
         self._sequence = 0
         self._downlink = 0
         self._gaps: set[int] = set()
@@ -191,19 +192,21 @@ class ClientCore:
 
     # --- what the client does --------------------------------------------------------------------------------------
 
-    def join(self, period_ticks: int, subscriptions: Iterable[tuple[str, str]]) -> None:
+    def join(self, period_ticks: int, subscriptions: Iterable[tuple[str, str]], offset_ticks: int = 0) -> None:
         """Take part: in lockstep every `period_ticks`, or free-running with 0; hear these (endpoint, channel).
+
+        Its ticks are those that leave the remainder `offset_ticks`, which is below the period.
 
         Raises UnknownName for an endpoint or a robot's channel that the deployment does not have.
         """
         assert self.deployment is not None and self.welcome is not None, "join before a welcome"
-        assert period_ticks >= 0, period_ticks
+        assert 0 <= offset_ticks < max(1, period_ticks), (offset_ticks, period_ticks)
         wanted = sorted(set(subscriptions))
         for source, channel in wanted:
             check_subscription(self.deployment, source, channel)
         items = [Subscription(source, channel) for source, channel in wanted]
-        self._join = encode(Join(self.name, self.boot, period_ticks, items))
-        self._period = period_ticks
+        self._join = encode(Join(self.name, self.boot, period_ticks, items, offset_ticks))
+        self._period, self._offset = period_ticks, offset_ticks
         if not self.is_away:
             self._publish(self._join)
         self._again_after_ns = AGAIN_NS
@@ -246,6 +249,13 @@ class ClientCore:
             return
         for part in split(sent, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part, self.branch)))
+
+    def fail(self, reason: str, trace: str = "") -> None:
+        """Say that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
+        if trace:
+            self.actions.append(Say("error", trace))
+        self.actions.append(Say("error", reason))
+        self._publish(encode(Failure(self.name, self.boot, reason)))
 
     # --- messages --------------------------------------------------------------------------------------------------
 
@@ -354,8 +364,9 @@ class ClientCore:
             return
         if not self._is_new(go):
             return
-        if self._period == 0 or go.tick % self._period != 0:
-            raise Malformed(f"Go for tick {go.tick} to a client with a period of {self._period} ticks")
+        if self._period == 0 or go.tick % self._period != self._offset:
+            timing = f"a period of {self._period} ticks and an offset of {self._offset}"
+            raise Malformed(f"Go for tick {go.tick} to a client with {timing}")
         if go.tick <= self.tick or self.ended:
             self._repeated += 1
             return

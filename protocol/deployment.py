@@ -22,7 +22,7 @@ from foosim.protocol.hosts import Host, Listen, Name, Placed
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.names import LineName, Team
 from foosim.protocol.network import LinkRule, Network, Selector
-from foosim.protocol.rovers import RoverRobot, RoverSensor, StationRobot
+from foosim.protocol.rovers import Offset, RoverRobot, RoverSensor, StationRobot
 from foosim.protocol.scene import Shape
 from foosim.protocol.scenery import (
     SCENERY_MAX,
@@ -66,6 +66,7 @@ class RodSensor(Part):
 
     kind: Literal["encoder"]
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     position_noise: LengthNoise
     angle_noise: AngleNoise
 
@@ -75,6 +76,7 @@ class BallSensor(Part):
 
     kind: Literal["ball"]
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     noise: LengthNoise
 
 
@@ -118,6 +120,7 @@ class Player(Placed):
 
     class_: ClassPath = Field(alias="class")
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     lockstep: bool = True
     on: RobotName | None = None
     process: Name | None = None
@@ -139,6 +142,7 @@ class ClientSpec(Part):
     on: RobotName | None = None
     lockstep: bool = False
     rate_hz: Rate | None = Field(default=None, alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
 
 
 class Capture(Part):
@@ -317,6 +321,10 @@ class Deployment(Part):
     def ticks(self, rate_hz: Fraction) -> int:
         """The period of a rate in ticks of this deployment."""
         return period_ticks(rate_hz, self.tick_ns)
+
+    def turns(self, timed: Sensor | Player) -> tuple[int, int]:
+        """Period and offset, in ticks, of a sensor or of a player in lockstep: its ticks are offset + n periods."""
+        return self.ticks(timed.rate_hz), timed.offset_ns // self.tick_ns
 
 
 def deployment_schema() -> dict[str, Any]:

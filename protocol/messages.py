@@ -203,8 +203,8 @@ JOIN_OF: Final = "join of "
 
 
 class Heartbeat(Message, frozen=True):
-    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` a client
-    that is gone (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people.
+    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` says why the
+    run cannot go on (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people.
 
     Without a report it is the vHub's word, before late deliveries, on whom they waited for."""
 
@@ -410,10 +410,9 @@ class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
 
 
 class Sent(Item, frozen=True):
-    """One packet that a client sends; `stamp_ns` is its own clock's, recorded and never judged.
+    """One packet that a client sends, to all who subscribe to its channel where `destination` is empty.
 
-    `destination` is empty when it goes to all who subscribe to the client's channel.
-    """
+    `stamp_ns` is its own clock's, recorded and never judged."""
 
     sequence: Counter
     destination: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
@@ -426,12 +425,13 @@ Packets = Annotated[list[Sent], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
 
 
 class Join(Message, frozen=True):
-    """A client takes part: `period` is in ticks (0: free-running). It takes effect at a tick that the vHub chooses."""
+    """A client takes part: `period` and `offset` are in ticks (0: free-running). The vHub chooses its first tick."""
 
     name: Name
     boot: Name
     period: Counter
     subscriptions: Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MAX)]
+    offset: Counter = 0
 
 
 class Up(Message, frozen=True):

@@ -22,7 +22,7 @@ from foosim.rehearsal import capture_commands, play_command, report_command, wha
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_info import CaptureInfo, capture_info
-from foosim.vhub.capture_parts import NEXT
+from foosim.vhub.capture_parts import FAILED_RUN, NEXT
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.payload_hash import HASHED
 from foosim.vhub.rows import CaptureError
@@ -58,7 +58,7 @@ def _describe(found: CaptureInfo) -> str:
     if NEXT in found.end:
         state = f"it goes on in {found.end[NEXT]}, which is not here"
     elif found.finished:
-        state = "finished"
+        state = "whole, of a run that failed" if FAILED_RUN in found.end else "finished"
     else:
         state = f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
     lines = [

@@ -42,6 +42,19 @@ class Process:
 
 
 @dataclass
+class AtWork:
+    """Whose turn it is: for whoever looks on from another thread."""
+
+    name: str = ""
+    tick: int = -1
+    """The tick that a player acts at; -1 while it is at none."""
+    acts: bool = False
+    """Whether it is a player's own code."""
+    turns: int = 0
+    """How many there have been; while it is the same number, it is the same turn."""
+
+
+@dataclass
 class Settings:
     """How to rehearse: everything beside the deployment. `slow_ns` is by process name."""
 

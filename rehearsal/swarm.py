@@ -150,11 +150,12 @@ class Prober:
             return
         if not self._joined:
             self._joined = True
-            rate_hz = core.deployment.clients[PROBER].rate_hz
-            assert rate_hz is not None
             deployment = core.deployment
+            spec = deployment.clients[PROBER]
+            assert spec.rate_hz is not None
             self._robots = sorted(deployment.robots)[:3] if deployment.is_hall else list(self.OF_TABLE)
-            core.join(core.deployment.ticks(rate_hz), [(robot, CHANNEL_ECHO) for robot in self._robots])
+            heard = [(robot, CHANNEL_ECHO) for robot in self._robots]
+            core.join(deployment.ticks(spec.rate_hz), heard, spec.offset_ns // deployment.tick_ns)
         if core.branch != self._branch:
             self._branch, last = core.branch, core.branch_ns // core.deployment.tick_ns
             self._back = {payload: tick for payload, tick in self._back.items() if tick <= last}

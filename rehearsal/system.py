@@ -14,8 +14,6 @@ from typing import Any, Final
 
 from mypy_extensions import mypyc_attr
 
-from foosim.client.core import ClientCore
-from foosim.client.player import PlayerLoop, load_player
 from foosim.node.solver import Solver
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish, Say
@@ -25,10 +23,11 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import Bus, Message, Traced
+from foosim.rehearsal.clients import Clients
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.hub_journal import Ending, HubJournal
-from foosim.rehearsal.settings import Process, Settings
+from foosim.rehearsal.settings import AtWork, Process, Settings
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
 from foosim.vhub.core import HubCore
@@ -53,7 +52,9 @@ class System:
         self.bus = Bus(rehearsal.weather)
         self.processes: dict[str, Process] = {}
         self.solvers: dict[str, Solver] = {}
-        self.players: dict[str, PlayerLoop] = {}
+        self.clients = Clients(self)
+        self.players = self.clients.players
+        self.at_work = AtWork()
         self.answers: dict[str, Answer] = {}
         self.healed = False
         """Whether a test has said that nothing new is to happen."""
@@ -90,13 +91,14 @@ class System:
         self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
-        self._enter_clients()
+        self.clients.enter_all()
         self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
         self._hub_back_ns = HUB_BACK_NS
 
-    def _enter(
+    def enter(
         self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
     ) -> None:
+        """Let a process in, which takes part from now on."""
         self.bus.subscribe(name, reads)
         process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
         process.clock = self._clock(name)
@@ -105,20 +107,20 @@ class System:
     def _clock(self, name: str) -> Clock:
         return self._clocks.setdefault(name, Clock())
 
-    def _now_of(self, name: str) -> int:
+    def now_of(self, name: str) -> int:
         """Return what a process's clock shows now."""
         return self._clock(name).at(self.bus.now_ns)
 
     def _enter_supervisor(self) -> None:
         core = self.supervisor
         core.on_commit = self._frames.append
-        self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
+        self.enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
         self.processes[channels.SUPERVISOR].took = core.watch.took
 
     def _enter_hub(self, fingerprint: bytes) -> None:
         """Let a vHub in, which goes on from the journal of the one before."""
         self._boots += 1
-        start = f"boot-{self._boots}", fingerprint, self._now_of(channels.VHUB)
+        start = f"boot-{self._boots}", fingerprint, self.now_of(channels.VHUB)
         hub = self.hub = self.settings.hub(*start, machine=self.hub_journal.machine)
 
         def turn(now_ns: int) -> None:
@@ -127,24 +129,14 @@ class System:
                 hub.begin(self.hub_journal.past(hub, build.run), now_ns)
             hub.advance(now_ns)
             if hub.member.refusal and self.settings.restart_ns and self.hub is hub:
-                self._next.append(lambda: self._hub_again(hub))
+                self.soon(lambda: self._hub_again(hub))
 
-        self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
+        self.enter(channels.VHUB, hub, turn, channels.VHUB_READS)
         self.processes[channels.VHUB].took = hub.waits.took
-
-    def _enter_clients(self) -> None:
-        for name, player in sorted(self.supervisor.deployment.players.items()):
-            assert player.lockstep, "a rehearsal has lockstep players only"
-            core = ClientCore(name, "boot", self._now_of(name))
-            loop = self.players[name] = PlayerLoop(core, load_player)
-            self._enter(name, core, loop.step, channels.CLIENT_READS)
-        for name, client in sorted(self.settings.clients.items()):
-            core = ClientCore(name, "boot", self._now_of(name))
-            self._enter(name, core, client(core), channels.CLIENT_READS)
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
-        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self._now_of(name))
+        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.now_of(name))
         # The processes of a rehearsal are one: the small run of one node is that of all.
         solver = self.solvers[name] = Solver(core, self.settings.factory, self._simulation)
 
@@ -156,9 +148,9 @@ class System:
                 solver.solve(core.work)
                 core.advance(now_ns)
             if core.member.refusal and self.settings.restart_ns and self.solvers.get(name) is solver:
-                self._next.append(lambda: self._start_again(name, solver))
+                self.soon(lambda: self._start_again(name, solver))
 
-        self._enter(name, core, turn, channels.NODE_READS)
+        self.enter(name, core, turn, channels.NODE_READS)
 
     # --- running -----------------------------------------------------------------------------------------------------
 
@@ -220,6 +212,7 @@ class System:
     def _hand(self, process: Process, message: Message) -> None:
         """Let a process take one message and do what follows from it."""
         _, _, _, channel, name, payload = message
+        self._begin_turn(process)
         if self._traces_receive:
             self._trace(self.bus.now_ns, process, "receive", channel.name, payload, name)
         now_ns = process.clock.at(self.bus.now_ns)
@@ -238,10 +231,12 @@ class System:
         now_ns = self.bus.now_ns
         for process in list(self.processes.values()):
             if max(process.wake_ns, process.busy_until_ns) <= now_ns:
-                self._wake(process)
+                self.wake(process)
 
-    def _wake(self, process: Process) -> None:
+    def wake(self, process: Process) -> None:
+        """Let a process do what is due by time."""
         now_ns = process.clock.at(self.bus.now_ns)
+        self._begin_turn(process)
         process.core.wake(now_ns)
         process.turn(now_ns)
         self._perform(process)
@@ -249,7 +244,13 @@ class System:
         self._plan_wake(process)
         assert process.wake_ns > self.bus.now_ns, f"{process.name} has a deadline that waking did not move"
 
-    def _turn(self, process: Process) -> None:
+    def _begin_turn(self, process: Process) -> None:
+        self.at_work.name = process.name
+        self.at_work.turns += 1
+
+    def take_turn(self, process: Process) -> None:
+        """Let a process do what follows from what has happened to it."""
+        self._begin_turn(process)
         process.turn(process.clock.at(self.bus.now_ns))
         self._perform(process)
         self._plan_wake(process)
@@ -280,7 +281,7 @@ class System:
         left = self._dying.pop(process.name, None)
         if left is not None:
             del actions[left:]
-            self._leave(process.name)
+            self.leave(process.name)
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
@@ -303,9 +304,9 @@ class System:
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             farewell = self.hub.farewell()
             self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
-            self._leave(process.name)
+            self.leave(process.name)
 
-    def _leave(self, name: str) -> None:
+    def leave(self, name: str) -> None:
         """A process has ended: what is on its way to it is lost."""
         self.processes.pop(name)
         self._behind.pop(name, None)
@@ -360,6 +361,10 @@ class System:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
 
+    def soon(self, action: Callable[[], object]) -> None:
+        """Call `action` between two turns; a signal handler may say so."""
+        self._next.append(action)
+
     def later(self, after_ns: int, action: Callable[[], object]) -> None:
         """Call `action` when some virtual time has passed."""
         self._boots += 1
@@ -368,11 +373,11 @@ class System:
     def _go_off(self) -> None:
         due_ns, _, action = heappop(self._timers)
         self.bus.now_ns = max(self.bus.now_ns, due_ns)
-        self._next.append(action)
+        self.soon(action)
 
     def kill(self, name: str) -> None:
         """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
-        self._leave(name)
+        self.leave(name)
         if name == channels.SUPERVISOR:
             return
         self.solvers.pop(name).close()
@@ -393,18 +398,18 @@ class System:
             self._boots += 1
             history = fold(self.supervisor.deployment, self.journal)
             boot = f"boot-{self._boots}"
-            now_ns = self._now_of(name)
+            now_ns = self.now_of(name)
             self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)
             self._enter_supervisor()
         else:
             self._enter_node(name, library_fingerprint())
-        self._wake(self.processes[name])
+        self.wake(self.processes[name])
 
     def _start_again(self, name: str, refused: Solver) -> None:
         """A process that is refused ends; its launcher starts another one after a while."""
         if self.solvers.get(name) is not refused:
             return
-        self._leave(name)
+        self.leave(name)
         self.solvers.pop(name).close()
         self._enter_node(name, library_fingerprint())
         self.pause(name, self.settings.restart_ns)
@@ -426,17 +431,15 @@ class System:
 
     def _supervisor_sees_gone(self, name: str) -> None:
         if channels.SUPERVISOR in self.processes:
-            self.supervisor.process_gone(name, self._now_of(channels.SUPERVISOR))
-            self._turn(self.processes[channels.SUPERVISOR])
+            self.supervisor.process_gone(name, self.now_of(channels.SUPERVISOR))
+            self.take_turn(self.processes[channels.SUPERVISOR])
 
     def _leave_hub(self) -> None:
         self.hub_journal.ending = None
-        self._leave(channels.VHUB)
+        self.leave(channels.VHUB)
         self.hub.actions.clear()
         self.later(self._hub_back_ns, self._start_hub)
-        for client in self._clients():
-            client.core.hub_gone(client.clock.at(self.bus.now_ns))
-            self._turn(client)
+        self.clients.hub_gone()
 
     def _hub_again(self, refused: HubCore) -> None:
         """A vHub that is refused ends, was never present to the supervisor, and is started again after a while."""
@@ -446,13 +449,8 @@ class System:
 
     def _start_hub(self) -> None:
         self._enter_hub(library_fingerprint())
-        self._wake(self.processes[channels.VHUB])
-        for client in self._clients():
-            client.core.hub_here(client.clock.at(self.bus.now_ns))
-            self._wake(client)
-
-    def _clients(self) -> list[Process]:
-        return [process for process in self.processes.values() if isinstance(process.core, ClientCore)]
+        self.wake(self.processes[channels.VHUB])
+        self.clients.hub_here()
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""

@@ -260,4 +260,4 @@ def _come_and_go(state: HubState, row: ClientRow) -> None:
         state.leave(row.client)
     else:
         heard = [(heard.source, heard.channel) for heard in row.subscriptions]
-        state.join(Joining(row.client, row.period, heard), row.tick)
+        state.join(Joining(row.client, row.period, heard, row.offset), row.tick)

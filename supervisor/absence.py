@@ -87,11 +87,11 @@ class Absence:
     def is_over(self, now_ns: int) -> bool:
         """Whether the vHub was away for longer than a run waits; then the run is over, which is said."""
         core = self._core
-        if not self.is_away or now_ns < self._since_ns + core.deployment.deadlines.vhub_back_ns:
+        wait_ns = core.beginning.patience_ns(core.frame.tick, core.deployment.deadlines.vhub_back_ns)
+        if not self.is_away or now_ns < self._since_ns + wait_ns:
             return False
-        wait_s = core.deployment.deadlines.vhub_back_ns / 1e9
         self._note()
-        core.finish(f"lost vhub: {self._reason}; it did not come back within {wait_s:g} s", failed=True)
+        core.finish(f"lost vhub: {self._reason}; it did not come back within {wait_ns / 1e9:g} s", failed=True)
         return True
 
     def _note(self) -> None:

@@ -1,9 +1,7 @@
 """The core of the supervisor: takes messages and the time, releases orders, assembles and commits frames.
 
 It computes nothing of the world: it knows who computes what (epochs), what changes the world (orders), and puts the
-nodes' parts together. It journals, then speaks. A committed tick never changes. Neighbours: `roster` (who takes part),
-`pacing` (when orders are released), `requests` (what people ask), `watch` (who is waited for), `records` (journal),
-`take_over` (the start of a supervisor that goes on with a run).
+nodes' parts together. It journals, then speaks. A committed tick never changes.
 """
 
 from __future__ import annotations
@@ -48,6 +46,7 @@ from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account, Recovered
 from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.balance import Balancer
+from foosim.supervisor.beginning import Beginning
 from foosim.supervisor.branches import Branches
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
@@ -59,7 +58,7 @@ from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.status import SupervisorStatistics
 from foosim.supervisor.take_over import TakeOver
-from foosim.supervisor.watch import Watch
+from foosim.supervisor.watch import Watch, losses
 
 FAREWELL_NS: Final = 10_000_000_000
 """How long an ended run waits for the vHub to close its capture."""
@@ -99,6 +98,7 @@ class SupervisorCore:
         self.frame: Frame = first_frame(self.deployment, settings.start)
         self.chain = first_chain(settings.origin)
         self.first_tick = self.frame.tick
+        self.beginning = Beginning(self.deployment, self.first_tick)
         self.epoch, self.is_open = 0, False
         """Whether an epoch of this supervisor has begun."""
         self.owners = self.deployment.owners()
@@ -168,7 +168,7 @@ class SupervisorCore:
         if self.end is None and not self.absence.is_over(now_ns):
             lost = self.watch.lost(self, now_ns)
             if lost and self.epoch == 0:
-                self.finish(_losses(lost), failed=True)
+                self.finish(losses(lost), failed=True)
             elif lost:
                 self._lose(lost, now_ns)
             if self.take_over is not None:
@@ -224,7 +224,7 @@ class SupervisorCore:
         if channels.VHUB in others:
             self.absence.lose(others.pop(channels.VHUB), now_ns)
         if others:
-            self.finish(_losses(others), failed=True)
+            self.finish(losses(others), failed=True)
         for name in sorted(lost.keys() & self.deployment.nodes.keys()):
             if self.end is None:
                 self.recovery.lose(name, lost[name], now_ns)
@@ -235,8 +235,12 @@ class SupervisorCore:
         self.arrivals.parts.clear()
 
     def finish(self, reason: str, failed: bool) -> None:
-        """End the run in order at the last committed tick; say it once."""
-        if self.end is not None:
+        """End the run in order at the last committed tick; say it once. One that was only resumed is abandoned."""
+        if self.end is not None or self.finished:
+            return
+        if failed and self.beginning.abandons(self.frame.tick, reason):
+            self.finished = True
+            self.say("error", f"the run does not go on from tick {self.frame.tick}: {reason}")
             return
         self.end = End(self.frame.tick, reason, failed)
         self.watch.ended_ns = self.watch.now_ns
@@ -251,7 +255,8 @@ class SupervisorCore:
         The last commit says that it is the last, so that the vHub does not close its tick: no other may be.
         """
         if not self.is_open or self.end is not None:
-            self.finish("stopped", failed=False)
+            if self.take_over is None or not self.take_over.stops():
+                self.finish("stopped", failed=False)
             return self.frame.tick
         last = max(self.released, self.frame.tick + 1)
         self.stop_at = min(self.stop_at or last, last)
@@ -493,8 +498,3 @@ class SupervisorCore:
             self._say_orders(want.tick, want.tick + 1)
         elif want.kind == channels.COMMIT.name and want.tick in self.commits:
             self.actions.append(Publish(channels.COMMIT, want.sender, self.commits[want.tick]))
-
-
-def _losses(lost: Mapping[str, str]) -> str:
-    """Return who is lost and why as a reason to end."""
-    return "lost " + "; ".join(f"{name}: {why}" for name, why in lost.items())

@@ -94,6 +94,7 @@ class Handshake:
         process = core.roster.by_name.get(heartbeat.sender)
         if process is None:
             if heartbeat.sender in core.roster.expected:
+                core.beginning.found_living = True
                 core.actions.append(Publish(channels.RECALL, channels.SUPERVISOR, encode(Recall(core.boot))))
             core.count_repeat()
             return
@@ -115,7 +116,7 @@ class Handshake:
             if heartbeat.sender == channels.VHUB:
                 core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))
         if heartbeat.lost and heartbeat.sender == channels.VHUB and core.end is None:
-            core.finish(f"lost {heartbeat.lost}", failed=True)
+            core.finish(heartbeat.lost, failed=True)
 
     def farewell(self, farewell: Farewell, payload: bytes, now_ns: int) -> None:
         """The vHub's last word: its capture is closed."""

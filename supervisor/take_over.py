@@ -32,15 +32,19 @@ class TakeOver:
         deadlines = core.deployment.deadlines
         self._core = core
         self._standing: Standing | None = None
-        self._nodes_ns = now_ns + deadlines.heartbeat_ns + REJOIN_NS
-        self._hub_ns = now_ns + deadlines.orphan_ns
+        self._living_ns = now_ns + deadlines.heartbeat_ns + REJOIN_NS
+        self._start_ns = now_ns + deadlines.start_ns
+        self._hub_ns = now_ns + max(deadlines.orphan_ns, deadlines.start_ns)
         self._roster = [] if history.epoch is None else list(history.epoch.roster)
         self._owners = history.owners
         """Who owns what by the last request, also if no epoch has begun with it."""
         if history.run.clock != core.clock:
             history.started_ns += now_ns - history.committed_ns
             history.committed_ns = now_ns
+        self._is_stopped = False
+        """Whether somebody has asked for the end of the run: it ends when the vHub is here, which has the capture."""
         stand_on(core, history)
+        core.beginning.go_on(core.frame.tick)
         core.say("warning", f"started again: the journal ends at tick {core.frame.tick}, epoch {core.epoch}")
 
     def standing(self, standing: Standing, now_ns: int) -> bool:
@@ -57,7 +61,13 @@ class TakeOver:
         core.epoch = max(core.epoch, standing.epoch)
         core.prepare(core.frame.layout)
         self._standing = standing
+        core.beginning.go_on(core.frame.tick)
         return True
+
+    def stops(self) -> bool:
+        """Somebody asks for the end of the run: return whether that waits for the vHub, which has to end the capture."""
+        self._is_stopped = True
+        return self._standing is None
 
     def lose_hub(self) -> None:
         """The vHub is gone again: the next one tells where it stands."""
@@ -66,16 +76,21 @@ class TakeOver:
     def wake(self, now_ns: int) -> None:
         """Begin the epoch when everybody is here, or when those who are not have had their time."""
         core = self._core
-        if core.end is not None:
+        if core.end is not None or core.finished:
             return
         if self._standing is None:
             if now_ns > self._hub_ns:
-                core.finish(f"lost {channels.VHUB}: it has not come back to the supervisor", failed=True)
+                wait_s = max(core.deployment.deadlines.orphan_ns, core.deployment.deadlines.start_ns) / 1e9
+                core.finish(f"lost {channels.VHUB}: it has not come to the supervisor within {wait_s:g} s", failed=True)
+            return
+        if self._is_stopped:
+            core.finish("stopped", failed=False)
             return
         layout, known = core.frame.layout.digest, core.roster.by_name
         expected = [name for name in self._roster if name not in core.roster.stopped]
         here = [name for name in expected if name in known and layout in known[name].ready and not known[name].lost]
-        if len(here) == len(expected) or now_ns >= self._nodes_ns:
+        waits_until_ns = self._living_ns if core.beginning.found_living else self._start_ns
+        if len(here) == len(expected) or now_ns >= waits_until_ns:
             self._open(here, [name for name in expected if name not in here], now_ns)
 
     def _open(self, here: list[str], missing: list[str], now_ns: int) -> None:
@@ -94,6 +109,8 @@ class TakeOver:
         core.owners = dict(self._owners)
         core.members = tuple(here)
         core.recovery.begin(here, missing, now_ns)
+        if core.finished:
+            return
         core.say_last_commit(now_ns)
         assert self._standing is not None
         core.branches.proceed(self._standing)

@@ -9,6 +9,7 @@ waited for.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from foosim.protocol import limits
@@ -149,9 +150,11 @@ class Watch:
         deadlines = self.deployment.deadlines
         if core.epoch == 0:
             return self._late_to_start(core, now_ns)
-        silent = self.roster.silent(now_ns, deadlines.heartbeat_ns)
+        tick = core.frame.tick
+        heartbeat_ns = core.beginning.patience_ns(tick, deadlines.heartbeat_ns)
+        silent = self.roster.silent(now_ns, heartbeat_ns)
         if silent:
-            return dict.fromkeys(silent, f"no heartbeat for {deadlines.heartbeat_ns / 1e9:g} s")
+            return dict.fromkeys(silent, f"no heartbeat for {heartbeat_ns / 1e9:g} s")
         if core.take_over is not None:
             return {}  # nobody is waited for yet
         if core.absence.is_away:
@@ -163,11 +166,11 @@ class Watch:
             return {}
         waited = ", ".join(names)
         overdue_ns = now_ns - self._progress_ns
-        if overdue_ns > deadlines.tick_lost_ns:
-            return dict.fromkeys(names, f"tick {core.frame.tick} is overdue by {overdue_ns / 1e9:.1f} s")
+        if overdue_ns > core.beginning.patience_ns(tick, deadlines.tick_lost_ns):
+            return dict.fromkeys(names, f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s")
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
-            core.say("warning", f"tick {core.frame.tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
+            core.say("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
         return {}
 
     def _late_to_start(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
@@ -178,6 +181,11 @@ class Watch:
         if not missing or now_ns - self._begun_ns <= self.deployment.deadlines.start_ns:
             return {}
         return dict.fromkeys(missing, f"not ready within {self.deployment.deadlines.start_ns / 1e9:g} s")
+
+
+def losses(lost: Mapping[str, str]) -> str:
+    """Return who is lost and why as a reason to end."""
+    return "lost " + "; ".join(f"{name}: {why}" for name, why in lost.items())
 
 
 def _names(waiting_for: str) -> list[str]:

@@ -18,6 +18,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from foosim.protocol.deployment_file import apply_sets
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree, write_yaml
+from tests.meter import Burden, Meter
 
 settings.register_profile(
     "foosim", derandomize=True, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
@@ -27,13 +28,21 @@ settings.load_profile("foosim")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """What `make fuzz` and `make stats` choose; by default the share of them that `make test` has."""
+    """What `make fuzz`, `make stats` and `make slow` choose; by default the share of them that `make test` has."""
     parser.addoption("--links-seed", type=int, default=1, help="of the networks and packets of tests/links")
     parser.addoption("--links-full", action="store_true", help="tests/links at full size, one failure in a million")
     parser.addoption("--links-table", default="", help="the file that the figures of tests/links are written into")
     parser.addoption("--fuzz-payloads", type=int, default=100, help="payloads for each target of the fuzz tests")
     parser.addoption("--fuzz-seed", type=int, default=17, help="what the payloads are drawn from")
     parser.addoption("--fuzz-block", type=int, default=-1, help="bring the payloads of this block alone")
+    parser.addoption("--slow-start", type=float, default=0.0, help="seconds that each process's start takes longer")
+    parser.addoption("--load", type=int, default=0, help="processes beside the tests that keep as many cores busy")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """What tests cost is measured; `make slow` makes the machine a slow one."""
+    config.pluginmanager.register(Meter(), "meter")
+    config.pluginmanager.register(Burden(config), "burden")
 
 
 def pytest_report_header(config: pytest.Config) -> str:

@@ -24,10 +24,11 @@ from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Room, megabytes, room_on_disk
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Epoch, Origin
+from foosim.protocol.messages import End, Epoch, Origin
 from foosim.vhub.capture_left import Journalled, Left, Progress, look, run_of
 from foosim.vhub.capture_parts import (
     END_METADATA,
+    FAILED_RUN,
     METADATA,
     NEXT,
     ORIGIN,
@@ -91,6 +92,11 @@ def origin_metadata(origin: Origin | None) -> dict[str, str]:
         return {}
     digest, chain = origin.digest.hex(), origin.chain.hex()
     return {ORIGIN: origin.source, ORIGIN_TICK: str(origin.tick), ORIGIN_DIGEST: digest, ORIGIN_CHAIN: chain}
+
+
+def ending_metadata(end: End) -> dict[str, str]:
+    """Return what a capture says of how its run ended."""
+    return {"reason": end.reason, **({FAILED_RUN: "true"} if end.failed else {})}
 
 
 def declare_topics(mcap: McapWriter) -> dict[str, int]:

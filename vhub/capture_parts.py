@@ -39,6 +39,8 @@ ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_di
 """Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
 NEXT: Final = "goes_on_in"
 """The file behind one: an entry of the metadata `foosim.end`."""
+FAILED_RUN: Final = "failed"
+"""An entry there where the run failed."""
 
 
 def part_path(path: Path, number: int) -> Path:

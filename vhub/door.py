@@ -1,7 +1,8 @@
 """What clients say to the vHub: hello, join, packets, Done; and that they are gone.
 
 A client that is gone may come back: one that the run waits for within `deadlines.client_back`, any other at any time as
-one that joins. After a restart of the vHub all that it knew are away, and come back in the same way.
+one that joins. Before the first tick, and after a restart of the vHub, when all that it knew are away, they have
+`deadlines.start`: their processes may have to be started.
 Neighbours: `core` closes the ticks, `sessions` has the clients.
 """
 
@@ -11,14 +12,15 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol import limits
 from foosim.protocol.actions import Journal
+from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import ClientHello, Done, Go, Join, Up
+from foosim.vhub.members import Member, may_lockstep
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import InputsRecord
-from foosim.vhub.sessions import Session, may_lockstep
-from foosim.vhub.state import Member
+from foosim.vhub.sessions import Session
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore
@@ -41,7 +43,7 @@ class Door:
         here = {name for name, member in core.state.members.items() if member.active}
         if written is not None:
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        core.sessions.expect(here, now_ns + core.deployment.deadlines.client_back_ns)
+        core.sessions.expect(here, now_ns + self._start_ns)  # theirs may have ended as well, and be started again
 
     def _known(self, name: str) -> Member | Joining | None:
         """Return what is known of a client, the latest first: as it joins, or as the state has it."""
@@ -81,8 +83,8 @@ class Door:
         for flight in flights:
             flight.released_wall_ns = now_ns
         core.sessions.say_go(session, Go(member.downlink, tick, member.sequence, received(flights), core.state.branch))
-        deadlines = core.deployment.deadlines
-        allowed_ns = deadlines.lockstep_realtime_ns if core.releases.factor else deadlines.lockstep_fast_ns
+        session.deadline = "lockstep_realtime" if core.releases.factor else "lockstep_fast"
+        allowed_ns: int = getattr(core.deployment.deadlines, f"{session.deadline}_ns")
         session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * core.deployment.tick_ns))
 
     # --- messages ----------------------------------------------------------------------------------------------------
@@ -103,6 +105,8 @@ class Door:
             return
         if join.period and not may_lockstep(core.state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
+        if join.offset >= max(1, join.period):
+            raise Malformed(f"{join.name} joins with an offset of {join.offset} ticks, its period is {join.period}")
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
@@ -138,10 +142,25 @@ class Door:
         if is_of_another or not core.waits_for(done.name) or done.tick != session.go_tick:
             core.repeated += 1
             return
-        core.take_done(done.name)
+        self.take_done(done.name)
         session.done = done
 
-    def _session(self, message: Join | Up | Done) -> Session | None:
+    def take_done(self, client: str) -> None:
+        """A tick waits for this client no more."""
+        self._core.waited.remove(client)
+        self._core.waits.client = client
+
+    def failure(self, failure: Failure, payload: bytes, now_ns: int) -> None:
+        """A client says that it has failed. Without a player the run cannot go on."""
+        core = self._core
+        session = self._session(failure)
+        if session is None or core.deployment is None:
+            return
+        if failure.name not in core.deployment.players:
+            raise Malformed(f"{failure.name} says that it has failed, it is no player")
+        core.give_up(failure.reason)
+
+    def _session(self, message: Join | Up | Done | Failure) -> Session | None:
         session = self._core.sessions.by_name.get(message.name)
         if session is None or session.boot != message.boot:
             self._core.repeated += 1
@@ -166,15 +185,19 @@ class Door:
         if session is None or core.state is None or core.deployment is None or core.ended is not None:
             return
         if self._is_waited_for(name):
-            session.away_ns = now_ns + core.deployment.deadlines.client_back_ns
+            session.away_ns = now_ns + (core.deployment.deadlines.client_back_ns if core.epoch else self._start_ns)
             return
         self._leave(name)
 
     def wake(self, now_ns: int) -> None:
-        """Give up who was away for too long."""
+        """Say Go again, and give up who has not answered or was away for too long."""
         core = self._core
         if core.state is None:
             return
+        if core.waited and core.releases is not None:
+            core.sessions.repeat(core.waited, now_ns)
+            for late in core.sessions.overdue(core.waited, core.releases.paused, now_ns):
+                core.give_up(late.unanswered)
         for name in core.sessions.late(now_ns):
             session = core.sessions.by_name[name]
             if self._is_waited_for(name):
@@ -188,6 +211,13 @@ class Door:
         known = self._known(name)
         return self._core.waits_for(name) or (known is not None and known.period > 0)
 
+    @property
+    def _start_ns(self) -> int:
+        """How long a client has to come whose process is being started."""
+        assert self._core.deployment is not None
+        deadlines = self._core.deployment.deadlines
+        return max(deadlines.client_back_ns, deadlines.start_ns)
+
     def _leave(self, name: str) -> None:
         core = self._core
         core.sessions.leave(name)
@@ -199,4 +229,5 @@ def _is_member(known: Member | Joining, join: Join) -> bool:
     """Whether a client takes part as it asks to."""
     wanted = {(item.source, item.channel) for item in join.subscriptions}
     active = isinstance(known, Joining) or known.active
-    return active and known.period == join.period and {(source, name) for source, name in known.subscriptions} == wanted
+    is_timed_so = (known.period, known.offset) == (join.period, join.offset)
+    return active and is_timed_so and {(source, name) for source, name in known.subscriptions} == wanted

@@ -43,7 +43,7 @@ from foosim.protocol.process import Stop, die_with_parent, machine_start, new_bo
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.vhub.branching import branch_command
-from foosim.vhub.capture_file import check_new, origin_metadata
+from foosim.vhub.capture_file import check_new, ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
@@ -323,7 +323,7 @@ class HubProcess:
         """Finish the capture; only then is the journal done with."""
         assert self.core.ended is not None
         if self._capture is not None:
-            self._capture.finish({"reason": self.core.ended.reason, "ended": wall.now_text()})
+            self._capture.finish({**ending_metadata(self.core.ended), "ended": wall.now_text()})
             self.core.capture = str(first_there(Path(self.core.capture)))
         if self._room is not None:
             self.core.recording = self._room.recording

@@ -56,7 +56,7 @@ class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A sender's radio, or port of a wire: its queue, when it is free, how much of its duty cycle is left."""
+    """A sender's radio, or port of a wire: its queue, when it is free, what its duty cycle counts."""
 
     free_ns: int = 0
     waiting: list[tuple[int, int]] = []
@@ -67,9 +67,10 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     last_count: int = 0
     is_dropping: bool = False
     """CoDel's variables, by the names of RFC 8289."""
-    tokens_ns: int = -1
-    tokens_at_ns: int = 0
-    """Airtime that the duty cycle leaves, as of a time; -1 before the first packet."""
+    sent: list[tuple[int, int, int]] = []
+    """Where a duty cycle limits it: (start, end, airtime) of what it sent; of many, neighbours are taken together."""
+    sent_ns: int = 0
+    """The airtime of these together."""
     opportunity: int = 0
     opportunity_bytes: int = 0
     """How far a trace of capacity is used up."""
@@ -184,11 +185,16 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A client that joins (again): its period in ticks (0: free-running) and what it subscribes to."""
+    """A client that joins (again): period and offset in ticks (0: free-running), and what it subscribes to."""
 
     name: str
     period: int
     subscriptions: list[tuple[str, str]]
+    offset: int = 0
+
+    def suits(self, tick: int) -> bool:
+        """Whether it can join at a tick."""
+        return self.period == 0 or tick % self.period == self.offset
 
 
 class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -197,7 +203,7 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     closed: int
     packets: tuple[int, int, int, int, int]
     refusals: list[tuple[str, int]]
-    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int]]
+    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int, int]]
     links: list[tuple[str, str, str, LinkState]]
     radios: list[tuple[str, str, RadioState]]
     airs: list[tuple[str, AirState]]

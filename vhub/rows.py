@@ -214,13 +214,14 @@ class SubscriptionRow(Row, frozen=True):
 
 
 class ClientRow(Row, frozen=True):
-    """A client that joins or leaves at `tick`; `period` is in ticks (0: free-running)."""
+    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks."""
 
     tick: Counter
     client: str
     event: Literal["joins", "leaves"]
     period: Counter
     subscriptions: list[SubscriptionRow]
+    offset: Counter = 0
 
 
 class OwnerRow(Row, frozen=True):

@@ -28,14 +28,9 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.names import nearest_name
 from foosim.vhub.downlinks import Downlinks
+from foosim.vhub.members import may_lockstep
 from foosim.vhub.memory import Joining
 from foosim.vhub.state import HubState
-
-
-def may_lockstep(deployment: Deployment, name: str) -> bool:
-    """Whether the run waits for this client: no other can hold it up."""
-    declared = deployment.players.get(name) or deployment.clients.get(name)
-    return declared is not None and declared.lockstep
 
 
 @dataclass(slots=True)
@@ -64,6 +59,8 @@ class Session:
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
     allowed_ns: int = 0
+    deadline: str = ""
+    """Which one of the deployment's that is."""
     done: Done | None = None
     inbox: list[Sent] = field(default_factory=list)
     inbox_bytes: int = 0
@@ -87,6 +84,12 @@ class Session:
             elif packet.sequence < self.next_sequence:
                 repeated += 1
         return repeated
+
+    @property
+    def unanswered(self) -> str:
+        """What is said when the deadline has passed."""
+        told = f"{self.name} has not answered tick {self.go_tick} for {self.allowed_ns / 1e9:g} s"
+        return f"{told} (deadlines.{self.deadline})"
 
     def wait(self, now_ns: int, allowed_ns: int, again_after_ns: int) -> None:
         """Begin to wait for a Done."""
@@ -191,13 +194,13 @@ class Sessions:
         return min((session.away_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
 
     def join(self, join: Join) -> None:
-        """Note a join; it takes effect when the hub closes a tick that suits its period."""
+        """Note a join; it takes effect when the hub closes a tick that suits it."""
         subscriptions = [(wanted.source, wanted.channel) for wanted in join.subscriptions]
-        self.joins[join.name] = Joining(join.name, join.period, sorted(set(subscriptions)))
+        self.joins[join.name] = Joining(join.name, join.period, sorted(set(subscriptions)), join.offset)
 
     def take_joins(self, tick: int) -> list[Joining]:
         """Take the joins that take effect at `tick`, in name order."""
-        due = [name for name, j in sorted(self.joins.items()) if j.period == 0 or tick % j.period == 0]
+        due = [name for name, joining in sorted(self.joins.items()) if joining.suits(tick)]
         return [self.joins.pop(name) for name in due]
 
     def leave(self, name: str) -> None:

@@ -22,6 +22,7 @@ from foosim.protocol.messages import Delivered, Deliveries, Disrupt, Edit, Epoch
 from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.links import Link
+from foosim.vhub.members import Member, may_lockstep
 from foosim.vhub.memory import Joining, Snapshot
 from foosim.vhub.packet import Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.room import Room
@@ -31,38 +32,6 @@ from foosim.vhub.transit import TRANSIT_FULL, Transit
 
 OUTBOX_SHIFT = 16
 """A robot's sequence number is tick x 2^16 + index."""
-
-
-class Member:
-    """A client that takes part, as the state knows it: in ticks and numbers, without its session."""
-
-    def __init__(
-        self,
-        period: int,
-        subscriptions: tuple[tuple[str, str], ...],
-        joined_tick: int,
-        sequence: int = 0,
-        downlink: int = 0,
-        active: bool = True,
-        branched: int = 0,
-    ) -> None:
-        self.period = period
-        self.subscriptions = subscriptions
-        self.joined_tick = joined_tick
-        self.sequence = sequence
-        """Greatest sequence number that was admitted."""
-        self.downlink = downlink
-        """Number of the last message to the client."""
-        self.active = active
-        self.branched = branched
-        """The number of that message when the last branch began: what was said then behind it is void."""
-
-    def is_due(self, tick: int) -> bool:
-        return self.active and self.period > 0 and tick % self.period == 0
-
-    def release_tick(self, tick: int) -> int:
-        """Return the first tick, from `tick` on, at which something can be released to the client."""
-        return tick if self.period == 0 else -(-tick // self.period) * self.period
 
 
 class HubState:
@@ -98,6 +67,9 @@ class HubState:
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
         self._transit = Transit(len(self._endpoints))
+        clients = [*deployment.players, *deployment.clients]
+        self._absent = {name for name in clients if may_lockstep(deployment, name)}
+        """Clients declared to be in lockstep that take no part: they may join at any tick that their timing suits."""
         self._receivers: dict[tuple[str, str], tuple[str, ...]] | None = None
         """Who hears each (endpoint, channel), in name order; None when it is to be found anew."""
 
@@ -121,9 +93,10 @@ class HubState:
         """Take a client in, from `tick` on; one that comes back keeps its numbers."""
         known = self.members.get(joining.name)
         subscriptions = tuple((robot, channel) for robot, channel in joining.subscriptions)
-        member = self.members[joining.name] = Member(joining.period, subscriptions, tick)
+        member = self.members[joining.name] = Member(joining.period, subscriptions, tick, offset=joining.offset)
         if known is not None:
             member.sequence, member.downlink, member.branched = known.sequence, known.downlink, known.branched
+        self._absent.discard(joining.name)
         self._receivers = None
 
     def leave(self, name: str) -> None:
@@ -131,6 +104,8 @@ class HubState:
         if name in self.members:
             self.members[name].subscriptions = ()
             self.members[name].active = False
+            if may_lockstep(self.deployment, name):
+                self._absent.add(name)
             self._receivers = None
 
     def due_members(self, tick: int) -> list[str]:
@@ -244,8 +219,10 @@ class HubState:
         """Return for how many ticks behind the next one it is certain that nothing reaches robots.
 
         That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
-        filled, no lockstep client is due, and no other is here.
+        filled, no lockstep client is due, none may join, and no other client is here.
         """
+        if self._absent:
+            return 0
         members = [member for member in self.members.values() if member.active]
         if any(member.period == 0 for member in members):
             return 0
@@ -442,8 +419,7 @@ class HubState:
                 "packets": [p.offered, p.delivered, p.dropped, p.refused, p.copies],
                 "refusals": sorted(self.refusals.items()),
                 "members": [
-                    [name, m.period, m.subscriptions, m.joined_tick, m.sequence, m.downlink, m.active, m.branched]
-                    for name, m in sorted(self.members.items())
+                    [name, *member.as_written()] for name, member in sorted(self.members.items())
                 ],
                 "links": [[*key, fabric.states[key]] for key in sorted(fabric.states)],
                 "radios": [[*key, fabric.radios[key]] for key in sorted(fabric.radios)],
@@ -465,7 +441,9 @@ class HubState:
         state.packets = Packets(*content.packets)
         state.refusals = dict(content.refusals)
         for name, period, subscriptions, *rest in content.members:
-            state.members[name] = Member(period, tuple(subscriptions), *rest)
+            member = state.members[name] = Member(period, tuple(subscriptions), *rest)
+            if member.active:
+                state._absent.discard(name)
         state.fabric.restore(content.links, content.radios, content.airs, content.asked)
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final

@@ -266,7 +266,7 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
     rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
     for joining in closing.joins:
         subscriptions = [SubscriptionRow(source, channel) for source, channel in joining.subscriptions]
-        rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions))
+        rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions, joining.offset))
     return rows
 
 

@@ -130,7 +130,7 @@ def _any_done(planting: Planting) -> None:
     def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
         session = self._session(done)
         if session is not None and self._core.waits_for(done.name):
-            self._core.take_done(done.name)
+            self.take_done(done.name)
             session.done = done
 
     planting.swap(Door, "done", done)

@@ -23,7 +23,7 @@ def test_whoever_has_the_name_of_a_client_that_a_tick_waits_for_is_waited_for(an
     hub.core.wake(1_999 * MS)
     assert not hub.core.lost, "it may come back"
     hub.core.wake(2_000 * MS)
-    assert hub.core.lost == ("" if answers else "hand: its connection closed")
+    assert hub.core.lost == ("" if answers else "lost hand: its connection closed")
     assert hub.state.closed == (0 if answers else -1)
 
 

@@ -30,8 +30,6 @@ SETS = (
     "network.links=[]",
     "table.rules.kickoff_delay=20 ms",
 )
-PATIENT = "deadlines.client_back=100 s"
-"""Machines are shared: a client may take long to come back."""
 
 
 class Talk:
@@ -88,7 +86,7 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
     written.mkdir()
     again.mkdir()
     split = "capture.split_time=200 ms"
-    sets = [word for setting in (*SETS, *scribes(written), PATIENT, split) for word in ("--set", setting)]
+    sets = [word for setting in (*SETS, *scribes(written), split) for word in ("--set", setting)]
     up = house.up("--json", *sets, players=True)
     info = house.info()
     with Control(info.simulation) as control, connect(info.radio, "ear") as ear, connect(info.radio, "mouth") as mouth:

@@ -40,6 +40,7 @@ from foosim.vhub.radio.timings import (
     with_category,
 )
 from foosim.vhub.setup import BLOCK_SHIFT, LinkSetup
+from foosim.vhub.stages.duty import note_sent
 from foosim.vhub.stages.stage import Stage
 
 COLLISION: Final = "collision"
@@ -116,7 +117,7 @@ class OnAir(Stage):
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
         self._once, self._factor = setup.sends_once, setup.settings.spreading_factor
-        self._is_limited = setup.settings.duty_cycle < 1.0
+        self._window_ns = setup.settings.duty_window_ns if setup.settings.duty_cycle < 1.0 else 0
 
     def at_sending(self, flight: Flight) -> str:
         cause = self._budget.measure(flight)
@@ -167,8 +168,8 @@ class OnAir(Stage):
         sender.free_ns = until_ns
         settings = self._shared if broadcast else self._settings
         sender.waiting.append((until_ns, len(flight.payload) + settings.overhead_bytes))
-        if self._is_limited:
-            sender.tokens_ns = max(0, sender.tokens_ns - access.airtime_ns)
+        if self._window_ns:
+            note_sent(sender, end_ns - airtime_ns, end_ns, self._window_ns)
         of = self._budget.propagation
         what = source, flight.sequence, flight.copy, end_ns - airtime_ns, end_ns, until_ns
         air.register(Transmission(*what, of.place(source).at, of.power_cdbm, self._factor))
