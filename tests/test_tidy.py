@@ -103,6 +103,7 @@ SHELLS = {
     "supervisor/up.py",
     "vhub/branching.py",
     "vhub/capture_cut.py",
+    "vhub/capture_damage.py",
     "vhub/capture_file.py",
     "vhub/capture_info.py",
     "vhub/capture_left.py",
