@@ -44,7 +44,7 @@ def folder(
 ) -> RunFolder:
     """The folder of a run whose launcher was killed with everything."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    folder = create_run("table", "far")
+    folder = create_run("table", "rehearsal")
     capture = tmp_path / "a run.mcap"
     capture.write_bytes(run[0])
     folder.write_launch(launch_of(RunOptions(TABLE, sets=SETS), capture))
@@ -85,7 +85,7 @@ def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
 ) -> None:
     where = damage(folder, stem, 30)
     text = refused(folder)
-    assert text.startswith(f"run far cannot go on: {where} behind it; tick "), text
+    assert text.startswith(f"run rehearsal cannot go on: {where} behind it; tick "), text
     told = re.search(r"; tick (\d+) is the last before it\. A new run begins with the last captured frame: (.*)", text)
     assert told is not None and 10 < int(told[1]) <= 30
     words = shlex.split(told[2])
@@ -108,8 +108,9 @@ def test_a_journal_whose_only_record_is_damaged_is_said_to_have_none(folder: Run
     records = read_records(path)
     next(records)
     path.write_bytes(path.read_bytes()[: records.valid_bytes - 1])
-    told = f"run far cannot go on: no file of the journal of supervisor in {folder.journals} has a whole record. A new"
-    assert refused(folder).startswith(told)
+    assert refused(folder).startswith(f"run rehearsal cannot go on: {path}: its first record is damaged; foosim-")
+    with pytest.raises(Refused, match=r"no file of the journal of supervisor in .* has a whole record\. A new"):
+        check_journals(folder, RunOptions(TABLE))
 
 
 def test_what_helps_is_said_where_there_is_no_capture(folder: RunFolder, tmp_path: Path) -> None:
