@@ -24,6 +24,7 @@ from foosim.client.payloads import Command, decode_payload
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree
 from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import System
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.vhub.capture_reader import open_capture
 
@@ -77,6 +78,12 @@ def command_of(words: list[str]) -> tuple[Any, list[str]]:
 # --- the tutorials ---------------------------------------------------------------------------------------------------
 
 
+def add_a_ball(system: System) -> None:
+    """What a reader reads may have had something added to it, for a while."""
+    system.at_tick(1000, lambda: system.request("add", position=[0.0, 0.3, 0.05], velocity=[0.0, 0.0, 0.0]))
+    system.at_tick(1200, lambda: system.request("remove", name="ball2"))
+
+
 @pytest.fixture(scope="module")
 def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A reader's folder: deploy/table.yaml, the README's player, and the capture of its first game."""
@@ -92,7 +99,8 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         patch.chdir(folder)
         patch.syspath_prepend(str(folder))
         plan = make_plan(RunOptions(asked["file"], "fast", asked["duration"], None, (*asked["sets"], "engine=pure")))
-        result = rehearse(plan.text, str(asked["file"]), plan.ticks, asked["nodes"], capture=asked["capture"]).json
+        given = plan.text, str(asked["file"]), plan.ticks, asked["nodes"]
+        result = rehearse(*given, prepare=add_a_ball, capture=asked["capture"]).json
         assert not result["failed"] and result["ticks"] == 2500
         yield folder
     sys.modules.pop("follower", None)
@@ -107,6 +115,7 @@ def test_the_readmes_player_plays(house: Path) -> None:
     commands = [decode_payload("position", payload) for payload in sent.payload]
     assert {command.spin for command in commands if isinstance(command, Command)} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
+    assert len(capture.frame_blocks) == 3, "something was added, and removed again"
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/capture.md", "docs/writing_a_player.md"])
