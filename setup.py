@@ -40,8 +40,9 @@ COMPILED: Final = {
         *("requests", "roster", "take_over", "watch"),
     ),
     "vhub": (
-        *("air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "members", "numbers", "packet"),
-        *("propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit", "world"),
+        *("ages", "air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "members", "numbers"),
+        *("packet", "propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit"),
+        *("world",),
     ),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss", "shadowing"),

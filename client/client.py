@@ -49,6 +49,8 @@ _LOG: Final = logging.getLogger("foosim.client")
 _LOG.addHandler(logging.NullHandler())
 
 T = TypeVar("T")
+Turns = tuple[int, int, tuple[tuple[str, str], ...]]
+"""Period and offset in ticks, and at the arrival of what a client acts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,8 +226,8 @@ class Client:
         self._newest = Newest({})
         self._branch = link.core.branch
         self._period: int | None = None
-        self._turns = (0, 0)
-        """Period and offset, in ticks, with which it has joined."""
+        self._turns: Turns = (0, 0, ())
+        """As it has joined."""
         self._commands: dict[str, Outgoing] = {}
         self._outgoing: deque[Outgoing] = deque()
 
@@ -269,7 +271,7 @@ class Client:
         turns = self._turns_at(rate_hz)
         if self._period is not None and self._turns != turns:
             raise NotJoined("lockstep at another rate, or after listen(): a client joins once")
-        return self._ticks(*turns)
+        return self._ticks(turns)
 
     def listen(self, subscriptions: Iterable[tuple[str, str]] = ()) -> None:
         """Take part without being waited for, and hear these (endpoint, channel) beside those of `subscribe`.
@@ -281,7 +283,7 @@ class Client:
             self.subscribe(source, channel)
         if self._period:
             raise NotJoined("listen() after lockstep(): a client joins once")
-        self._join(0, 0)
+        self._join((0, 0, ()))
 
     # --- packets -----------------------------------------------------------------------------------------------------
 
@@ -339,12 +341,13 @@ class Client:
 
     # --- inside ------------------------------------------------------------------------------------------------------
 
-    def _turns_at(self, rate_hz: float | Fraction | None) -> tuple[int, int]:
-        offset = 0
+    def _turns_at(self, rate_hz: float | Fraction | None) -> Turns:
+        offset, arrivals = 0, list[tuple[str, str]]()
         if rate_hz is None:
             spec = self.deployment.clients.get(self.name) or self.deployment.players.get(self.name)
             rate_hz = None if spec is None else spec.rate_hz
             offset = 0 if spec is None else spec.offset_ns // self.deployment.tick_ns
+            arrivals = self.deployment.arrivals_of(self.name)
         if rate_hz is None:
             raise BadValue(f"no rate for lockstep, and the deployment declares none for {self.name}", rate_hz)
         try:
@@ -354,12 +357,12 @@ class Client:
             raise BadValue("not a rate in Hz", rate_hz) from None
         if rate <= 0:
             raise BadValue("not a rate above 0 Hz", rate_hz)
-        return self.deployment.ticks(rate), offset
+        return self.deployment.ticks(rate), offset, tuple(arrivals)
 
-    def _ticks(self, period: int, offset: int) -> Iterator[int]:
+    def _ticks(self, turns: Turns) -> Iterator[int]:
         core = self._core
         if self._period is None:
-            self._join(period, offset)
+            self._join(turns)
         while True:
             self._link.wait(lambda: core.go is not None or core.ended, None)
             if core.go is None:
@@ -382,11 +385,13 @@ class Client:
         self._core.done(packets)
         self._link.perform()
 
-    def _join(self, period: int, offset: int) -> None:
+    def _join(self, turns: Turns) -> None:
+        period, offset, arrivals = turns
+        self._subscriptions.update(arrivals)
         wanted = sorted(self._subscriptions)
         self._newest = Newest({pair: channel_kind(self.deployment, *pair) for pair in wanted})
-        self._core.join(period, wanted, offset)
-        self._period, self._turns = period, (period, offset)
+        self._core.join(period, wanted, offset, arrivals)
+        self._period, self._turns = period, turns
         self._link.perform()
 
     def _command(self, robot: str, payload: bytes, channel: str) -> None:

@@ -110,6 +110,7 @@ class ClientCore:
         self._unrecorded: deque[Sent] = deque()
         self._resend_ns = NEVER_NS
         self._period = self._offset = 0
+        self._on_arrival = False
         self._sequence = 0
         self._downlink = 0
         self._gaps: set[int] = set()
@@ -192,10 +193,17 @@ class ClientCore:
 
     # --- what the client does --------------------------------------------------------------------------------------
 
-    def join(self, period_ticks: int, subscriptions: Iterable[tuple[str, str]], offset_ticks: int = 0) -> None:
+    def join(
+        self,
+        period_ticks: int,
+        subscriptions: Iterable[tuple[str, str]],
+        offset_ticks: int = 0,
+        arrivals: Iterable[tuple[str, str]] = (),
+    ) -> None:
         """Take part: in lockstep every `period_ticks`, or free-running with 0; hear these (endpoint, channel).
 
-        Its ticks are those that leave the remainder `offset_ticks`, which is below the period.
+        Its ticks are those that leave the remainder `offset_ticks`, which is below the period. With `arrivals`, which
+        are some of what it hears, they are those at which a packet of these arrives, or a period has passed.
 
         Raises UnknownName for an endpoint or a robot's channel that the deployment does not have.
         """
@@ -205,8 +213,10 @@ class ClientCore:
         for source, channel in wanted:
             check_subscription(self.deployment, source, channel)
         items = [Subscription(source, channel) for source, channel in wanted]
-        self._join = encode(Join(self.name, self.boot, period_ticks, items, offset_ticks))
-        self._period, self._offset = period_ticks, offset_ticks
+        calling = [Subscription(source, channel) for source, channel in sorted(set(arrivals))]
+        assert all(item in items for item in calling), (calling, items)
+        self._join = encode(Join(self.name, self.boot, period_ticks, items, offset_ticks, calling))
+        self._period, self._offset, self._on_arrival = period_ticks, offset_ticks, bool(calling)
         if not self.is_away:
             self._publish(self._join)
         self._again_after_ns = AGAIN_NS
@@ -364,7 +374,7 @@ class ClientCore:
             return
         if not self._is_new(go):
             return
-        if self._period == 0 or go.tick % self._period != self._offset:
+        if self._period == 0 or (not self._on_arrival and go.tick % self._period != self._offset):
             timing = f"a period of {self._period} ticks and an offset of {self._offset}"
             raise Malformed(f"Go for tick {go.tick} to a client with {timing}")
         if go.tick <= self.tick or self.ended:

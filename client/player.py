@@ -181,7 +181,7 @@ class PlayerLoop:
         self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in wanted})
         if declared.lockstep:
             period, offset = deployment.turns(declared)
-            self.core.join(period, wanted, offset)
+            self.core.join(period, wanted, offset, deployment.arrivals_of(name))
         else:
             self.core.join(0, wanted)
             self._period_ns = int(NS_PER_S / declared.rate_hz)

@@ -115,13 +115,16 @@ class Player(Placed):
 
     It may command its `robots` and hears their channels, and those of others that `hears` selects. One that is `on` a
     robot is on board of it: its packets leave from and come to where the robot is. Players that name the same `process`
-    share one; else each has its own.
+    share one; else each has its own. One that acts at `arrival` is called at each tick at which a packet arrives of
+    what `arrivals` selects, and when it has not been called for the period of its rate.
     """
 
     class_: ClassPath = Field(alias="class")
     rate_hz: Rate = Field(alias="rate")
     offset_ns: Offset = _default("0 s", "offset")
     lockstep: bool = True
+    act: Literal["period", "arrival"] = "period"
+    arrivals: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     on: RobotName | None = None
     process: Name | None = None
     robots: dict[RobotName, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
@@ -307,6 +310,18 @@ class Deployment(Part):
                 if other != name and fnmatchcase(other, glob):
                     heard.update((other, channel) for channel in channels if self._has(other, channel))
         return sorted(heard)
+
+    def arrivals_of(self, name: str) -> list[tuple[str, str]]:
+        """The (endpoint, channel) at the arrival of whose packets a player acts, sorted; none for one by period."""
+        player = self.players.get(name)
+        if player is None or player.act != "arrival":
+            return []
+        chosen = player.arrivals.items()
+        return [
+            (source, channel)
+            for source, channel in self.heard_by(name)
+            if any(channel in channels and fnmatchcase(source, glob) for glob, channels in chosen)
+        ]
 
     def _has(self, endpoint: str, channel: str) -> bool:
         """Whether an endpoint may say something on a channel: players and clients on any, robots on their own."""

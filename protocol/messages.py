@@ -410,9 +410,7 @@ class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
 
 
 class Sent(Item, frozen=True):
-    """One packet that a client sends, to all who subscribe to its channel where `destination` is empty.
-
-    `stamp_ns` is its own clock's, recorded and never judged."""
+    """One packet of a client: to all subscribers without a `destination`. `stamp_ns`, its own clock, is not judged."""
 
     sequence: Counter
     destination: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
@@ -422,16 +420,18 @@ class Sent(Item, frozen=True):
 
 
 Packets = Annotated[list[Sent], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+Subscriptions = Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MAX)]
 
 
 class Join(Message, frozen=True):
-    """A client takes part: `period` and `offset` are in ticks (0: free-running). The vHub chooses its first tick."""
+    """A client takes part: with period and offset in ticks (0: free-running), or when a packet of `arrivals` comes."""
 
     name: Name
     boot: Name
     period: Counter
-    subscriptions: Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MAX)]
+    subscriptions: Subscriptions
     offset: Counter = 0
+    arrivals: Subscriptions = field(default_factory=list)
 
 
 class Up(Message, frozen=True):

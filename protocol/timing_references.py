@@ -4,10 +4,12 @@ Like references.py, whose findings it makes, it reads plain data and passes over
 """
 
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
 
-from foosim.protocol import units
+from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
-from foosim.protocol.references import Finding, Location, View
+from foosim.protocol.names import nearest_name
+from foosim.protocol.references import Finding, Location, View, quoted
 from foosim.protocol.units import format_ns
 
 
@@ -15,6 +17,8 @@ def check_timing(data: object) -> Iterator[Finding]:
     """All problems of a deployment's times, found as they are asked for."""
     view = View(data)
     yield from _clients(view)
+    for player in view.players:
+        yield from _arrivals(view, player)
     tick_ns = view.tick_ns()
     if tick_ns is None:
         return
@@ -101,3 +105,50 @@ def _clients(view: View) -> Iterator[Finding]:
                 continue
             what = "an offset of who is not in lockstep: a free-running client has no ticks of its own"
             yield Finding((section, name, "offset"), what, "offset", at="key")
+
+
+def _arrivals(view: View, player: str) -> Iterator[Finding]:
+    """Who acts at arrival is in lockstep, has no ticks of its own, and hears at the arrival of what it acts."""
+    at: Location = ("players", player)
+    arrivals = view.mapping(*at, "arrivals")
+    if view.get(*at, "act") != "arrival":
+        if arrivals and view.get(*at, "act") in (None, "period"):
+            what = "arrivals of a player that acts by its period: needs act: arrival"
+            yield Finding((*at, "arrivals"), what, "arrivals", at="key")
+        return
+    if not _in_lockstep(view, "players", player, is_default=True):
+        what = "needs lockstep: a free-running player acts by its own clock"
+        yield Finding((*at, "act"), what, "arrival", "'period'")
+    elif view.get(*at, "offset") is not None:
+        what = "an offset of a player that acts at arrival, and so at no ticks of its own"
+        yield Finding((*at, "offset"), what, "offset", at="key")
+    if not arrivals:
+        yield Finding((*at, "arrivals"), "missing key of a player that acts at arrival", "arrivals", at="missing")
+    heard = _heard(view, player)
+    for glob in arrivals:
+        matched = {source for source in heard if names.is_selector(glob) and fnmatchcase(source, glob)}
+        if names.is_selector(glob) and not matched:
+            nearest = quoted(nearest_name(glob, heard))
+            yield Finding((*at, "arrivals", glob), "a selector that matches nothing it hears", glob, nearest, at="key")
+            continue
+        channels = sorted({channel for source in matched for channel in heard[source]})
+        for index, channel in view.texts(*at, "arrivals", glob):
+            if matched and channel not in channels:
+                what = f"no channel that it hears of {glob}: valid are {', '.join(channels)}"
+                yield Finding((*at, "arrivals", glob, index), what, channel)
+
+
+def _heard(view: View, player: str) -> dict[str, set[str]]:
+    """The channels that a player hears, by endpoint."""
+    heard: dict[str, set[str]] = {}
+    for robot in view.mapping("players", player, "robots"):
+        heard.setdefault(robot, set()).update(name for _, name in view.texts("players", player, "robots", robot))
+    endpoints = [*view.robots, *view.players, *view.clients]
+    for glob in view.mapping("players", player, "hears"):
+        for endpoint in endpoints:
+            if names.is_selector(glob) and endpoint != player and fnmatchcase(endpoint, glob):
+                said = {name for _, name in view.texts("players", player, "hears", glob)}
+                if endpoint in view.robots:
+                    said &= {*view.mapping("robots", endpoint, "sensors"), names.CHANNEL_ECHO}
+                heard.setdefault(endpoint, set()).update(said)
+    return {endpoint: channels for endpoint, channels in heard.items() if channels}

@@ -36,7 +36,7 @@ class Beginning:
         return tick <= self._first_tick or (tick <= self.tick and not self.found_living)
 
     def patience_ns(self, tick: int, deadline_ns: int) -> int:
-        """Return how long to wait, while frame `tick` is the last one, where a running world waits for `deadline_ns`."""
+        """Return how long to wait at frame `tick` where a running world waits for `deadline_ns`."""
         return max(deadline_ns, self._start_ns) if self.lasts(tick) else deadline_ns
 
     def abandons(self, tick: int, reason: str) -> bool:

@@ -95,8 +95,7 @@ class SupervisorCore:
         self.recovery, self.absence, self.branches = Recovery(self), Absence(self), Branches(self)
         self.balancer = Balancer(self.deployment.owners()) if settings.balance else None
         self.handshake = Handshake(self)
-        self.frame: Frame = first_frame(self.deployment, settings.start)
-        self.chain = first_chain(settings.origin)
+        self.frame, self.chain = first_frame(self.deployment, settings.start), first_chain(settings.origin)
         self.first_tick = self.frame.tick
         self.beginning = Beginning(self.deployment, self.first_tick)
         self.epoch, self.is_open = 0, False
@@ -180,7 +179,7 @@ class SupervisorCore:
             if now_ns >= self._prepare_ns:
                 self.requests.prepare()
                 self._prepare_ns = now_ns + PREPARE_NS
-        elif self.end is not None and not self.finished:
+        elif not (self.finished or (self.take_over is not None and self.take_over.waits_for_hub(now_ns))):
             hub = self.roster.by_name.get(channels.VHUB)
             self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
             if hub is not None and hub.gone_ns and now_ns > hub.gone_ns + GONE_NS:
@@ -255,8 +254,7 @@ class SupervisorCore:
         The last commit says that it is the last, so that the vHub does not close its tick: no other may be.
         """
         if not self.is_open or self.end is not None:
-            if self.take_over is None or not self.take_over.stops():
-                self.finish("stopped", failed=False)
+            self.finish("stopped", failed=False)
             return self.frame.tick
         last = max(self.released, self.frame.tick + 1)
         self.stop_at = min(self.stop_at or last, last)

@@ -180,18 +180,25 @@ def _links(status: dict[str, Any], links_max: int) -> Table:
     table = Table(title="links", title_justify="left", box=None, pad_edge=False)
     table.add_column("from")
     table.add_column("to")
-    for column in ("offered", "delivered", "dropped", "mean delay"):
+    for column in ("offered", "delivered", "dropped", "mean delay", "age at use, p99"):
         table.add_column(column, justify="right")
     links = status["links"]
     shown = sorted(links, key=lambda link: (-link[2], link[:2]))[:links_max]
-    for source, destination, offered, delivered, dropped, delay_ns, *_ in sorted(shown):
-        table.add_row(source, destination, str(offered), str(delivered), str(dropped), f"{delay_ns / 1e6:.2f} ms")
+    for source, destination, offered, delivered, dropped, delay_ns, _, _, _, ages in sorted(shown):
+        delay = f"{delay_ns / 1e6:.2f} ms"
+        table.add_row(source, destination, str(offered), str(delivered), str(dropped), delay, _age_text(ages))
     packets = status["packets"]
     hidden = max(len(links), status.get("links_in_all", 0)) - len(shown)
     more = f"and {hidden} more" if hidden > 0 else ""
     total = (str(packets["offered"]), str(packets["delivered"]), str(packets["dropped"]))
     table.add_row("all", more, *total, f"{packets['in_flight']} in flight", style="bold")
     return table
+
+
+def _age_text(ages: list[list[Any]]) -> str:
+    """Return how old what goes by a link is when its receiver acts: of the one channel, or the oldest of several."""
+    _, _, p50_ns, p99_ns = max(ages, key=lambda age: (age[3], age[2]), default=("", 0, -1, -1))
+    return "" if p99_ns < 0 else f"{p50_ns / 1e6:.1f}, {p99_ns / 1e6:.1f} ms"
 
 
 def render_text(status: dict[str, Any], width: int = 120) -> str:

@@ -28,11 +28,14 @@ class Handshake:
     def hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
         """Answer who asks to take part: with what to build, or with a refusal."""
         core = self._core
+        if core.roster.has_silent_namesake(hello, now_ns):
+            return  # the one before it may have ended; it says hello again
         reason = core.roster.reason_against(hello)
         if reason:
             self.refuse(hello.role, hello.name, hello.boot, reason)
             return
-        if self._has_ended():
+        closes = core.take_over is not None and hello.role == "vhub"  # its capture, where the run has ended
+        if not closes and self._has_ended():
             return
         core.roster.take(hello, now_ns)
         run, pace, added = core.settings, str(core.pacer.pace), core.added_to(core.frame.layout)

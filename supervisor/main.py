@@ -19,8 +19,8 @@ from foosim.protocol.actions import Say
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.certificates import check_host, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
-from foosim.protocol.command import DONE, FAILED
-from foosim.protocol.errors import Refused
+from foosim.protocol.command import DONE, FAILED, REFUSED
+from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
@@ -90,12 +90,15 @@ class SupervisorProcess:
         wire.declare_alive()
 
     def run(self) -> int:
-        """Serve the run until it has ended; write how, and return the exit code."""
+        """Serve the run until it has ended; write how, and return the exit code. Of one that was resumed and does not
+        go on, nothing is written, so that it can be resumed again."""
         info = self._info
         self._folder.write_info(info)
         self.core.say("info", f"run {info.run} listens at {info.simulation}; its folder is {self._folder.path}")
         self._loop.run(lambda: self.core.finished)
         self._loop.perform()
+        if self.core.beginning.abandoned:
+            return REFUSED
         self._folder.write_result(result(self.core))
         end = self.core.end
         return FAILED if end is None or end.failed else DONE
@@ -177,7 +180,10 @@ def _history(plan: Plan, folder: RunFolder) -> History | None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
     if not journal_files(folder.journals, SUPERVISOR):
         return None
-    history = fold(plan.deployment, read_newest(folder.journals, SUPERVISOR))
+    try:
+        history = fold(plan.deployment, read_newest(folder.journals, SUPERVISOR))
+    except (JournalError, Malformed) as error:
+        raise Refused(f"run {folder.name} cannot go on: {error}") from None
     if history.run.deployment != plan.text:
         raise Refused(f"run {folder.name} was started with another deployment than {plan.options.file} is now")
     return history

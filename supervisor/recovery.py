@@ -108,7 +108,7 @@ class Recovery:
         """
         core = self._core
         if not core.is_open and now_ns > process.gone_ns + SAID_NS:
-            process.lost = False  # its connection was cut: it says itself that it is ready, until it is told of an epoch
+            process.lost = False  # its connection was cut; it says that it is ready until it is told of an epoch
         runs = core.is_open and core.end is None
         if runs and not core.members and process.ready and process.name not in core.roster.stopped:
             process.lost = False

@@ -16,6 +16,8 @@ from foosim.protocol.errors import show
 from foosim.protocol.messages import Heartbeat, Hello, Ready
 from foosim.protocol.names import nearest_name
 
+SILENT_NS: Final = 3 * limits.HEARTBEAT_NS
+"""A process that lives is not silent for so long, unless its machine or its loop stands."""
 ROLES: Final[tuple[str, ...]] = ("node", "vhub")
 
 
@@ -91,6 +93,12 @@ class Roster:
                 "its results would differ (the deployment may say mixed_cpu: true)"
             )
         return ""
+
+    def has_silent_namesake(self, hello: Hello, now_ns: int) -> bool:
+        """Whether another process of this name takes part and was not heard of for some heartbeats: it may be gone."""
+        known = self.by_name.get(hello.name)
+        is_other = known is not None and known.boot != hello.boot and not known.lost
+        return known is not None and is_other and now_ns - known.heard_ns > SILENT_NS
 
     def take(self, hello: Hello, now_ns: int) -> Process:
         """Note a process whose hello was accepted; one that was lost begins anew."""

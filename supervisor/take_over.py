@@ -41,8 +41,6 @@ class TakeOver:
         if history.run.clock != core.clock:
             history.started_ns += now_ns - history.committed_ns
             history.committed_ns = now_ns
-        self._is_stopped = False
-        """Whether somebody has asked for the end of the run: it ends when the vHub is here, which has the capture."""
         stand_on(core, history)
         core.beginning.go_on(core.frame.tick)
         core.say("warning", f"started again: the journal ends at tick {core.frame.tick}, epoch {core.epoch}")
@@ -53,6 +51,11 @@ class TakeOver:
         core = self._core
         if self._standing is not None and self._standing.boot == standing.boot:
             return False
+        if core.end is not None:
+            self._standing = standing
+            core.watch.ended_ns = now_ns
+            core.branches.proceed(standing)
+            return True
         if core.branches.is_behind(standing):
             core.branches.begin(standing, now_ns)
         elif core.branches.is_further(standing):
@@ -64,10 +67,9 @@ class TakeOver:
         core.beginning.go_on(core.frame.tick)
         return True
 
-    def stops(self) -> bool:
-        """Somebody asks for the end of the run: return whether that waits for the vHub, which has to end the capture."""
-        self._is_stopped = True
-        return self._standing is None
+    def waits_for_hub(self, now_ns: int) -> bool:
+        """Whether a run that has ended, perhaps before this start, waits for the vHub to close its capture."""
+        return self._standing is None and now_ns <= self._hub_ns
 
     def lose_hub(self) -> None:
         """The vHub is gone again: the next one tells where it stands."""
@@ -82,9 +84,6 @@ class TakeOver:
             if now_ns > self._hub_ns:
                 wait_s = max(core.deployment.deadlines.orphan_ns, core.deployment.deadlines.start_ns) / 1e9
                 core.finish(f"lost {channels.VHUB}: it has not come to the supervisor within {wait_s:g} s", failed=True)
-            return
-        if self._is_stopped:
-            core.finish("stopped", failed=False)
             return
         layout, known = core.frame.layout.digest, core.roster.by_name
         expected = [name for name in self._roster if name not in core.roster.stopped]

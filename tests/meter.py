@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Generator
 from pathlib import Path
 from typing import Final
@@ -37,7 +37,7 @@ class Meter:
 
     def __init__(self) -> None:
         self._begun_s = 0.0
-        self._by_folder: Counter[str] = Counter()
+        self._by_folder: dict[str, float] = defaultdict(float)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logstart(self) -> None:
@@ -60,7 +60,7 @@ class Meter:
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.section("processor time")
-        for folder, spent_s in self._by_folder.most_common():
+        for folder, spent_s in sorted(self._by_folder.items(), key=lambda item: -item[1]):
             terminalreporter.write_line(f"{spent_s:8.1f} s  {folder}")
         used = os.times()
         user_s, system_s = used.user + used.children_user, used.system + used.children_system

@@ -134,7 +134,7 @@ def test_a_players_declaration_is_valid() -> None:
         ((name, declared),) = content["players"].items()
         changed = apply_sets(table, "table.yaml", [f"players.{name}={json.dumps(declared)}"])
         classes.append(load_deployment(changed, "table.yaml").players[name].class_)
-    assert classes == ["follower:Follower", "scouting:Scout"]
+    assert classes == ["follower:Follower", "scouting:Scout", "follower:Follower"]
 
 
 # --- what is named exists --------------------------------------------------------------------------------------------

@@ -141,7 +141,7 @@ class _Completion:
         flights = state.in_flight()
         for flight in flights:
             flight.cause = IN_FLIGHT
-        file.write(Closing(closing.frame, closing.digest, [], [], fates=flights))
+        file.write(Closing(closing.frame, closing.digest, [], [], fates=flights, ages=state.ages.untold()))
 
     def _told_of(self, file: CaptureFile) -> Iterator[bytes]:
         """Yield the records, and write the epochs among them that the file lacks."""

@@ -97,7 +97,7 @@ class HubCore:
         self.speak: Callable[[int], int] = lambda now_ns: now_ns
         """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
-        self.epoch = self._epoch_tick = 0
+        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self.repeated = 0
         self._epoch_payload = b""
         self._owners: dict[str, str] = {}
         self.waits = Waits()
@@ -109,7 +109,6 @@ class HubCore:
         self.waited: list[str] = []
         """Clients whose Dones that tick lacks."""
         self._patience = Patience(now_ns)
-        self._end_ns = self._malformed = self.repeated = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Commit: self._on_commit,
             Samples: self._on_samples,
@@ -291,6 +290,7 @@ class HubCore:
         for flight in world.closing.fates:
             if not flight.cause and flight.destination not in state.members:
                 flight.released_wall_ns = now_ns
+        world.closing.ages = state.aged
         self._keeping.add(world.closing)
         self.actions += self._keeping.take(releases.waiting_tick)
         self._world = None

@@ -105,8 +105,7 @@ class Door:
             return
         if join.period and not may_lockstep(core.state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
-        if join.offset >= max(1, join.period):
-            raise Malformed(f"{join.name} joins with an offset of {join.offset} ticks, its period is {join.period}")
+        _check_timing(join)
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
@@ -227,7 +226,20 @@ class Door:
 
 def _is_member(known: Member | Joining, join: Join) -> bool:
     """Whether a client takes part as it asks to."""
-    wanted = {(item.source, item.channel) for item in join.subscriptions}
+    wanted = [{(item.source, item.channel) for item in items} for items in (join.subscriptions, join.arrivals)]
     active = isinstance(known, Joining) or known.active
     is_timed_so = (known.period, known.offset) == (join.period, join.offset)
-    return active and is_timed_so and {(source, name) for source, name in known.subscriptions} == wanted
+    heard = [{(source, name) for source, name in pairs} for pairs in (known.subscriptions, known.arrivals)]
+    return active and is_timed_so and heard == wanted
+
+
+def _check_timing(join: Join) -> None:
+    """Raises Malformed for an offset or arrivals that its period or its subscriptions do not allow."""
+    if join.offset >= (1 if join.arrivals else max(1, join.period)):
+        acts = ", and acts at arrival" if join.arrivals else ""
+        raise Malformed(f"{join.name} joins with an offset of {join.offset} ticks, its period is {join.period}{acts}")
+    if join.arrivals and not join.period:
+        raise Malformed(f"{join.name} acts at arrival and joins free-running: only who is in lockstep can")
+    for item in join.arrivals:
+        if item not in join.subscriptions:
+            raise Malformed(f"{join.name} acts at the arrival of {item.source} {item.channel}, which it does not hear")

@@ -99,7 +99,7 @@ class Fabric:
             link = self._by_rule.get(key)
             if link is None:
                 profile = self.profiles.of_rule(rule, source, destination)
-                state = self.states.setdefault((source, destination, _name(profile)), LinkState())
+                state = self.states.setdefault((source, destination, name_of(profile)), LinkState())
                 link = self._by_rule[key] = Link(source, destination, profile, self, state)
             self._links[source, destination, kind] = link
         return link
@@ -219,6 +219,6 @@ def _sender(source: str, destination: str, profile: Profile) -> RadioKey:
     return (source + _OWN_QUEUE + destination, profile.rule) if profile.is_own_queue else (source, profile.radio)
 
 
-def _name(profile: Profile) -> str:
+def name_of(profile: Profile) -> str:
     """Return a profile's name: its rule, and the radio where the rule does not say it."""
     return profile.rule if not profile.radio or profile.radio == profile.rule else f"{profile.rule}/{profile.radio}"

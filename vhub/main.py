@@ -29,11 +29,11 @@ from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Level
-from foosim.protocol.errors import BadValue, DeploymentError
+from foosim.protocol.errors import BadValue, DeploymentError, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, JournalError, read_journal, remove_journal
+from foosim.protocol.journal import Journal, JournalError, journal_files, read_journal, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build, End
 from foosim.protocol.notify import Notify
@@ -223,7 +223,21 @@ class HubProcess:
             core.lose("the network", error.problems[0])
             return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
+        goes_on = bool(journal_files(folder, VHUB))
         self._journal = self._loop.journal = Journal(folder, VHUB)
+        try:
+            self._go_on(build, deployment, folder, now_ns)
+        except Refused as error:
+            if not goes_on:
+                raise
+            core.failure = f"cannot go on: {error}"
+            core.lose(VHUB, f"it cannot go on: {error}")
+            return
+        self._listen(deployment)
+
+    def _go_on(self, build: Build, deployment: Deployment, folder: Path, now_ns: int) -> None:
+        """Begin, or be the vHub that was there before, with its capture. Raises Refused for what it has left."""
+        core = self.core
         records = list(read_journal(folder, VHUB))
         captured = self._open_capture(build, deployment, records)
         self._room = RoomWatch(self._capture, folder, deployment.capture.reserve_bytes)
@@ -234,7 +248,6 @@ class HubProcess:
         core.begin(past, now_ns)
         for line in start_lines(meanings(deployment), build.deployment_name) if past is None else ():
             self._log.info(line)
-        self._listen(deployment)
 
     def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:
         """Begin the capture, or go on with the one that the vHub before has begun; return how far it is."""

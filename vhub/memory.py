@@ -184,17 +184,63 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """The numbers by which a stage dropped it that it has nowhere else; `to_rows.DECIDING` has their names."""
 
 
+Counts = dict[int, int]
+"""How often each age was seen, in ticks."""
+
+
+class HeardState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    """A channel that a client hears, or has heard: when its newest packet was sent, and ages at use.
+
+    Those up to the last row, and those since.
+    """
+
+    source: str
+    channel: str
+    sent_ns: int
+    """-1 while nothing has come."""
+    is_heard: bool
+    """Whether it still hears it."""
+    whole: Counts
+    recent: Counts
+
+
+class Age(msgspec.Struct, frozen=True):
+    """The ages at use of one channel at one client, of some time or of the whole run."""
+
+    client: str
+    source: str
+    channel: str
+    counts: Counts
+
+
 class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A client that joins (again): period and offset in ticks (0: free-running), and what it subscribes to."""
+    """A client that joins (again): period and offset in ticks (0: free-running), what it subscribes to, and of that at
+    the arrival of what it acts, if it does."""
 
     name: str
     period: int
     subscriptions: list[tuple[str, str]]
     offset: int = 0
+    arrivals: list[tuple[str, str]] = []
 
     def suits(self, tick: int) -> bool:
         """Whether it can join at a tick."""
-        return self.period == 0 or tick % self.period == self.offset
+        return self.period == 0 or bool(self.arrivals) or tick % self.period == self.offset
+
+
+class MemberState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A client that takes part, as it is written down: what a `members.Member` is."""
+
+    period: int
+    subscriptions: tuple[tuple[str, str], ...]
+    joined_tick: int
+    sequence: int = 0
+    downlink: int = 0
+    active: bool = True
+    branched: int = 0
+    offset: int = 0
+    arrivals: tuple[tuple[str, str], ...] = ()
+    called_tick: int = -1
 
 
 class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -203,12 +249,13 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     closed: int
     packets: tuple[int, int, int, int, int]
     refusals: list[tuple[str, int]]
-    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int, int]]
+    members: list[tuple[str, MemberState]]
     links: list[tuple[str, str, str, LinkState]]
     radios: list[tuple[str, str, RadioState]]
     airs: list[tuple[str, AirState]]
     asked: list[tuple[int, str]]
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
+    ages: list[tuple[str, list[HeardState]]]
     branch: tuple[int, int]
     flights: list[FlightState]

@@ -21,7 +21,7 @@ from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Build, Commit, Delivered, Edit, Epoch, Recovered, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
 from foosim.protocol.start import first_chain
-from foosim.vhub.memory import Joining
+from foosim.vhub.memory import Age, Joining
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState
 
@@ -97,6 +97,8 @@ class Closing:
     """Losses and returns that were over with this frame."""
     chain: bytes = b""
     """Over the frames up to this one, without the one that the run began with."""
+    ages: Sequence[Age] = ()
+    """Ages at use since they were told last, where this closing tells them."""
 
 
 def closing_of(
@@ -220,6 +222,7 @@ class Fold:
         count_downlinks(state, frame.tick, released)
         state.at_door = dict(record.refused)
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
+        closing.ages = state.aged
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
         self.commit, self.inputs = record.commit, None

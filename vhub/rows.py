@@ -214,7 +214,10 @@ class SubscriptionRow(Row, frozen=True):
 
 
 class ClientRow(Row, frozen=True):
-    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks."""
+    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks.
+
+    One with `arrivals` acts when a packet of these channels reaches it, and when it has not for a period.
+    """
 
     tick: Counter
     client: str
@@ -222,6 +225,28 @@ class ClientRow(Row, frozen=True):
     period: Counter
     subscriptions: list[SubscriptionRow]
     offset: Counter = 0
+    arrivals: list[SubscriptionRow] = []
+
+
+class AgeRow(Row, frozen=True):
+    """How old the newest packet of a channel was when its receiver acted, since the row before: told each second of
+    simulated time, up to the closing of `tick`, and at the end.
+
+    `uses` counts the ticks at which the client acted and had something of the channel; `p50_ns`, `p99_ns` and `most_ns`
+    are of these. `counts` says how often each of `ages_ns` was seen; ages of 64 ticks and more are rounded down to
+    1/32.
+    """
+
+    tick: Counter
+    client: str
+    source: str
+    channel: str
+    uses: Counter
+    p50_ns: Counter
+    p99_ns: Counter
+    most_ns: Counter
+    ages_ns: list[int]
+    counts: list[int]
 
 
 class OwnerRow(Row, frozen=True):
@@ -266,6 +291,7 @@ RECOVERIES: Final = "/recoveries"
 TICK: Final = "/tick"
 LAYOUT: Final = "/layout"
 FRAME: Final = "/frame"
+AGES: Final = "/ages"
 PACKETS: Final = "/packets"
 CLIENTS: Final = "/clients"
 
@@ -276,6 +302,7 @@ ROW_TYPES: Final[Mapping[str, type[Row]]] = {
     CLIENTS: ClientRow,
     TICK: TickRow,
     FRAME: FrameRow,
+    AGES: AgeRow,
     PACKETS: PacketRow,
 }
 """The type of the rows of each topic."""

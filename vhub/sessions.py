@@ -195,8 +195,10 @@ class Sessions:
 
     def join(self, join: Join) -> None:
         """Note a join; it takes effect when the hub closes a tick that suits it."""
-        subscriptions = [(wanted.source, wanted.channel) for wanted in join.subscriptions]
-        self.joins[join.name] = Joining(join.name, join.period, sorted(set(subscriptions)), join.offset)
+        subscriptions = {(wanted.source, wanted.channel) for wanted in join.subscriptions}
+        arrivals = {(wanted.source, wanted.channel) for wanted in join.arrivals}
+        what = sorted(subscriptions), join.offset, sorted(arrivals)
+        self.joins[join.name] = Joining(join.name, join.period, *what)
 
     def take_joins(self, tick: int) -> list[Joining]:
         """Take the joins that take effect at `tick`, in name order."""

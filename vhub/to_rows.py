@@ -18,11 +18,14 @@ from foosim.protocol.draws import Slot
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Add, Disrupt, Edit, Epoch, Freeze, Push, Recovered, Remove
+from foosim.vhub.ages import quantile
 from foosim.vhub.air import DEAF
 from foosim.vhub.mcap_writer import McapWriter
+from foosim.vhub.memory import Age
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import (
+    AGES,
     CLIENTS,
     EPOCHS,
     FRAME,
@@ -31,6 +34,7 @@ from foosim.vhub.rows import (
     RECOVERIES,
     TICK,
     AddedRow,
+    AgeRow,
     ClientRow,
     DecidedRow,
     DeliveredRow,
@@ -90,7 +94,16 @@ def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]
         entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
         if known is None or frame.tick % plan.frames_every == 0:
             entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
+    entries += [(AGES, at_ns, at_ns, mark, _age_row(frame.tick, age, plan.tick_ns)) for age in closing.ages]
     return entries
+
+
+def _age_row(tick: int, age: Age, tick_ns: int) -> AgeRow:
+    ages = sorted(age.counts)
+    p50, p99 = quantile(age.counts, 0.5), quantile(age.counts, 0.99)
+    counts = [age.counts[ticks] for ticks in ages]
+    figures = sum(counts), p50 * tick_ns, p99 * tick_ns, ages[-1] * tick_ns
+    return AgeRow(tick, age.client, age.source, age.channel, *figures, [ticks * tick_ns for ticks in ages], counts)
 
 
 def add_packets(
@@ -265,8 +278,11 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
     tick = closing.frame.tick
     rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
     for joining in closing.joins:
-        subscriptions = [SubscriptionRow(source, channel) for source, channel in joining.subscriptions]
-        rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions, joining.offset))
+        heard, calling = (
+            [SubscriptionRow(source, channel) for source, channel in pairs]
+            for pairs in (joining.subscriptions, joining.arrivals)
+        )
+        rows.append(ClientRow(tick, joining.name, "joins", joining.period, heard, joining.offset, calling))
     return rows
 
 

@@ -49,8 +49,8 @@ def running() -> dict[str, Any]:
             "supervisor": {"role": "supervisor", **HERE, "busy": 0.106, "tick": 6170, "waiting_for": "red"},
         },
         "links": [
-            ["player-red", "red.goal", 1234, 1220, 9, 1_302_000],
-            ["camera", "player-red", 617, 612, 4, 1_297_000],
+            ["player-red", "red.goal", 1234, 1220, 9, 1_302_000, "lan", 0, {}, []],
+            ["camera", "player-red", 617, 612, 4, 1_297_000, "lan", 0, {}, [["ball", 600, 6_000_000, 8_000_000]]],
         ],
     }
 
@@ -100,12 +100,14 @@ def test_a_row_for_each_node_with_what_it_owns_solved_and_its_load(running: dict
 def test_a_row_for_each_link_and_one_for_all(running: dict[str, Any]) -> None:
     text = render_text(running)
     assert row_of(text, "1234").split() == ["player-red", "red.goal", "1234", "1220", "9", "1.30", "ms"]
-    assert row_of(text, "617 ").split() == ["camera", "player-red", "617", "612", "4", "1.30", "ms"]
+    camera = ["camera", "player-red", "617", "612", "4", "1.30", "ms", "6.0,", "8.0", "ms"]
+    assert row_of(text, "617 ").split() == camera
     assert row_of(text, "22510").split() == ["all", "22510", "22390", "113", "7", "in", "flight"]
 
 
 def test_of_too_many_links_the_busiest_are_shown(running: dict[str, Any]) -> None:
-    running["links"] = [["camera", f"player-{number}", number, number, 0, 0] for number in range(LINKS_SHOWN_MAX + 5)]
+    rest = [0, 0, "lan", 0, {}, []]
+    running["links"] = [["camera", f"player-{n}", n, n, *rest] for n in range(LINKS_SHOWN_MAX + 5)]
     text = render_text(running)
     assert row_of(text, "player-5 ")
     assert "player-4 " not in text
@@ -182,7 +184,7 @@ def test_what_passed_before_the_first_tick_does_not_count_as_slow(running: dict[
 
 @pytest.mark.parametrize("height", [17, 18, 24])
 def test_a_low_window_shows_fewer_links_and_keeps_the_row_for_all(running: dict[str, Any], height: int) -> None:
-    running["links"] = [["camera", f"player-{number}", number, number, 0, 0] for number in range(40)]
+    running["links"] = [["camera", f"player-{number}", number, number, 0, 0, "lan", 0, {}, []] for number in range(40)]
     console = Console(width=80, height=height, file=io.StringIO(), color_system=None)
     with console.capture() as captured:
         console.print(fitted(running, console))

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import pytest
 from msgspec import structs
 
 from foosim.protocol import channels, limits
 from foosim.protocol.deployment_file import apply_sets
-from foosim.protocol.messages import ClientHello, Epoch, Join, Want
+from foosim.protocol.messages import ClientHello, Epoch, Join, Subscription, Want
 from foosim.vhub.state import HubState
 from tests.vhub.test_sessions import BUILD, DEPLOYMENT, FRAME, OWNERS, PERIODS, TEXT, Hub, sent
 
 W = limits.RELEASE_AHEAD
 OWNED = list(DEPLOYMENT.robots)
+BALL = Subscription("camera", "ball")
 
 
 def covered(hub: Hub) -> list[tuple[int, int]]:
@@ -123,10 +125,19 @@ def test_they_end_at_ticks_that_offsets_say_and_where_an_absent_client_may_join(
     assert reached[7:] == [(8, 8), (9, 11), (12, 13), (14, 16), (17, 17), (18, 18), (19, 21)]
 
 
-def test_a_join_with_an_offset_that_is_no_remainder_is_refused() -> None:
+@pytest.mark.parametrize(
+    ("join", "what"),
+    [
+        (Join("hand", "one", 5, [], 5), "joins with an offset of 5 ticks, its period is 5"),
+        (Join("ear", "one", 0, [], 1), "joins with an offset of 1 ticks, its period is 0"),
+        (Join("hand", "one", 5, [BALL], 1, [BALL]), "an offset of 1 ticks, its period is 5, and acts at arrival"),
+        (Join("ear", "one", 0, [BALL], 0, [BALL]), "acts at arrival and joins free-running"),
+        (Join("hand", "one", 5, [], 0, [BALL]), "acts at the arrival of camera ball, which it does not hear"),
+    ],
+)
+def test_a_join_whose_times_do_not_fit_is_refused(join: Join, what: str) -> None:
     hub = Hub()
-    for name, period, offset in (("hand", 5, 5), ("ear", 0, 1)):
-        hub.say(channels.CLIENT_HELLO, name, ClientHello(name, "one", limits.PROTOCOL_VERSION, "", 0))
-        hub.say(channels.UP, name, Join(name, "one", period, [], offset))
-        assert f"{name} joins with an offset of {offset} ticks, its period is {period}" in hub.lines()[-1]
-    assert hub.core.statistics().malformed == 2 and not hub.core.sessions.joins
+    hub.say(channels.CLIENT_HELLO, join.name, ClientHello(join.name, "one", limits.PROTOCOL_VERSION, "", 0))
+    hub.say(channels.UP, join.name, join)
+    assert what in hub.lines()[-1]
+    assert hub.core.statistics().malformed == 1 and not hub.core.sessions.joins

@@ -44,6 +44,13 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     folder = open_run("far")
     house.wait_for("all to be gone with it", lambda: folder.is_left() and not house.processes_with("--run far"))
     assert folder.result() is None
+    (journal,) = journal_files(folder.journals, channels.VHUB)
+    journal.rename(journal.with_suffix(".away"))
+    code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
+    why = f"run far cannot go on: the vHub's journal is gone from {folder.journals}; foosim-supervisor up {house.table}"
+    assert code == 3 and err.startswith(why) and last_json(out)["reason"] == err.strip()
+    assert last_json(out)["capture"] == str(house.folder / "far.mcap")
+    journal.with_suffix(".away").rename(journal)
     tear(folder.journals, channels.VHUB, 60)
     tear(folder.journals, channels.SUPERVISOR, 9)
     up = house.start("foosim-supervisor", "up", "--resume", "far", "--json")
@@ -59,8 +66,8 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     assert open_capture(house.folder / "far.mcap").about.finished
     verified = verify_capture(house.folder / "far.mcap")
     assert verified.ticks == content["ticks"]
-    code, _, err = house.run("foosim-supervisor", "up", "--resume", "far")
-    assert code == 3 and "run far has ended" in err
+    code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
+    assert (code, last_json(out)) == (0, content) and "run far has ended: stopped" in err
 
 
 def test_a_run_that_does_not_come_up_says_why(house: House) -> None:
