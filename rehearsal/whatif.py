@@ -281,7 +281,7 @@ def _judged(
             state.close_clients(frame, admitted, fates)
             ages.take(state.aged)
             yield from fates
-    ages.take(state.ages.untold())
+    ages.take(state.ages.untold(state.closed))
     for flight in state.in_flight():
         flight.cause = IN_FLIGHT
         yield flight

@@ -254,7 +254,7 @@ class Up:
             self._supervisor_watch.unanswered()
             return
         self._supervisor_watch.answered()
-        now_s = time.monotonic()
+        now_s = self._own_time.at(time.monotonic())
         self._tell_recoveries(status["recoveries"])
         if not self._has_ended:
             self.display.show(status, now_s)
@@ -385,7 +385,7 @@ class Up:
             self._launcher.kill()
             raise Killed("\n".join(["killed", *self._capture_lines()]), self.unended("killed by a second Ctrl-C"))
         supervisor = self._launcher.children[SUPERVISOR]
-        now_s = time.monotonic()
+        now_s = self._own_time.at(time.monotonic())
         if supervisor.exit_code is not None:
             if self._supervisor_comes_back(supervisor, now_s):
                 self._restart_ended(now_s)

@@ -103,7 +103,7 @@ class Session:
     def rest(self, for_ns: int, back_ns: int, now_ns: int) -> None:
         """For so long the client could do nothing: move its deadlines, at most to where they would begin now."""
         if self.away_ns >= 0:
-            self.away_ns = min(self.away_ns + for_ns, now_ns + back_ns)
+            self.away_ns = max(self.away_ns, min(self.away_ns + for_ns, now_ns + back_ns))
         if self.deadline_ns:
             self.deadline_ns = min(self.deadline_ns + for_ns, now_ns + self.allowed_ns)
 

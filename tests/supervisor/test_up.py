@@ -16,11 +16,13 @@ from foosim.protocol.session import ConnectError
 from foosim.supervisor import control
 from foosim.supervisor.display import Display
 from foosim.supervisor.launcher import Child
+from foosim.supervisor.liveness import UNANSWERED_MAX
+from foosim.supervisor.outcome import capture_lines
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.supervisor.restarts import WAITS_S
 from foosim.supervisor.run_folder import RunInfo
 from foosim.supervisor.status import NOT_RECORDED
-from foosim.supervisor.up import END_S, Up
+from foosim.supervisor.up import END_S, Killed, Up
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -91,6 +93,62 @@ def test_what_follows_when_a_node_ends(
     assert (tmp_path / "node.log").read_text().count("started") == starts
     is_given_up = has_begun and ends == "exit 3"
     assert ("is given up; foosim-supervisor start red tries it again" in said.getvalue()) == is_given_up
+    up._launcher.close()
+
+
+@pytest.mark.parametrize(
+    ("ends", "listened", "comes_back", "reason"),
+    [
+        ("kill -9 $$", False, True, "lost supervisor: it was killed by SIGKILL, not by foosim"),
+        ("exit 1", False, False, "lost supervisor: it ended with exit code 1"),
+        ("exit 1", True, True, "lost supervisor: it ended with exit code 1"),
+        ("echo run mine cannot go on: no journal; exit 3", True, False, "run mine cannot go on: no journal"),
+        ("echo MemoryError; exit 1", True, True, "lost supervisor: it ended with exit code 1: too little memory"),
+    ],
+)
+def test_what_follows_when_the_supervisor_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, listened: bool, comes_back: bool, reason: str
+) -> None:
+    """Whatever becomes of it, there is a result, of the shape of any other."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up._launch(SUPERVISOR, ["sh", "-c", ends])
+    supervisor = up._launcher.children[SUPERVISOR]
+    supervisor.process.wait()
+    if listened:
+        up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
+    outcome = up._outcome()
+    assert outcome.failed and outcome.result["reason"] == reason and outcome.result["run"] == "run"
+    assert up._supervisor_comes_back(supervisor, 0.0) == comes_back
+    up._launcher.children[SUPERVISOR].process.wait()
+    up._interrupts = 2
+    with pytest.raises(Killed) as killed:
+        up._goes_on()
+    assert killed.value.result.keys() == outcome.result.keys()
+    assert killed.value.result["reason"] == "killed by a second Ctrl-C"
+    up._launcher.close()
+
+
+def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    up._launch(SUPERVISOR, ["sleep", "100"])
+    supervisor = up._launcher.children[SUPERVISOR]
+    for _ in range(3 * UNANSWERED_MAX):
+        up._supervisor_watch.unanswered()
+        up._end_stalled_supervisor(supervisor)
+    assert supervisor.exit_code is None, "it has not said where it listens"
+    up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
+    up._end_stalled_supervisor(supervisor)
+    for _ in range(UNANSWERED_MAX):
+        up._supervisor_watch.unanswered()
+    up._end_stalled_supervisor(supervisor)
+    supervisor.process.wait()
+    assert said.getvalue() == (
+        "supervisor does not answer any more: it is killed (it had not answered for 5 s)\n"
+    )
+    assert up._outcome().result["reason"] == "lost supervisor: it was killed by up: it had not answered for 5 s"
     up._launcher.close()
 
 
@@ -166,22 +224,14 @@ def test_a_supervisor_that_runs_and_lets_nobody_in_is_an_error(tmp_path: Path, m
     up._launcher.close()
 
 
-def test_a_capture_that_was_cut_off_is_an_error_with_the_command_that_completes_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    capture = tmp_path / "run.mcap"
-    up = Up(make_plan(RunOptions(TABLE)), capture, Display(io.StringIO()), "run")
+def test_a_capture_that_was_cut_off_is_named_with_the_command_that_completes_it(tmp_path: Path) -> None:
+    capture, journals = tmp_path / "run.mcap", tmp_path / "journals"
     capture.write_bytes(b"\x89MCAP0\r\n")
-    reason = "done; the capture is cut off: its vHub ended before it was closed"
-    up.folder.write_result({"reason": reason, "failed": True, "recoveries": [], "recording": NOT_RECORDED})
-    outcome = up._outcome()
-    assert outcome.failed and outcome.lines == (
-        f"the run has ended: {reason}",
+    assert capture_lines(capture, {"recording": NOT_RECORDED}, journals) == [
         f"capture {capture} (unfinished)",
-        f"complete it with: foosim-replay recover {capture} --journals {up.folder.journals}",
-    )
-    up._launcher.close()
+        f"complete it with: foosim-replay recover {capture} --journals {journals}",
+    ]
+    assert capture_lines(capture, None, journals) == [f"capture {capture} (unfinished)"], "the run can be resumed"
 
 
 def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says_that_it_closes_its_capture(
@@ -190,7 +240,7 @@ def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
     up._launch(SUPERVISOR, ["sleep", "100"])
-    told = {"state": "ended", "recoveries": [], "processes": {}, "starts": {}, "recording": NOT_RECORDED}
+    told = {"state": "ended", "begun": True, "recoveries": [], "processes": {}, "starts": {}, "recording": NOT_RECORDED}
     closing = SimpleNamespace(status=lambda timeout_s, give_up: told)
     up._has_begun = up._has_ended = up._is_told = True
     up._interrupts, up._ending_s = 1, time.monotonic() - END_S - 1
