@@ -45,7 +45,7 @@ class Door:
         here = {name for name, member in core.state.members.items() if member.active}
         if written is not None:
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        core.sessions.expect(here, now_ns + self._start_ns)  # theirs may have ended as well, and be started again
+        core.sessions.expect(here, self._start_ns, now_ns)  # theirs may have ended as well, and be started again
 
     def _known(self, name: str) -> Member | Joining | None:
         """Return what is known of a client, the latest first: as it joins, or as the state has it."""
@@ -187,7 +187,7 @@ class Door:
         if session is None or core.state is None or core.deployment is None or core.ended is not None:
             return
         if self._is_waited_for(name):
-            session.away_ns = now_ns + (core.deployment.deadlines.client_back_ns if core.epoch else self._start_ns)
+            session.leave(core.deployment.deadlines.client_back_ns if core.epoch else self._start_ns, now_ns)
             return
         self._leave(name)
 
@@ -205,12 +205,8 @@ class Door:
         core.orphan.rest(stood_ns, now_ns)
         if stood_ns >= TOLD_NS:
             core.actions.append(Say("warning", told(stood_ns)))
-        self._rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
+        core.sessions.rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
         self._looked_ns = now_ns
-
-    def _rest(self, for_ns: int, now_ns: int) -> None:
-        if self._core.deployment is not None:
-            self._core.sessions.rest(for_ns, self._core.deployment.deadlines.client_back_ns, now_ns)
 
     def wake(self, now_ns: int) -> None:
         """Say Go again, lose who has not answered in time, and give up who was away for too long.
@@ -224,9 +220,9 @@ class Door:
         core.sessions.repeat(core.waited, now_ns)
         passed_ns, self._looked_ns = now_ns - self._looked_ns, now_ns
         if self.holds:
-            self._rest(limits.COUNTER_MAX, now_ns)
+            core.sessions.rest(limits.COUNTER_MAX, now_ns)
         elif core.releases is not None and core.releases.paused:
-            self._rest(passed_ns, now_ns)
+            core.sessions.rest(passed_ns, now_ns)
         for late in core.sessions.overdue(now_ns):
             core.give_up(late.unanswered)
         for name in core.sessions.late(now_ns):

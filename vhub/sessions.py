@@ -48,6 +48,8 @@ class Session:
     """Whether it is to be told what it had not received then."""
     away_ns: int = -1
     """Until when a client that is away may come back at least; -1 while it is here."""
+    back_ns: int = 0
+    """How long it has for that."""
     next_sequence: int = 1
     """The number of its next packet: nothing behind a gap is taken."""
     heard: int = 0
@@ -85,10 +87,14 @@ class Session:
         """No answer is waited for."""
         self.deadline_ns = 0
 
-    def rest(self, for_ns: int, back_ns: int, now_ns: int) -> None:
+    def leave(self, back_ns: int, now_ns: int) -> None:
+        """The client is away, and has so long to come back."""
+        self.back_ns, self.away_ns = back_ns, now_ns + back_ns
+
+    def rest(self, for_ns: int, now_ns: int) -> None:
         """For so long the client could do nothing: move its deadlines, at most to where they would begin now."""
         if self.away_ns >= 0:
-            self.away_ns = min(self.away_ns + for_ns, now_ns + back_ns)
+            self.away_ns = min(self.away_ns + for_ns, now_ns + self.back_ns)
         if self.deadline_ns:
             self.deadline_ns = min(self.deadline_ns + for_ns, now_ns + self.allowed_ns)
 
@@ -197,10 +203,11 @@ class Sessions:
         here = {name for name, member in state.members.items() if member.active} | self.joins.keys()
         return [name for name in declared if may_lockstep(deployment, name) and name not in here]
 
-    def expect(self, names: Iterable[str], until_ns: int) -> None:
+    def expect(self, names: Iterable[str], back_ns: int, now_ns: int) -> None:
         """These clients come back, by then, to this vHub, which is another one."""
         for name in sorted(names):
-            self.by_name[name] = Session(name, "", away_ns=until_ns)
+            self.by_name[name] = Session(name, "")
+            self.by_name[name].leave(back_ns, now_ns)
 
     def late(self, now_ns: int) -> list[str]:
         """Return the clients that were away for too long, in name order."""
@@ -295,10 +302,10 @@ class Sessions:
                 session.heard, session.heard_ns = member.sequence, now_ns
                 self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence, state.branch))))
 
-    def rest(self, for_ns: int, back_ns: int, now_ns: int) -> None:
-        """For so long no client could do anything; `back_ns` is what one that is away has to come back."""
+    def rest(self, for_ns: int, now_ns: int) -> None:
+        """For so long no client could do anything."""
         for session in self.by_name.values():
-            session.rest(for_ns, back_ns, now_ns)
+            session.rest(for_ns, now_ns)
 
     def overdue(self, now_ns: int) -> list[Session]:
         """Return those who are here and have not answered in time, in name order."""
