@@ -42,7 +42,7 @@ COMPILED: Final = {
     "vhub": (
         *("ages", "air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "members", "numbers"),
         *("packet", "propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit"),
-        *("world",),
+        *("turns", "world"),
     ),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss", "shadowing"),

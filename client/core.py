@@ -111,7 +111,8 @@ class ClientCore:
         self._resend_ns = NEVER_NS
         self._period = self._offset = 0
         self._on_arrival = False
-        self._sequence = 0
+        self._sequence = self.first_sequence = 0
+        """The number of its last packet; and of the last one of processes before it, whose place it takes."""
         self._downlink = 0
         self._gaps: set[int] = set()
         self._done = b""
@@ -290,7 +291,7 @@ class ClientCore:
             return
         self.welcome = welcome
         self.deployment = deployment
-        self._sequence = welcome.sequence
+        self._sequence = self.first_sequence = welcome.sequence
         self._downlink = welcome.downlink
         self.branch = welcome.branch
 

@@ -127,6 +127,8 @@ class Player(Placed):
     arrivals: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     on: RobotName | None = None
     process: Name | None = None
+    restart: bool = True
+    """Whether its process is started again when a signal has ended it, or it was lost with its machine."""
     robots: dict[RobotName, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     hears: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)

@@ -132,8 +132,7 @@ class System:
                 self.soon(lambda: self._hub_again(hub))
 
         self.enter(channels.VHUB, hub, turn, channels.VHUB_READS)
-        process = self.processes[channels.VHUB]
-        process.took, process.stood = hub.waits.took, hub.door.rest
+        self.processes[channels.VHUB].took, self.processes[channels.VHUB].stood = hub.waits.took, hub.door.rest
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -396,9 +395,11 @@ class System:
         self.soon(action)
 
     def kill(self, name: str) -> None:
-        """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
+        """End a node, a player or the supervisor at once: what is on its way to it is lost; it is seen to go."""
         self.leave(name)
-        if name == channels.SUPERVISOR:
+        if name in self.players:
+            self.clients.gone(name)
+        if name not in self.solvers:
             return
         self.solvers.pop(name).close()
         self._supervisor_sees_gone(name)
@@ -412,7 +413,7 @@ class System:
         return name in self._dying
 
     def start(self, name: str) -> None:
-        """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""
+        """Start a node, a player or the supervisor again, with a new boot; the supervisor goes on from its journal."""
         assert name not in self.processes, f"{name} is running"
         if name == channels.SUPERVISOR:
             self._boots += 1
@@ -421,6 +422,8 @@ class System:
             now_ns = self.now_of(name)
             self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)
             self._enter_supervisor()
+        elif name in self.players:
+            self.clients.start(name)
         else:
             self._enter_node(name, library_fingerprint())
         self.wake(self.processes[name])

@@ -82,6 +82,8 @@ def recovery_text(entry: dict[str, Any]) -> str:
         "join": f"node {name} takes part",
         "supervisor": "the supervisor was started again",
         "vhub": f"lost the vHub ({entry['reason']})",
+        "player": f"lost {name} ({entry['reason']})",
+        "return": f"{name} takes part again",
     }
     what = texts[entry["what"]]
     after = "" if entry["outage_ms"] is None else f", went on after {entry['outage_ms']:.1f} ms"

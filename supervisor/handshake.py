@@ -116,6 +116,7 @@ class Handshake:
         process.heartbeat = heartbeat
         report = decode_json(heartbeat.report)
         process.report = report if isinstance(report, dict) else {}
+        core.absence.players.hear(process)
         if process.lost and process.name == channels.VHUB:
             core.absence.hear(now_ns)
         if core.end is not None:

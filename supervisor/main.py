@@ -24,13 +24,14 @@ from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, JournalError, journal_files, read_newest, remove_journal
+from foosim.protocol.journal import Journal, JournalError, journal_files, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.notify import Notify
 from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.journal_check import supervisor_records
 from foosim.supervisor.journal_room import JournalRoom
 from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.records import History, fold
@@ -179,10 +180,10 @@ def _history(plan: Plan, folder: RunFolder) -> History | None:
     """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
     if folder.result() is not None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
-    if not journal_files(folder.journals, SUPERVISOR):
-        return None
+    if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
+        return None  # the one before may have ended when it had only made the file
     try:
-        history = fold(plan.deployment, read_newest(folder.journals, SUPERVISOR))
+        history = fold(plan.deployment, supervisor_records(folder, plan.options))
     except (JournalError, Malformed) as error:
         raise Refused(f"run {folder.name} cannot go on: {error}") from None
     if history.run.deployment != plan.text:

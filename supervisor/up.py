@@ -342,7 +342,8 @@ class Up:
             wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
         after = f"starts again in {wait_s:g} s" if wait_s else "starts again"
         if wait_s is None:
-            after = "is given up" if at_once else f"is given up; foosim-supervisor start {child.name} tries it again"
+            is_node = child.name in self.plan.deployment.nodes
+            after = f"is given up; foosim-supervisor start {child.name} tries it again" if is_node else "is given up"
         self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
 
     def _start_due(self, now_s: float) -> None:
@@ -359,10 +360,18 @@ class Up:
         if child.name == VHUB and (child.exit_code == REFUSED or VHUB in self._restarts.failed):
             return False
         if self._has_begun:
-            return child.name == VHUB or child.name in self.plan.deployment.nodes
+            return child.name == VHUB or child.name in self.plan.deployment.nodes or self._plays_again(child)
         is_orphan = child.exit_code == FAILED and self._restarts.has_ended(SUPERVISOR)
         may_come = child.how.is_by_signal or child.is_away or is_orphan
         return may_come and child.name not in self._restarts.failed
+
+    def _plays_again(self, child: Child) -> bool:
+        """Whether these are players whom something else has ended: one that ends by itself has failed."""
+        deployment = self.plan.deployment
+        players = deployment.player_processes().get(child.name, ())
+        may_restart = bool(players) and all(deployment.players[player].restart for player in players)
+        is_lost = child.how.is_by_signal or child.is_away
+        return may_restart and is_lost and child.name not in self._restarts.failed
 
     def _vhub_again(self) -> list[str]:
         """Return how the vHub is started again: where clients know it to be."""

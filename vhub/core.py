@@ -50,7 +50,6 @@ from foosim.protocol.orphan import Orphan
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain
-from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
 from foosim.vhub.footing import Footing
@@ -118,7 +117,7 @@ class HubCore:
             Recall: self._on_recall,
             Build: self._on_build,
             Piece: self._on_build,
-            Tempo: self._on_tempo,
+            Tempo: self.door.tempo,
             End: self._on_end,
             Proceed: self.footing.proceed,
             ClientHello: self.door.hello,
@@ -266,6 +265,7 @@ class HubCore:
         assert world is not None and state is not None and releases is not None
         tick = world.frame.tick
         self._tell_of_waits(now_ns)
+        self.door.leave_owing(state, world.closing)
         admitted = self.sessions.take_sent() if state.hears_clients else {}
         samples = self._samples.pop(tick, [])
         deliveries = state.close_robots(world.frame, admitted)
@@ -274,6 +274,7 @@ class HubCore:
             state.members[name].downlink += 1
         record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
         self.actions.append(Journal(record))
+        self.door.tell()
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         if not state.was_final:
             self._sent[tick + 1] = payload
@@ -439,12 +440,6 @@ class HubCore:
         if want.kind == channels.DELIVERIES.name and want.tick in self._sent and not self.footing.waits:
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[want.tick]))
 
-    def _on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
-        """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
-        pace = parse_pace(tempo.pace)
-        if self.releases is not None:
-            self.releases.set_tempo(0.0 if pace.kind == "fast" else float(pace.factor), tempo.paused)
-
     # --- time --------------------------------------------------------------------------------------------------------
 
     def _ask_again(self, now_ns: int) -> None:
@@ -466,7 +461,11 @@ class HubCore:
         if not self.lost:
             self.lost = reason
             self.actions.append(Say("error", reason))
-            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self.heartbeat())))
+            self.say_heartbeat()
+
+    def say_heartbeat(self) -> None:
+        """Say at once what the next heartbeat would."""
+        self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self.heartbeat())))
 
     def heartbeat(self) -> Heartbeat:
         """Return what it says of itself."""

@@ -32,7 +32,15 @@ from foosim.protocol.errors import BadValue, DeploymentError, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, JournalError, journal_files, read_journal, remove_journal
+from foosim.protocol.journal import (
+    Journal,
+    JournalDamaged,
+    JournalError,
+    journal_files,
+    read_journal,
+    read_whole,
+    remove_journal,
+)
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.messages import Build
 from foosim.protocol.notify import Notify
@@ -40,6 +48,7 @@ from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
+from foosim.vhub.branching import branch_command
 from foosim.vhub.capture_file import check_new, ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
@@ -50,7 +59,7 @@ from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 from foosim.vhub.records import Closing, first_head
-from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_captured
+from foosim.vhub.resume import Captured, end_of, first_tick_of, last_tick_of, recall, was_captured
 from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
@@ -254,6 +263,9 @@ class HubProcess:
         except Refused as error:
             if not goes_on:
                 raise
+            if self._capture is not None:  # it stays as it is, without a line about this
+                self._capture.leave()
+                self._capture = None
             core.failure = f"cannot go on: {error}"
             core.lose(VHUB, f"it cannot go on: {error}")
             return
@@ -262,7 +274,9 @@ class HubProcess:
     def _go_on(self, build: Build, deployment: Deployment, folder: Path, now_ns: int) -> None:
         """Begin, or be the vHub that was there before, with its capture. Raises Refused for what it has left."""
         core = self.core
-        records = list(read_journal(folder, VHUB))
+        records, damaged = read_whole(read_journal(folder, VHUB))
+        if damaged is not None:
+            raise self._refusal(build, records, damaged)
         captured = self._open_capture(build, deployment, records)
         self._room = RoomWatch(self._capture, folder, deployment.capture.reserve_bytes)
         core.recording = self._room.recording
@@ -272,6 +286,13 @@ class HubProcess:
         core.begin(past, now_ns)
         for line in start_lines(meanings(deployment), build.deployment_name) if past is None else ():
             self._log.info(line)
+
+    def _refusal(self, build: Build, records: list[bytes], damaged: JournalDamaged) -> Refused:
+        """Return why nobody goes on over a damaged journal, and what helps."""
+        before = was_captured(records)
+        capture = self._options.capture if before is None else Path(before) if before else None
+        what = f"{damaged}; tick {last_tick_of(records)} is the last before it"
+        return Refused(f"{what}. {branch_command([build.deployment_name], capture)}")
 
     def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:
         """Begin the capture, or go on with the one that the vHub before has begun; return how far it is."""

@@ -28,7 +28,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.names import nearest_name
 from foosim.vhub.downlinks import Downlinks
-from foosim.vhub.members import may_lockstep
+from foosim.vhub.members import may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.state import HubState
 
@@ -46,8 +46,15 @@ class Session:
     """The last downlink up to which it had all at its hello."""
     is_behind: bool = True
     """Whether it is to be told what it had not received then."""
+    is_gone: bool = False
+    """Whether its process has gone, and has not come back, nor another one."""
+    returns: int = 0
+    """How often its process had lost the vHub when it said hello."""
+    before: set[str] = field(default_factory=set)
+    """Boots of processes that are gone for good: what comes late of them is of nobody."""
     away_ns: int = -1
-    """Until when a client that is away may come back at least; -1 while it is here."""
+    """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
+    here."""
     back_ns: int = 0
     """How long it has for that."""
     next_sequence: int = 1
@@ -69,12 +76,20 @@ class Session:
     inbox_bytes: int = 0
     """As they came."""
 
-    def come(self, boot: str, received: int, sequence: int) -> None:
-        """A process of the client is here; it goes on behind these numbers."""
+    def is_late(self, hello: ClientHello) -> bool:
+        """Whether a hello was said by a process that has gone since: one that comes back counts one return more."""
+        is_of_gone = self.is_gone and hello.boot == self.boot and hello.returns <= self.returns
+        return is_of_gone or hello.boot in self.before
+
+    def come(self, boot: str, received: int, sequence: int, joins_first: bool = False) -> None:
+        """A process of the client is here; it goes on behind these numbers. It may be away until it `joins_first`."""
         if boot != self.boot:
+            if self.boot:
+                self.before.add(self.boot)
             self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
         self.is_present = self.is_present and boot == self.boot
-        self.boot, self.received, self.is_behind, self.away_ns = boot, received, True, -1
+        self.boot, self.received, self.is_behind, self.is_gone = boot, received, True, False
+        self.away_ns = self.away_ns if joins_first else -1
         self.next_sequence = max(self.next_sequence, sequence + 1)
 
     @property
@@ -163,10 +178,12 @@ class Sessions:
             downlink = min(has, downlink)
         else:  # another process: the numbers of what the one before has sent are taken
             waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
+            waiting += [] if session.done is None else session.done.packets
             sequence = max([sequence, *(packet.sequence for packet in waiting)])
         if session.boot != hello.boot:
             self._left_behind.setdefault(hello.name, []).extend(session.inbox)
-        session.come(hello.boot, downlink, sequence)
+        session.returns = hello.returns
+        session.come(hello.boot, downlink, sequence, hello.returns == 0 and may_restart(deployment, hello.name))
         welcome = ClientWelcome(
             hello.name,
             hello.boot,
@@ -193,7 +210,7 @@ class Sessions:
             hint = f", nearest is {nearest}" if nearest else ""
             return f"no client {hello.name} is declared; declared are {', '.join(sorted(declared)) or 'none'}{hint}"
         session = self.by_name.get(hello.name)
-        if session is not None and session.boot not in ("", hello.boot) and session.away_ns < 0:
+        if session is not None and session.boot not in ("", hello.boot) and not session.is_gone:
             return f"a client {hello.name} is already here"
         return ""
 
@@ -286,6 +303,7 @@ class Sessions:
     def catch_up(self, session: Session, waits: bool, now_ns: int) -> None:
         """A client has joined (again): say what it had not received; `waits` is whether a tick waits for its Done."""
         session.is_present = True
+        session.away_ns = -1
         if session.is_behind:
             session.deadline_ns = now_ns + session.allowed_ns if waits else 0
             session.is_behind = False

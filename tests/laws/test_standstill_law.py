@@ -165,7 +165,8 @@ def test_of_a_clients_two_deadlines_the_longer_one_counts() -> None:
         system.later(2_999 * MS, lambda: client(system, name).hub_gone(system.bus.now_ns))
 
     assert_nobody_was_lost(fly(stop))
-    run = fly(stop, FAST, "deadlines.lockstep_fast=1 s", "deadlines.client_back=1 s")
+    alone = "players.player-red.restart=false"
+    run = fly(stop, FAST, alone, "deadlines.lockstep_fast=1 s", "deadlines.client_back=1 s")
     assert run.json["reason"] == "lost player-red: its connection closed"
 
 

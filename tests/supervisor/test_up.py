@@ -16,12 +16,13 @@ from foosim.protocol.session import ConnectError
 from foosim.supervisor import control
 from foosim.supervisor.display import Display
 from foosim.supervisor.launcher import Child
+from foosim.supervisor.liveness import UNANSWERED_MAX
 from foosim.supervisor.outcome import capture_lines
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.supervisor.restarts import WAITS_S
 from foosim.supervisor.run_folder import RunInfo
 from foosim.supervisor.status import NOT_RECORDED
-from foosim.supervisor.up import END_S, Up
+from foosim.supervisor.up import END_S, Killed, Up
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -92,6 +93,103 @@ def test_what_follows_when_a_node_ends(
     assert (tmp_path / "node.log").read_text().count("started") == starts
     is_given_up = has_begun and ends == "exit 3"
     assert ("is given up; foosim-supervisor start red tries it again" in said.getvalue()) == is_given_up
+    up._launcher.close()
+
+
+@pytest.mark.parametrize(
+    ("ends", "listened", "comes_back", "reason"),
+    [
+        ("kill -9 $$", False, True, "lost supervisor: it was killed by SIGKILL, not by foosim"),
+        ("exit 1", False, False, "lost supervisor: it ended with exit code 1"),
+        ("exit 1", True, True, "lost supervisor: it ended with exit code 1"),
+        ("echo run mine cannot go on: no journal; exit 3", True, False, "run mine cannot go on: no journal"),
+        ("echo MemoryError; exit 1", True, True, "lost supervisor: it ended with exit code 1: too little memory"),
+    ],
+)
+def test_what_follows_when_the_supervisor_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, listened: bool, comes_back: bool, reason: str
+) -> None:
+    """Whatever becomes of it, there is a result, of the shape of any other."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up._launch(SUPERVISOR, ["sh", "-c", ends])
+    supervisor = up._launcher.children[SUPERVISOR]
+    supervisor.process.wait()
+    if listened:
+        up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
+    outcome = up._outcome()
+    assert outcome.failed and outcome.result["reason"] == reason and outcome.result["run"] == "run"
+    assert up._supervisor_comes_back(supervisor, 0.0) == comes_back
+    up._launcher.children[SUPERVISOR].process.wait()
+    up._interrupts = 2
+    with pytest.raises(Killed) as killed:
+        up._goes_on()
+    assert killed.value.result.keys() == outcome.result.keys()
+    assert killed.value.result["reason"] == "killed by a second Ctrl-C"
+    up._launcher.close()
+
+
+def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    up._launch(SUPERVISOR, ["sleep", "100"])
+    supervisor = up._launcher.children[SUPERVISOR]
+    for _ in range(3 * UNANSWERED_MAX):
+        up._supervisor_watch.unanswered()
+        up._end_stalled_supervisor(supervisor)
+    assert supervisor.exit_code is None, "it has not said where it listens"
+    up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
+    up._end_stalled_supervisor(supervisor)
+    for _ in range(UNANSWERED_MAX):
+        up._supervisor_watch.unanswered()
+    up._end_stalled_supervisor(supervisor)
+    supervisor.process.wait()
+    assert said.getvalue() == (
+        "supervisor does not answer any more: it is killed (it had not answered for 5 s)\n"
+    )
+    assert up._outcome().result["reason"] == "lost supervisor: it was killed by up: it had not answered for 5 s"
+    up._launcher.close()
+
+
+@pytest.mark.parametrize(
+    ("ends", "sets", "starts", "ends_run"),
+    [
+        ("kill -9 $$", (), 2, False),
+        ("kill -9 $$", ("players.player-red.restart=false",), 1, True),
+        ("exit 1", (), 1, True),
+    ],
+)
+def test_a_player_is_started_again_when_a_signal_has_ended_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, sets: tuple[str, ...], starts: int, ends_run: bool
+) -> None:
+    """One that ends by itself has failed. The sixth time within a minute it is given up, and the run ends."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE, sets=sets)), None, Display(said), "run")
+    (tmp_path / "player").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
+    (tmp_path / "player").chmod(0o755)
+    up._launch("player-red", [str(tmp_path / "player")])
+    up._has_begun = True
+    now_s = 0.0
+
+    def ended() -> bool:
+        child: Child = up._launcher.children["player-red"]
+        child.process.wait()
+        return up._ends_run(child)
+
+    def go_on() -> int:
+        nonlocal now_s
+        up._restart_ended(now_s, knows=True)
+        now_s += max(WAITS_S)
+        up._restart_ended(now_s, knows=True)
+        up._launcher.children["player-red"].process.wait()
+        return (tmp_path / "player.log").read_text().count("started")
+
+    assert ended() == ends_run and go_on() == starts
+    if not ends_run:
+        assert [go_on() for _ in range(5)][-1] == 6 and ended()
+        assert "player-red was killed by SIGKILL" in said.getvalue() and "is given up; its log" in said.getvalue()
     up._launcher.close()
 
 
