@@ -51,8 +51,7 @@ class Door:
         here = {name for name, member in core.state.members.items() if member.active}
         if written is not None:
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        # Theirs may have ended as well, and be started again.
-        core.sessions.expect(dict.fromkeys(sorted(here), now_ns + self._start_ns))
+        core.sessions.expect(here, self._start_ns, now_ns)  # theirs may have ended as well, and be started again
 
     def _known(self, name: str) -> Member | Joining | None:
         """Return what is known of a client, the latest first: as it joins, or as the state has it."""
@@ -222,7 +221,7 @@ class Door:
             return
         session.is_gone = True
         if self._is_waited_for(name):
-            session.away_ns = now_ns + self._back_ns(name)
+            session.leave(self._back_ns(name), now_ns)
             self._miss(name, session.boot, "its connection closed")
             return
         self._leave(name)
@@ -259,7 +258,7 @@ class Door:
         deployment = self._core.deployment
         for name, session in self._core.sessions.by_name.items():
             if session.away_ns >= 0 and deployment is not None and may_restart(deployment, name):
-                session.away_ns = now_ns + self._back_ns(name)
+                session.leave(self._back_ns(name), now_ns)
 
     @property
     def _tick(self) -> int:
@@ -280,12 +279,8 @@ class Door:
         core.orphan.rest(stood_ns, now_ns)
         if stood_ns >= TOLD_NS:
             core.actions.append(Say("warning", told(stood_ns)))
-        self._rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
+        core.sessions.rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
         self._looked_ns = now_ns
-
-    def _rest(self, for_ns: int, now_ns: int) -> None:
-        if self._core.deployment is not None:
-            self._core.sessions.rest(for_ns, self._back_ns, now_ns)
 
     def wake(self, now_ns: int) -> None:
         """Say Go again, lose who has not answered in time, and give up who was away for too long.
@@ -299,9 +294,9 @@ class Door:
         core.sessions.repeat(core.waited, now_ns)
         passed_ns, self._looked_ns = now_ns - self._looked_ns, now_ns
         if self.holds:
-            self._rest(limits.COUNTER_MAX, now_ns)
+            core.sessions.rest(limits.COUNTER_MAX, now_ns)
         elif core.releases is not None and core.releases.paused:
-            self._rest(passed_ns, now_ns)
+            core.sessions.rest(passed_ns, now_ns)
         for late in core.sessions.overdue(now_ns):
             core.give_up(late.unanswered)
         for name in core.sessions.late(now_ns):

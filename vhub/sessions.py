@@ -7,7 +7,7 @@ world must remember of a client is in `state`. Neighbours: `core`, `door` (what 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from foosim.protocol import channels, limits
@@ -55,6 +55,8 @@ class Session:
     away_ns: int = -1
     """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
     here."""
+    back_ns: int = 0
+    """How long it has for that."""
     next_sequence: int = 1
     """The number of its next packet: nothing behind a gap is taken."""
     heard: int = 0
@@ -100,10 +102,14 @@ class Session:
         """No answer is waited for."""
         self.deadline_ns = 0
 
-    def rest(self, for_ns: int, back_ns: int, now_ns: int) -> None:
+    def leave(self, back_ns: int, now_ns: int) -> None:
+        """The client is away, and has so long to come back."""
+        self.back_ns, self.away_ns = back_ns, now_ns + back_ns
+
+    def rest(self, for_ns: int, now_ns: int) -> None:
         """For so long the client could do nothing: move its deadlines, at most to where they would begin now."""
         if self.away_ns >= 0:
-            self.away_ns = max(self.away_ns, min(self.away_ns + for_ns, now_ns + back_ns))
+            self.away_ns = min(self.away_ns + for_ns, now_ns + self.back_ns)
         if self.deadline_ns:
             self.deadline_ns = min(self.deadline_ns + for_ns, now_ns + self.allowed_ns)
 
@@ -214,10 +220,11 @@ class Sessions:
         here = {name for name, member in state.members.items() if member.active} | self.joins.keys()
         return [name for name in declared if may_lockstep(deployment, name) and name not in here]
 
-    def expect(self, until_ns: Mapping[str, int]) -> None:
-        """These clients come back, each by a time, to this vHub, which is another one."""
-        for name, at_ns in until_ns.items():
-            self.by_name[name] = Session(name, "", away_ns=at_ns)
+    def expect(self, names: Iterable[str], back_ns: int, now_ns: int) -> None:
+        """These clients come back, by then, to this vHub, which is another one."""
+        for name in sorted(names):
+            self.by_name[name] = Session(name, "")
+            self.by_name[name].leave(back_ns, now_ns)
 
     def late(self, now_ns: int) -> list[str]:
         """Return the clients that were away for too long, in name order."""
@@ -313,10 +320,10 @@ class Sessions:
                 session.heard, session.heard_ns = member.sequence, now_ns
                 self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence, state.branch))))
 
-    def rest(self, for_ns: int, back_ns: Callable[[str], int], now_ns: int) -> None:
-        """For so long no client could do anything; `back_ns` is what each that is away has to come back."""
-        for name, session in self.by_name.items():
-            session.rest(for_ns, back_ns(name), now_ns)
+    def rest(self, for_ns: int, now_ns: int) -> None:
+        """For so long no client could do anything."""
+        for session in self.by_name.values():
+            session.rest(for_ns, now_ns)
 
     def overdue(self, now_ns: int) -> list[Session]:
         """Return those who are here and have not answered in time, in name order."""

@@ -181,3 +181,15 @@ def test_a_client_whose_machine_slept_waits_for_its_vhub_as_long_as_it_is_awake(
 
     assert_nobody_was_lost(fly(sleep, FAST, "deadlines.vhub_back=5 s"), "vhub")
     assert [core.lost for core in clients] == [False, False]
+
+
+def test_a_client_that_has_the_time_of_a_start_keeps_it_when_the_clock_rests() -> None:
+    """Behind a restart of the vHub its clients may have ended, too, and are started again."""
+
+    def both(system: System) -> None:
+        for name in PLAYERS:
+            system.pause(name, 8_000 * MS)
+        system.kill_hub("now", 50 * MS)
+        system.later(1_000 * MS, partial(system.set_forward, VHUB, 3_000 * MS))
+
+    assert_nobody_was_lost(fly(both, FAST, "deadlines.start=10 s", "deadlines.lockstep_fast=1 s"), "vhub")
