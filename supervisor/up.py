@@ -322,9 +322,10 @@ class Up:
     def _restart_ended(self, now_s: float, knows: bool = False) -> None:
         """Start processes again that ended while the run goes on; who ends again and again, or is refused, is given up.
 
-        `knows`: a status has just told which nodes are stopped.
+        `knows`: a status has just told which nodes are stopped, and whether the run has begun.
         """
-        for child in self._launcher.ended():
+        may_judge = self._has_begun or knows or self._control is None
+        for child in self._launcher.ended() if may_judge else ():
             if child.name in self._stopped or child.exit_code == DONE or self._restarts.is_known(child.name):
                 continue
             if child.exit_code == REFUSED and not knows:
@@ -398,7 +399,8 @@ class Up:
             self.display.say("ending the run; a second Ctrl-C kills it")
             self._ending_s = now_s
         if not self._has_ended and not self._ending_s:
-            if self._lost is not None and not self._ends_run(self._lost):
+            lost = self._lost
+            if lost is not None and (self._launcher.children[lost.name] is not lost or not self._ends_run(lost)):
                 self._lost = None  # it ended before we saw that the run had begun
             self._restart_ended(now_s)
         if self._lost is None:
