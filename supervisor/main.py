@@ -84,6 +84,7 @@ class SupervisorProcess:
         self._loop.on_unwritten = self._on_unwritten
         self._room = JournalRoom(folder.journals, plan.deployment.capture.reserve_bytes)
         self._loop.took = self.core.watch.took
+        self._loop.stood = lambda stood_ns, now_ns: self.core.watch.rest(self.core, stood_ns, now_ns)
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
         wire.read(channels.SUPERVISOR_READS, channels.SUPERVISOR_WAITS)
@@ -102,7 +103,7 @@ class SupervisorProcess:
             return REFUSED
         self._folder.write_result(result(self.core))
         end = self.core.end
-        return FAILED if end is None or end.failed else DONE
+        return FAILED if end is None or end.failed or self.core.closing.cut_off else DONE
 
     def stop(self) -> None:
         """Have the run end in order, as the command `down` does; a signal handler may call this."""
@@ -179,8 +180,8 @@ def _history(plan: Plan, folder: RunFolder) -> History | None:
     """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
     if folder.result() is not None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
-    if not journal_files(folder.journals, SUPERVISOR):
-        return None
+    if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
+        return None  # the one before may have ended when it had only made the file
     try:
         history = fold(plan.deployment, supervisor_records(folder, plan.options))
     except (JournalError, Malformed) as error:

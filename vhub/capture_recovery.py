@@ -142,7 +142,7 @@ class _Completion:
         flights = state.in_flight()
         for flight in flights:
             flight.cause = IN_FLIGHT
-        file.write(Closing(closing.frame, closing.digest, [], [], fates=flights, ages=state.ages.untold()))
+        file.write(Closing(closing.frame, closing.digest, [], [], fates=flights, ages=state.ages.untold(state.closed)))
 
     def _told_of(self, file: CaptureFile) -> Iterator[bytes]:
         """Yield the records, and write the epochs among them that the file lacks."""

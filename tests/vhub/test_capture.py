@@ -109,7 +109,10 @@ def test_poses_are_those_of_the_one_forward_kinematics(capture: CaptureData, hub
 
 
 def test_packets_come_back_as_columns(capture: CaptureData, hub_run: HubRun) -> None:
-    flights = [flight for closing in hub_run.closings for flight in closing.fates]
+    """Those of one closing in the order of their log times, which is not that of their fates."""
+    in_time = [sorted(closing.fates, key=lambda flight: flight.sent_ns) for closing in hub_run.closings]
+    assert in_time != [closing.fates for closing in hub_run.closings]
+    flights = [flight for fates in in_time for flight in fates]
     packets = capture.packets
     account = hub_run.core.statistics()
     assert len(packets) == len(flights) == account.offered
@@ -188,6 +191,7 @@ def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
         "in_flight": account.in_flight,
     }
     assert info.topics == {
+        "/ages": 12,
         "/clients": 5,
         "/epochs": 2,
         "/frame": 8,

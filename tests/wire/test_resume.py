@@ -19,13 +19,13 @@ from foosim.rehearsal.verify import verify_capture
 from foosim.supervisor.plan import plan_again
 from foosim.supervisor.run_folder import open_run
 from foosim.vhub.capture_reader import open_capture
-from tests.wire.conftest import LONG
+from tests.wire.conftest import LONG, SLOW
 from tests.wire.test_run import last_json
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
 
-BARE = ("--set", LONG, "--set", "players={}", "--set", "engine=pure")
+BARE = ("--set", LONG, "--set", "players={}", "--set", "engine=pure", "--set", f"pace={SLOW}")
 
 
 def tear(folder: Path, stem: str, count: int) -> None:
@@ -71,7 +71,7 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     tear(folder.journals, channels.SUPERVISOR, 9)
     up = house.start("foosim-supervisor", "up", "--resume", "far", "--json")
     house.ticking(before + 100)
-    assert house.run("foosim-supervisor", "down")[0] == 0
+    assert house.ask("foosim-supervisor", "down")[0] == 0
     code, out, err = house.end(up)
     assert code == 0, err
     content = last_json(out)
