@@ -90,9 +90,11 @@ def damage_of(path: Path) -> Damage | None:
         files = files_from(path)
     except CaptureError:
         files = [path]
+    if not _has_magic_end(files[-1]):
+        return None
     walks = [_Walk(file) for file in files]
     broken = tuple(place for walk in walks for place in walk.broken)
-    if not broken or not walks[-1].has_end:
+    if not broken:
         return None
     ticks: list[tuple[int, int]] = []
     for tick in sorted({tick for walk in walks for tick in walk.ticks}):
@@ -101,6 +103,16 @@ def damage_of(path: Path) -> Damage | None:
         else:
             ticks.append((tick, tick))
     return Damage(str(path), broken, tuple(ticks), _until_ns(path, walks, ticks))
+
+
+def _has_magic_end(path: Path) -> bool:
+    """Whether a file ends as a finished one does."""
+    try:
+        with path.open("rb") as stream:
+            stream.seek(max(0, path.stat().st_size - len(MAGIC)))
+            return stream.read() == MAGIC
+    except OSError as error:
+        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
 
 
 def _until_ns(path: Path, walks: list[_Walk], ticks: list[tuple[int, int]]) -> int | None:
@@ -125,7 +137,6 @@ class _Walk:
         self.ticks: list[int] = []
         self.before = -1
         """The last tick before what is broken first."""
-        self.has_end = False
         self._channels: dict[int, str] = {}
         self._described = Described()
         self._span: Span | None = None
@@ -140,12 +151,9 @@ class _Walk:
             raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
 
     def _go(self, stream: BinaryIO, size: int) -> None:
-        stream.seek(max(0, size - len(MAGIC)))
-        self.has_end = stream.read(len(MAGIC)) == MAGIC
-        stream.seek(0)
         if stream.read(len(MAGIC)) != MAGIC:
             raise CaptureError(f"{self.path}: no MCAP file, it does not start with {MAGIC!r}")
-        at, stop = len(MAGIC), size - len(MAGIC) * self.has_end
+        at, stop = len(MAGIC), size - len(MAGIC)
         self._crc = crc32(MAGIC)
         while at < stop:
             try:
