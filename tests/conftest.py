@@ -21,7 +21,12 @@ from foosim.protocol.yaml_tree import locate_in, plain, read_tree, write_yaml
 from tests.meter import Burden, Meter
 
 settings.register_profile(
-    "foosim", derandomize=True, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
+    "foosim",
+    derandomize=True,
+    deadline=None,
+    print_blob=True,
+    max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile("search", settings.get_profile("foosim"), derandomize=False, max_examples=2000)
 settings.load_profile("foosim")
@@ -79,23 +84,23 @@ def fleet_text() -> Callable[..., str]:
     return text
 
 
-TOGETHER = ("tests/wire/", "tests/test_wheel.py")
+TOGETHER = ("tests/replay/", "tests/vhub/", "tests/wire/")
 
 
-class WireTogether(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
-    """Spreads tests one by one, but gives tests/wire to one worker: its runs would starve one another of cores.
+class Together(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
+    """Gives each file to one worker, so that what its tests share is computed once.
 
-    So it does with the tests of the wheel, which is built once.
+    So it does with folders whose files share runs, and with tests/wire: its runs would starve one another of cores.
     """
 
     def _split_scope(self, nodeid: str) -> str:
-        return next((place for place in TOGETHER if nodeid.startswith(place)), nodeid)
+        return next((place for place in TOGETHER if nodeid.startswith(place)), nodeid.partition("::")[0])
 
 
 @pytest.hookimpl(optionalhook=True)  # optional, so that pytest also runs with `-p no:xdist`
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> WireTogether:
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Together:
     """The order in which workers get their tests. (xdist 3.8's own groups have no effect with pytest 9.2.)"""
-    return WireTogether(config, log)
+    return Together(config, log)
 
 
 @pytest.fixture

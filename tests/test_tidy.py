@@ -91,6 +91,7 @@ SHELLS = {
     "supervisor/reach.py",
     "supervisor/journal_room.py",
     "supervisor/launcher.py",
+    "supervisor/journal_check.py",
     "supervisor/leftovers.py",
     "supervisor/main.py",
     "supervisor/memory.py",
@@ -106,6 +107,7 @@ SHELLS = {
     "supervisor/up.py",
     "vhub/branching.py",
     "vhub/capture_cut.py",
+    "vhub/capture_damage.py",
     "vhub/capture_file.py",
     "vhub/capture_info.py",
     "vhub/capture_left.py",
@@ -143,8 +145,13 @@ def name_of(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def imports_of(path: Path) -> Iterator[tuple[int, str]]:
+@cache
+def imports_of(path: Path) -> tuple[tuple[int, str], ...]:
     """Line and full dotted name of every import in a file, at any depth of nesting."""
+    return tuple(_imports_of(path))
+
+
+def _imports_of(path: Path) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)

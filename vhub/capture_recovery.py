@@ -117,7 +117,8 @@ class _Completion:
                 raise Malformed(f"it is not that of run {run}")
             self.first_tick = HubState.restore(deployment, head.state).closed + 1
         except (Malformed, JournalError, msgspec.DecodeError, KeyError, ValueError, TypeError) as error:
-            self.problem = f"its journal cannot be used: {error}" if self._head else "there is no journal of it"
+            is_there = self._head or isinstance(error, JournalError)
+            self.problem = f"its journal cannot be used: {error}" if is_there else "there is no journal of it"
 
     def write(self, file: CaptureFile) -> None:
         """Write what the file lacks, and what was in flight at the end."""

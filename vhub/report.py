@@ -90,6 +90,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
             "links": core.links_told.lines(state, anew=is_last),
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
+            "absences": {"boot": core.member.boot, **core.door.absences.report()},
             "lateness_ms": lateness.as_json() if lateness is not None and lateness.count else None,
             "capture": core.capture,
             "recording": core.recording,

@@ -115,13 +115,18 @@ def add_packets(
     encode: Callable[[Row], bytes],
     kept: Callable[[Row], Row] | None,
 ) -> None:
-    """Add the rows of packets to a file, as `encode` writes them; `kept` makes of a row what is kept of it.
+    """Add the rows of one closing's packets to a file in the order of their log times, as `encode` writes them.
 
-    The hot path: see the bench before changing it.
+    `kept` makes of a row what is kept of it. The hot path: see the bench before changing it.
     """
-    for flight in flights:
+    for flight in sorted(flights, key=_log_time):
         _, log_ns, publish_ns, sequence, row = packet_entry(flight)
         mcap.add_message(channel, log_ns, publish_ns, sequence, encode(row if kept is None else kept(row)))
+
+
+def _log_time(flight: Flight) -> int:
+    """Return when a packet was sent: those of a closing arrive in another order, by their due times."""
+    return flight.sent_ns
 
 
 def packet_entry(flight: Flight) -> Entry:
@@ -285,7 +290,7 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
             for pairs in (joining.subscriptions, joining.arrivals)
         )
         rows.append(ClientRow(tick, joining.name, "joins", joining.period, heard, joining.offset, calling))
-    return rows
+    return [*rows, *(ClientRow(tick, name, "leaves_owing", 0, []) for name in closing.owing)]
 
 
 def edit_row(edit: Edit) -> EditRow:
@@ -299,5 +304,3 @@ def edit_row(edit: Edit) -> EditRow:
     if isinstance(edit, Disrupt):
         return EditRow("network", "", event=edit.event)
     return EditRow("freeze" if isinstance(edit, Freeze) else "thaw", edit.name)
-
-

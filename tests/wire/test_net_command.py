@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 def test_a_partition_by_request_cuts_and_a_heal_joins_again(house: House) -> None:
     up = house.up("--capture", "run.mcap", "--set", "engine=pure", players=True)
     house.ticking(50)
-    code, out, err = house.run("foosim-net", "partition", "player-red", "rest", "--json")
+    code, out, err = house.ask("foosim-net", "partition", "player-red", "rest", "--json")
     assert code == 0, err
     cut = json.loads(out)["tick"]
-    assert house.run("foosim-net", "partition", "player-rde", "rest") == (
+    assert house.ask("foosim-net", "partition", "player-rde", "rest") == (
         3,
         "",
         "partition[0][0]: a selector that matches no endpoint, 'player-rde', nearest is 'player-red'\n",
@@ -46,7 +46,7 @@ def test_a_partition_by_request_cuts_and_a_heal_joins_again(house: House) -> Non
     ticks = {row.sent_ns // capture.deployment.tick_ns for row in lost}
     assert ticks and min(ticks) >= cut and max(ticks) < healed
     one = next(row for row in lost if row.source == "camera")
-    code, out, err = house.run("foosim-net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
+    code, out, err = house.ask("foosim-net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
     assert code == 0, err
     assert "policy    at sending cut by request 0, from " in out and ": partition\n" in out
     assert out.endswith("dropped at sending: partition (policy)\n")
