@@ -29,20 +29,20 @@ COMPILED: Final = {
     "node/sensors": ("__init__", "ball", "battery", "encoder", "fitting", "odometry", "pose", "proximity"),
     "protocol": (
         *("actions", "assign", "barrier", "channels", "codec", "draws", "frame", "layout", "limits", "member"),
-        *("obstacles", "patience", "refusals", "sampling", "scene", "start"),
+        *("obstacles", "patience", "refusals", "sampling", "scene", "standstill", "start"),
     ),
     "rehearsal": (
-        *("bounds", "bus", "clock", "hub_journal", "laws", "machines", "packet_laws", "replica", "settings"),
+        *("bounds", "bus", "clock", "hub_journal", "laws", "machines", "packet_laws", "people", "replica", "settings"),
         *("system", "whatif", "whatif_reading", "world_bounds"),
     ),
     "supervisor": (
-        *("absence", "arrivals", "balance", "branches", "core", "handshake", "head", "issued", "pacing", "recovery"),
-        *("requests", "roster", "take_over", "watch"),
+        *("absence", "arrivals", "balance", "branches", "closing", "core", "handshake", "head", "issued", "pacing"),
+        *("recovery", "requests", "roster", "take_over", "watch"),
     ),
     "vhub": (
         *("ages", "air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "members", "numbers"),
         *("packet", "propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit"),
-        *("world",),
+        *("turns", "world"),
     ),
     "vhub/radio": (
         *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss", "shadowing"),

@@ -163,7 +163,7 @@ class Link:
         self._wire = Wire(session, Plane.RADIO, self._inbox, core.name)
         self._loop = Loop(core, self._inbox, _LOG, lambda now_ns: max(now_ns, min(core.deadline_ns(), self._until_ns)))
         self._loop.connect(self._wire)
-        self._loop.on_alive = self._on_alive
+        self._loop.on_alive, self._loop.stood = self._on_alive, core.rest
         self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
 
     def be_present(self) -> None:

@@ -111,7 +111,8 @@ class ClientCore:
         self._resend_ns = NEVER_NS
         self._period = self._offset = 0
         self._on_arrival = False
-        self._sequence = 0
+        self._sequence = self.first_sequence = 0
+        """The number of its last packet; and of the last one of processes before it, whose place it takes."""
         self._downlink = 0
         self._gaps: set[int] = set()
         self._done = b""
@@ -185,6 +186,11 @@ class ClientCore:
         """A vHub is present."""
         if self.is_away:
             self._again_ns = now_ns
+
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The client's own loop stood still for so long: the vHub could not come back to it (`standstill`)."""
+        if self._lost_ns != NEVER_NS and self.deployment is not None:
+            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self.deployment.deadlines.vhub_back_ns)
 
     def statistics(self) -> ClientStatistics:
         downlinks = self._downlinks, self._repeated, self._missing, self._malformed, self._overflowed
@@ -285,7 +291,7 @@ class ClientCore:
             return
         self.welcome = welcome
         self.deployment = deployment
-        self._sequence = welcome.sequence
+        self._sequence = self.first_sequence = welcome.sequence
         self._downlink = welcome.downlink
         self.branch = welcome.branch
 

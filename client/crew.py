@@ -74,6 +74,11 @@ class Crew:
             (core.hub_here if is_alive else core.hub_gone)(now_ns)
         self._stirred = dict(self._players)
 
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The loop of all of them stood still for so long."""
+        for core in self.cores:
+            core.rest(stood_ns, now_ns)
+
     def deadline_ns(self) -> int:
         """When `wake` has something to do next, or somebody acts."""
         return min(min(player.core.deadline_ns(), player.deadline_ns()) for player in self._players.values())

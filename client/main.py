@@ -62,7 +62,7 @@ class PlayerProcess:
         self._loop.connect(self._absent[0])
         self._loop.show_progress(progress)
         self._loop.turn = self._turn
-        self._loop.on_alive = self._on_alive
+        self._loop.on_alive, self._loop.stood = self._on_alive, self.crew.rest
         for wire in self._absent:  # who is alone waits for its downlinks itself; of several queues nobody can
             wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS if len(names) == 1 else ())
         self._absent[0].watch_alive(VHUB)

@@ -127,6 +127,8 @@ class Player(Placed):
     arrivals: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     on: RobotName | None = None
     process: Name | None = None
+    restart: bool = True
+    """Whether its process is started again when a signal has ended it, or it was lost with its machine."""
     robots: dict[RobotName, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     hears: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
@@ -187,12 +189,13 @@ class Deadlines(Part):
     tick_named_ns: Deadline = _default("500 ms", "tick_named")
     tick_lost_ns: Deadline = _default("1 s", "tick_lost")
     lockstep_fast_ns: Deadline = _default("10 s", "lockstep_fast")
-    lockstep_realtime_ns: Deadline = _default("1 s", "lockstep_realtime")
+    lockstep_realtime_ns: Deadline = _default("2 s", "lockstep_realtime")
     start_ns: Deadline = _default("60 s", "start")
     orphan_ns: Deadline = _default("30 s", "orphan")
     """Nodes and vHub end when their supervisor has been gone for so long."""
     vhub_back_ns: Deadline = _default("30 s", "vhub_back")
     client_back_ns: Deadline = _default("2 s", "client_back")
+    close_ns: Deadline = _default("30 s", "close")
 
 
 def _int_only(value: object) -> object:

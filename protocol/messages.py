@@ -156,8 +156,8 @@ class Part(Message, frozen=True):
 
 
 class Recovered(Item, frozen=True):
-    """A loss or a return that is over: `what` (node, join, supervisor, vhub) of `name`, behind frame `tick`, with
-    `epoch` the first without or with it; `outage_ns` is the supervisor's wall time without a commit."""
+    """A loss or a return that is over: `what` (node, join, supervisor, vhub, player, return) of `name`, behind frame
+    `tick`, with `epoch` the first without or with it; `outage_ns` is the supervisor's wall time without a commit."""
 
     what: Name
     name: Name

@@ -25,6 +25,7 @@ class Clients:
     def __init__(self, system: System) -> None:
         self.players: dict[str, PlayerLoop] = {}
         self._system = system
+        self._starts = 0
 
     def enter_all(self) -> None:
         """Let everybody in whom the deployment or the rehearsal declares."""
@@ -55,6 +56,20 @@ class Clients:
                 system.soon(lambda: system.leave(name))
 
         system.enter(name, core, turn, channels.CLIENT_READS)
+        system.processes[name].stood = core.rest
+
+    def start(self, name: str) -> None:
+        """Start a player's process again, with new memory."""
+        self._starts += 1
+        self.enter_player(name, f"boot-{self._starts}")
+
+    def gone(self, name: str) -> None:
+        """The vHub sees that a client's presence has ended."""
+        system = self._system
+        hub = system.processes.get(channels.VHUB)
+        if hub is not None:
+            system.hub.client_gone(name, hub.clock.at(system.bus.now_ns))
+            system.take_turn(hub)
 
     def hub_gone(self) -> None:
         """All see that the vHub's presence has ended."""

@@ -58,8 +58,9 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     With --swarm a seed decides the number of nodes (3 to 5), their clocks, the weather on the bus (delay, loss,
     repeats) and 8 to 20 faults of at least three kinds in 208 ticks on the pure engine (--for: more of both): processes
     killed, ended amid a turn, paused, slow, stopped, cut off one way or both, clogged; memory and clocks that jump; old
-    messages once more; robots moved, balls added, removed and pushed, the run paused. Everything that is written, said
-    and closed is checked against the laws; then all heals, and everybody has to be back.
+    messages once more; in every eighth seed players lost; robots moved, balls added, removed and pushed, the run
+    paused. Everything that is written, said and closed is checked against the laws; then all heals, and everybody has
+    to be back.
 
     A line of progress each second goes to standard error: simulated time, its speed, the score, and which process was
     waited for the most. A Ctrl-C ends the rehearsal in order, a second one at once; the last line says how far it came

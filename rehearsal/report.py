@@ -19,6 +19,7 @@ from foosim.protocol.network import event_of
 from foosim.protocol.radios import Radio
 from foosim.protocol.units import format_ns
 from foosim.rehearsal.age_tallies import AgeAtUse, AgeTallies
+from foosim.rehearsal.report_asked import edit_text, moves
 from foosim.rehearsal.report_map import Map, MapMaker
 from foosim.rehearsal.report_settings import (
     event_text,
@@ -163,7 +164,7 @@ class RuleReport:
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """An event of the network, and whether it was asked for while the run went on."""
+    """An event of the network or of the world, and whether it was asked for while the run went on."""
 
     at_ns: int
     text: str
@@ -314,6 +315,10 @@ class _Gathered:
 
     def take_tick(self, row: TickMark) -> None:
         for edit in row.edits:
+            text = edit_text(edit)
+            if text:
+                edited_ns = (row.tick - 1) * self._tick_ns  # an edit belongs to the tick that led to this frame
+                self._happenings.append(Happening(edited_ns, text, is_asked=True))
             if edit.kind == "network":
                 at_ns = row.tick * self._tick_ns
                 try:
@@ -335,6 +340,7 @@ class _Gathered:
         chain = chain_at_start(capture.about)
         for number, digest in enumerate(capture.digests):
             chain = chain if number == 0 else chain_next(chain, digest.tobytes())
+        moved = [Happening(tick * self._tick_ns, text, is_asked=True) for tick, text in moves(capture.epochs)]
         bands = sorted(self._bands(), key=lambda band: (band.start_ns, band.kind, band.text))
         return Report(
             name,
@@ -360,7 +366,7 @@ class _Gathered:
             {cause: tuple(counts) for cause, counts in sorted(self._causes.items())},
             tuple(self._sender(*key) for key in sorted(self._senders)),
             tuple(self._rule(*key) for key in sorted(self._rules)),
-            tuple(sorted(self._happenings, key=lambda happening: happening.at_ns)),
+            tuple(sorted([*self._happenings, *moved], key=lambda happening: happening.at_ns)),
             tuple(bands[:BANDS_MAX]),
             max(0, len(bands) - BANDS_MAX),
             tuple(self._marks()),

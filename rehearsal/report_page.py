@@ -138,7 +138,7 @@ def _network(found: Report) -> Iterator[str]:
 def _events(found: Report) -> Iterator[str]:
     yield "<h2>Events</h2>"
     if not (found.happenings or found.bands or found.marks):
-        yield _note("Nothing happened to the network, and no process was lost.")
+        yield _note("Nothing happened to the network, nobody changed the world, and no process was lost.")
         return
     yield lanes(WIDE, found.start_ns, found.end_ns, found.bands, found.marks, "events over time")
     if found.bands_left:

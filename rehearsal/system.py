@@ -18,24 +18,23 @@ from foosim.node.solver import Solver
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import Bus, Message, Traced
 from foosim.rehearsal.clients import Clients
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.hub_journal import Ending, HubJournal
+from foosim.rehearsal.people import OPERATOR, People
 from foosim.rehearsal.settings import AtWork, Process, Settings
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
+from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
 
-OPERATOR: Final = "operator"
 NEVER_NS: Final = limits.COUNTER_MAX
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
@@ -52,18 +51,16 @@ class System:
         self.bus = Bus(rehearsal.weather)
         self.processes: dict[str, Process] = {}
         self.solvers: dict[str, Solver] = {}
+        self.people = People(self.bus, self.later)
+        self.answers = self.people.answers
         self.clients = Clients(self)
         self.players = self.clients.players
         self.at_work = AtWork()
-        self.answers: dict[str, Answer] = {}
         self.healed = False
         """Whether a test has said that nothing new is to happen."""
         self.flipped: set[str] = set()
         """Nodes whose memory a test has changed."""
-        self.asked: dict[str, str] = {}
-        """The verb of what was requested and not given up, by id."""
         self._traces_receive = rehearsal.observer is not None and "receive" in rehearsal.observes
-        self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
         self._timers: list[tuple[int, int, Callable[[], object]]] = []
@@ -92,7 +89,6 @@ class System:
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
         self.clients.enter_all()
-        self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
         self._hub_back_ns = HUB_BACK_NS
 
     def enter(
@@ -103,6 +99,7 @@ class System:
         process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
         process.clock = self._clock(name)
         process.wake_ns = self._soonest_ns = self.bus.now_ns
+        process.begin(self.bus.now_ns)
 
     def _clock(self, name: str) -> Clock:
         return self._clocks.setdefault(name, Clock())
@@ -115,7 +112,10 @@ class System:
         core = self.supervisor
         core.on_commit = self._frames.append
         self.enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
-        self.processes[channels.SUPERVISOR].took = core.watch.took
+        process = self.processes[channels.SUPERVISOR]
+        process.took = core.watch.took
+        process.stood = lambda stood_ns, now_ns: core.watch.rest(core, stood_ns, now_ns)
+        self._hub_hears(True)
 
     def _enter_hub(self, fingerprint: bytes) -> None:
         """Let a vHub in, which goes on from the journal of the one before."""
@@ -132,7 +132,8 @@ class System:
                 self.soon(lambda: self._hub_again(hub))
 
         self.enter(channels.VHUB, hub, turn, channels.VHUB_READS)
-        self.processes[channels.VHUB].took = hub.waits.took
+        process = self.processes[channels.VHUB]
+        process.took, process.stood = hub.waits.took, hub.door.rest
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -194,7 +195,7 @@ class System:
         process = self.processes.get(message[2])
         if process is None:
             if message[2] == OPERATOR:
-                self._answered(message[5])
+                self.people.answered(message[5])
         elif process.inbox or process.busy_until_ns > self.bus.now_ns:
             process.inbox.append(message)
             self._behind[process.name] = process
@@ -215,7 +216,7 @@ class System:
         self._begin_turn(process)
         if self._traces_receive:
             self._trace(self.bus.now_ns, process, "receive", channel.name, payload, name)
-        now_ns = process.clock.at(self.bus.now_ns)
+        now_ns = process.look(self.bus.now_ns)
         process.core.receive(channel, name, payload, now_ns)
         process.turn(now_ns)
         if (
@@ -235,8 +236,8 @@ class System:
 
     def wake(self, process: Process) -> None:
         """Let a process do what is due by time."""
-        now_ns = process.clock.at(self.bus.now_ns)
         self._begin_turn(process)
+        now_ns = process.look(self.bus.now_ns)
         process.core.wake(now_ns)
         process.turn(now_ns)
         self._perform(process)
@@ -270,6 +271,7 @@ class System:
         wake_ns = self._core_deadline_ns(process)
         if process.core is self.supervisor:
             wake_ns = min(wake_ns, process.wake_ns)
+        process.due_ns = process.clock.at(wake_ns)
         process.wake_ns = max(wake_ns, process.busy_until_ns)
         self._soonest_ns = min(self._soonest_ns, process.wake_ns)
 
@@ -302,14 +304,32 @@ class System:
         if process.core is self.supervisor and self._frames:
             self._tell_commits(was_cut=left is not None)
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
-            farewell = self.hub.farewell()
-            self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
-            self.leave(process.name)
+            self._close(process, leaves_ns)
+
+    def _close(self, process: Process, begun_ns: int) -> None:
+        """The vHub closes its capture, shows how far it is, and says farewell."""
+        hub = self.hub
+
+        def turn(now_ns: int) -> None:
+            if self.settings.closing(hub, self.bus.now_ns - begun_ns) and channels.VHUB in self.processes:
+                said, at_ns = hub.farewell(), max(begun_ns, self.bus.now_ns)
+                self.bus.put(process.name, said.channel, said.name, said.payload, at_ns)
+                self.leave(process.name)
+
+        process.core, process.turn = ClosingCore(hub), turn
+        turn(begun_ns)
 
     def leave(self, name: str) -> None:
         """A process has ended: what is on its way to it is lost."""
         self.processes.pop(name)
         self._behind.pop(name, None)
+        if name == channels.SUPERVISOR:
+            self._hub_hears(False)
+
+    def _hub_hears(self, is_alive: bool) -> None:
+        """The vHub sees the supervisor come or go."""
+        if channels.VHUB in self.processes:
+            self.hub.orphan.hear(is_alive, self.now_of(channels.VHUB))
 
     def _keep(self, now_ns: int, process: Process, action: Any) -> None:
         """Hand what is written or said to those who asked for it."""
@@ -376,9 +396,11 @@ class System:
         self.soon(action)
 
     def kill(self, name: str) -> None:
-        """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
+        """End a node, a player or the supervisor at once: what is on its way to it is lost; it is seen to go."""
         self.leave(name)
-        if name == channels.SUPERVISOR:
+        if name in self.players:
+            self.clients.gone(name)
+        if name not in self.solvers:
             return
         self.solvers.pop(name).close()
         self._supervisor_sees_gone(name)
@@ -392,7 +414,7 @@ class System:
         return name in self._dying
 
     def start(self, name: str) -> None:
-        """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""
+        """Start a node, a player or the supervisor again, with a new boot; the supervisor goes on from its journal."""
         assert name not in self.processes, f"{name} is running"
         if name == channels.SUPERVISOR:
             self._boots += 1
@@ -401,6 +423,8 @@ class System:
             now_ns = self.now_of(name)
             self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)
             self._enter_supervisor()
+        elif name in self.players:
+            self.clients.start(name)
         else:
             self._enter_node(name, library_fingerprint())
         self.wake(self.processes[name])
@@ -468,29 +492,10 @@ class System:
         self._clock(name).offset_ns += by_ns
         process = self.processes.get(name)
         if process is not None:
+            due_ns = process.due_ns
             self._plan_wake(process)
+            process.due_ns = due_ns
 
     def request(self, verb: str, *, again_ns: int = 0, **arguments: Any) -> str:
         """Ask the supervisor for something, every `again_ns` until it answers (0: once); return the request's id."""
-        self._requests += 1
-        identity = f"request-{self._requests}"
-        self.asked[identity] = verb
-        payload = encode(Request(OPERATOR, identity, verb, encode_json(arguments)))
-        self._ask(identity, payload, again_ns)
-        return identity
-
-    def give_up(self, verb: str) -> None:
-        """Ask no more for what is not answered yet."""
-        for identity in [known for known, what in self.asked.items() if what == verb and known not in self.answers]:
-            self.asked.pop(identity)
-
-    def _ask(self, identity: str, payload: bytes, again_ns: int) -> None:
-        if identity in self.answers or identity not in self.asked:
-            return
-        self.bus.put(OPERATOR, channels.REQUEST, OPERATOR, payload, self.bus.now_ns)
-        if again_ns:
-            self.later(again_ns, lambda: self._ask(identity, payload, again_ns))
-
-    def _answered(self, payload: bytes) -> None:
-        answer = decode(Answer, payload)
-        self.answers[answer.id] = answer
+        return self.people.request(verb, again_ns, arguments)

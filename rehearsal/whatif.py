@@ -267,18 +267,21 @@ def _judged(
     with world_of(capture, frames) as frame_of:
         for offered in offers.ticks():
             frame = frame_of(offered)
+            owing = [row.client for row in offered.came if row.event == "leaves_owing"]
             for row in offered.came:
                 _come_and_go(state, row)
             edits = [edit_of(edit) for edit in offered.edits]
             fates: list[Flight] = []
             state.close_world(frame, [offered.robots[key] for key in sorted(offered.robots)], fates, edits)
+            for name in owing:
+                state.leave(name)
             admitted: dict[str, list[Sent]] = {}
             for (source, _), sent in sorted(offered.clients.items()):
                 admitted.setdefault(source, []).append(sent)
             state.close_clients(frame, admitted, fates)
             ages.take(state.aged)
             yield from fates
-    ages.take(state.ages.untold())
+    ages.take(state.ages.untold(state.closed))
     for flight in state.in_flight():
         flight.cause = IN_FLIGHT
         yield flight
@@ -287,7 +290,7 @@ def _judged(
 def _come_and_go(state: HubState, row: ClientRow) -> None:
     if row.event == "leaves":
         state.leave(row.client)
-    else:
+    elif row.event == "joins":
         both = row.subscriptions, row.arrivals
         heard, calling = ([(item.source, item.channel) for item in items] for items in both)
         state.join(Joining(row.client, row.period, heard, row.offset, calling), row.tick)

@@ -48,6 +48,7 @@ from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.balance import Balancer
 from foosim.supervisor.beginning import Beginning
 from foosim.supervisor.branches import Branches
+from foosim.supervisor.closing import Closing
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
@@ -60,10 +61,6 @@ from foosim.supervisor.status import SupervisorStatistics
 from foosim.supervisor.take_over import TakeOver
 from foosim.supervisor.watch import Watch, losses
 
-FAREWELL_NS: Final = 10_000_000_000
-"""How long an ended run waits for the vHub to close its capture."""
-GONE_NS: Final = 500_000_000
-"""How long what a process said last may take after the news that it is gone: the two come by different ways."""
 PREPARE_NS: Final = 200_000_000
 """How often a layout that nodes have not built yet is asked for again."""
 
@@ -91,10 +88,9 @@ class SupervisorCore:
         self.roster = Roster(self.deployment, fingerprint)
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
         self.watch = Watch(self.deployment, self.roster, now_ns)
-        self.requests = Requests(self)
         self.recovery, self.absence, self.branches = Recovery(self), Absence(self), Branches(self)
         self.balancer = Balancer(self.deployment.owners()) if settings.balance else None
-        self.handshake = Handshake(self)
+        self.requests, self.handshake, self.closing = Requests(self), Handshake(self), Closing(self)
         self.frame, self.chain = first_frame(self.deployment, settings.start), first_chain(settings.origin)
         self.first_tick = self.frame.tick
         self.beginning = Beginning(self.deployment, self.first_tick)
@@ -180,10 +176,7 @@ class SupervisorCore:
                 self.requests.prepare()
                 self._prepare_ns = now_ns + PREPARE_NS
         elif not (self.finished or (self.take_over is not None and self.take_over.waits_for_hub(now_ns))):
-            hub = self.roster.by_name.get(channels.VHUB)
-            self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
-            if hub is not None and hub.gone_ns and now_ns > hub.gone_ns + GONE_NS:
-                self.finished = True
+            self.finished = self.closing.is_over(now_ns)
 
     @property
     def lacking(self) -> tuple[Channel, int]:
@@ -214,7 +207,8 @@ class SupervisorCore:
         if process is None:
             return
         process.gone_ns = now_ns
-        if not process.farewell and not process.lost and self.end is None:
+        is_certain = not self.watch.doubts(process, now_ns)
+        if is_certain and not process.farewell and not process.lost and self.end is None:
             self._lose({name: "its connection closed"}, now_ns)
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:

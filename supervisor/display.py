@@ -15,6 +15,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from foosim.protocol.disk import megabytes
+from foosim.vhub.room_watch import CLOSING
+
 LINKS_SHOWN_MAX: Final = 20
 ENTITIES_SHOWN_MAX: Final = 6
 
@@ -79,6 +82,8 @@ def recovery_text(entry: dict[str, Any]) -> str:
         "join": f"node {name} takes part",
         "supervisor": "the supervisor was started again",
         "vhub": f"lost the vHub ({entry['reason']})",
+        "player": f"lost {name} ({entry['reason']})",
+        "return": f"{name} takes part again",
     }
     what = texts[entry["what"]]
     after = "" if entry["outage_ms"] is None else f", went on after {entry['outage_ms']:.1f} ms"
@@ -92,6 +97,15 @@ def recording_text(status: dict[str, Any]) -> str:
         return ""
     refused = f" ({recording['refused']} rows are not in it)" if recording["refused"] else ""
     return f"capture {recording['state']}: {recording['problem']}{refused}"
+
+
+def closing_text(status: dict[str, Any]) -> str:
+    """`closing the capture: 81,200 rows are left, 12.4 MB are written`; empty when nothing is closed."""
+    recording = status["recording"]
+    if recording["state"] != CLOSING:
+        return ""
+    left = recording["offered"] - recording["written"] - recording["refused"]
+    return f"closing the capture: {left:,} rows are left, {megabytes(recording['bytes'])} are written"
 
 
 def plain_line(status: dict[str, Any]) -> str:
@@ -245,6 +259,14 @@ class Display:
             self._live.update(fitted(status, self._console), refresh=True)
         else:
             self.say(plain_line(status))
+
+    def show_closing(self, status: dict[str, Any]) -> None:
+        """Show how far a run that has ended is with its capture."""
+        text = closing_text(status)
+        if self._live is not None:
+            self._live.update(Group(fitted(status, self._console), Text(text)), refresh=True)
+        elif text:
+            self.say(text)
 
     def say(self, line: str) -> None:
         """Show one line that stays."""

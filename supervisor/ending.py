@@ -12,8 +12,11 @@ from typing import Final
 from foosim.protocol.command import REFUSED
 from foosim.supervisor.children import BY_SIGNAL
 
-NO_MEMORY: Final = ("MemoryError", "Cannot allocate memory", "std::bad_alloc", "memory allocation of")
-"""What Python, the system, C++ and Rust say when they get no memory."""
+NO_MEMORY: Final = (
+    *("MemoryError", "can't start new thread", "Cannot allocate memory", "failed to map segment"),
+    *("std::bad_alloc", "memory allocation of", "Memory allocation still failed"),
+)
+"""What Python, the system and its loader, C++, Rust and OpenBLAS say when they get no memory."""
 WORDS_MAX: Final = 300
 
 

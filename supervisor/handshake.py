@@ -14,6 +14,7 @@ from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.codec import decode_json, encode
 from foosim.protocol.fetching import piece_of
 from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Recall, Refusal
+from foosim.supervisor.absence import SAID_NS
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -37,6 +38,9 @@ class Handshake:
         closes = core.take_over is not None and hello.role == "vhub"  # its capture, where the run has ended
         if not closes and self._has_ended():
             return
+        known = core.roster.by_name.get(hello.name)
+        if known is not None and known.in_doubt and known.boot != hello.boot:
+            core.process_gone(hello.name, now_ns)  # there is no doubt left
         core.roster.take(hello, now_ns)
         run, pace, added = core.settings, str(core.pacer.pace), core.added_to(core.frame.layout)
         deployment = run.deployment_name, run.deployment_text
@@ -102,6 +106,8 @@ class Handshake:
             core.count_repeat()
             return
         process.heard_ns = now_ns
+        if process.in_doubt and now_ns > process.gone_ns + SAID_NS:
+            process.in_doubt, process.gone_ns = False, 0
         if process.lost and process.name != channels.VHUB:
             core.recovery.hear(process, now_ns)
         if not heartbeat.report:
@@ -110,6 +116,7 @@ class Handshake:
         process.heartbeat = heartbeat
         report = decode_json(heartbeat.report)
         process.report = report if isinstance(report, dict) else {}
+        core.absence.players.hear(process)
         if process.lost and process.name == channels.VHUB:
             core.absence.hear(now_ns)
         if core.end is not None:

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from foosim.protocol.deployment import Deadlines
+from foosim.protocol.standstill import Standstill
 
 UNANSWERED_MAX: Final = 5
 """How many questions a supervisor may leave unanswered before its process is killed."""
@@ -28,18 +29,23 @@ LOOK_S_MAX: Final = 3.0
 """How long at most the launcher is from one look to the next by itself: beyond that it was not given the processor."""
 
 
+def _ns(time_s: float) -> int:
+    return round(time_s * 1e9)
+
+
 class OwnTime:
-    """A clock that stands while the launcher does not go round."""
+    """A clock that stands while the launcher does not go round (`protocol.standstill`)."""
 
     def __init__(self, now_s: float) -> None:
-        self._last_s = now_s
-        self._stood_s = 0.0
+        self._last_ns = _ns(now_s)
+        self._standstill = Standstill(self._last_ns)
+        self._stood_ns = 0
 
     def at(self, now_s: float) -> float:
         """Return the time at a look, in s, less what the launcher itself stood still."""
-        self._stood_s += max(0.0, now_s - self._last_s - LOOK_S_MAX)
-        self._last_s = now_s
-        return now_s - self._stood_s
+        due_ns, self._last_ns = self._last_ns + _ns(LOOK_S_MAX), _ns(now_s)
+        self._stood_ns += self._standstill.look(due_ns, self._last_ns)
+        return (self._last_ns - self._stood_ns) / 1e9
 
 
 class SupervisorWatch:

@@ -24,8 +24,18 @@ from foosim.vhub.viewing import LOG
 
 _UNKNOWN: Final[Mapping[str, Any]] = {
     **dict.fromkeys(("run", "world", "seed", "ticks", "first_tick", "tick_ns", "rtf", "lag_ms", "lateness_ms")),
-    "digest": None, "packets": NO_PACKETS, "recording": NOT_RECORDED, "from": None, "nodes": {}, "recoveries": [],
-    "moves": 0, "handovers": 0, "score": None, "capture": None, "reason": None, "failed": True,
+    "digest": None,
+    "packets": NO_PACKETS,
+    "recording": NOT_RECORDED,
+    "from": None,
+    "nodes": {},
+    "recoveries": [],
+    "moves": 0,
+    "handovers": 0,
+    "score": None,
+    "capture": None,
+    "reason": None,
+    "failed": True,
 }
 
 
@@ -71,8 +81,11 @@ def detached_outcome(folder: RunFolder, deployment: Deployment, capture: Path | 
     return Outcome({**_UNKNOWN, **known, "failed": False}, False, (line,))
 
 
-def capture_lines(capture: Path | None, result: dict[str, Any] | None) -> list[str]:
-    """Say where a capture is, whether it has its end, and what the result says to be wrong with it."""
+def capture_lines(capture: Path | None, result: dict[str, Any] | None, journals: Path | None = None) -> list[str]:
+    """Say where a capture is, whether it has its end, and what the result says to be wrong with it.
+
+    Of a run that has ended also how one without an end is completed from `journals`.
+    """
     files = {} if capture is None else parts_at(capture)
     if not files:
         return []
@@ -82,6 +95,8 @@ def capture_lines(capture: Path | None, result: dict[str, Any] | None) -> list[s
     with suppress(CaptureError):
         is_finished = has_end(there[-1])
     lines = [f"capture {there[0]}{count}" if is_finished else f"capture {there[0]}{count} (unfinished)"]
+    if not is_finished and result is not None and journals is not None:
+        lines.append(f"complete it with: foosim-replay recover {there[0]} --journals {journals}")
     return [*lines, wrong] if wrong else lines
 
 

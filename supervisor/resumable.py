@@ -26,7 +26,7 @@ def check_resumable(folder: RunFolder, file: Path, capture: Path | None, *, has_
     `file` is its deployment. The vHub's journal and the capture are looked at where it runs on this machine.
     """
     begins = f"foosim-supervisor up {file}"
-    if not journal_files(folder.journals, SUPERVISOR):
+    if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
         raise Refused(f"run {folder.name} has no journal to go on from in {folder.journals}; {begins} begins a new run")
     if capture is not None and parts_at(capture):
         begins += f" --from {first_there(capture)}"

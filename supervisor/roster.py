@@ -37,6 +37,8 @@ class Process:
     report: dict[str, Any] = field(default_factory=dict)
     farewell: bool = False
     gone_ns: int = 0
+    in_doubt: bool = False
+    """Its connection has ended, perhaps only because the supervisor stood still."""
     lost: bool = False
     """The run goes on without it; it may come back by the handshake."""
 
@@ -85,7 +87,7 @@ class Roster:
         if hello.name in self.stopped:
             return f"{hello.name} is stopped; `foosim-supervisor start {hello.name}` lets it take part again"
         known = self.by_name.get(hello.name)
-        if known is not None and known.boot != hello.boot and not known.lost:
+        if known is not None and known.boot != hello.boot and not known.lost and not known.in_doubt:
             return f"a {known.role} {hello.name} is already here"
         if hello.fingerprint != self._fingerprint and not self.deployment.mixed_cpu:
             return (

@@ -34,7 +34,7 @@ class SupervisorStatistics:
 
 DISRUPTIONS_SHOWN: Final = 16
 """Events of the network that a status has, the last that were asked for."""
-NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0}
+NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
 UNFINISHED: Final = "unfinished"
 """State of a recording of which nobody has said that it is closed: its file has no end, or was closed later."""
 NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
@@ -45,6 +45,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
     frame = core.frame
     hub = core.roster.by_name.get(VHUB)
     report = {} if hub is None else hub.report
+    cut_off = core.closing.cut_off
     wall_ns = core.committed_ns - core.started_ns
     origin = core.settings.origin
     return {
@@ -73,8 +74,8 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         "handovers": core.account.handovers,
         "score": _score(frame),
         "capture": report.get("capture") or None,
-        "reason": core.end.reason if core.end is not None else None,
-        "failed": core.end.failed if core.end is not None else False,
+        "reason": "; ".join(part for part in (core.end.reason, cut_off) if part) if core.end is not None else None,
+        "failed": core.end is not None and (core.end.failed or bool(cut_off)),
     }
 
 
@@ -115,7 +116,7 @@ def _recording(core: SupervisorCore) -> dict[str, Any]:
     """Return how the capture does, as the vHub told last; in a run that is over that is final once it said farewell."""
     hub = core.roster.by_name.get(VHUB)
     told = NOT_RECORDED if hub is None else hub.report.get("recording") or NOT_RECORDED
-    is_open = core.finished and hub is not None and not hub.farewell and told["state"] in ("on", "low")
+    is_open = core.finished and hub is not None and not hub.farewell and told["state"] in ("on", "low", "closing")
     return {**told, "state": UNFINISHED} if is_open else told
 
 

@@ -67,6 +67,12 @@ class TakeOver:
         core.beginning.go_on(core.frame.tick)
         return True
 
+    def rest(self, stood_ns: int) -> None:
+        """The supervisor stood still for so long: nobody could come back to it."""
+        self._living_ns += stood_ns
+        self._start_ns += stood_ns
+        self._hub_ns += stood_ns
+
     def waits_for_hub(self, now_ns: int) -> bool:
         """Whether a run that has ended, perhaps before this start, waits for the vHub to close its capture."""
         return self._standing is None and now_ns <= self._hub_ns

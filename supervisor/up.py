@@ -254,10 +254,13 @@ class Up:
             self._supervisor_watch.unanswered()
             return
         self._supervisor_watch.answered()
-        now_s = time.monotonic()
+        now_s = self._own_time.at(time.monotonic())
         self._tell_recoveries(status["recoveries"])
         if not self._has_ended:
             self.display.show(status, now_s)
+        else:  # the supervisor waits as long as there is progress, and so do we
+            self.display.show_closing(status)
+            self._ending_s = now_s if self._ending_s else 0.0
         self._has_begun = self._has_begun or status["begun"]
         self._has_ended = status["state"] in ENDED
         self._stopped = {name for name, process in status["processes"].items() if process["stopped"]}
@@ -339,7 +342,8 @@ class Up:
             wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
         after = f"starts again in {wait_s:g} s" if wait_s else "starts again"
         if wait_s is None:
-            after = "is given up" if at_once else f"is given up; foosim-supervisor start {child.name} tries it again"
+            is_node = child.name in self.plan.deployment.nodes
+            after = f"is given up; foosim-supervisor start {child.name} tries it again" if is_node else "is given up"
         self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
 
     def _start_due(self, now_s: float) -> None:
@@ -356,10 +360,18 @@ class Up:
         if child.name == VHUB and (child.exit_code == REFUSED or VHUB in self._restarts.failed):
             return False
         if self._has_begun:
-            return child.name == VHUB or child.name in self.plan.deployment.nodes
+            return child.name == VHUB or child.name in self.plan.deployment.nodes or self._plays_again(child)
         is_orphan = child.exit_code == FAILED and self._restarts.has_ended(SUPERVISOR)
         may_come = child.how.is_by_signal or child.is_away or is_orphan
         return may_come and child.name not in self._restarts.failed
+
+    def _plays_again(self, child: Child) -> bool:
+        """Whether these are players whom something else has ended: one that ends by itself has failed."""
+        deployment = self.plan.deployment
+        players = deployment.player_processes().get(child.name, ())
+        may_restart = bool(players) and all(deployment.players[player].restart for player in players)
+        is_lost = child.how.is_by_signal or child.is_away
+        return may_restart and is_lost and child.name not in self._restarts.failed
 
     def _vhub_again(self) -> list[str]:
         """Return how the vHub is started again: where clients know it to be."""
@@ -373,7 +385,7 @@ class Up:
             self._launcher.kill()
             raise Killed("\n".join(["killed", *self._capture_lines()]), self.unended("killed by a second Ctrl-C"))
         supervisor = self._launcher.children[SUPERVISOR]
-        now_s = time.monotonic()
+        now_s = self._own_time.at(time.monotonic())
         if supervisor.exit_code is not None:
             if self._supervisor_comes_back(supervisor, now_s):
                 self._restart_ended(now_s)
@@ -458,7 +470,8 @@ class Up:
 
     def _capture_lines(self) -> list[str]:
         """Say where the capture is, and whether it has its end: who was killed, or failed, did not finish it."""
-        lines = capture_lines(self.capture, self.folder.result())
+        journals = None if VHUB in self._launcher.remotes else self.folder.journals
+        lines = capture_lines(self.capture, self.folder.result(), journals)
         return lines or ([self._not_home] if self._not_home else [])
 
     @contextmanager

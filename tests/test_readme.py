@@ -24,6 +24,7 @@ from foosim.client.payloads import Command, decode_payload
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree
 from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import System
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.vhub.capture_reader import open_capture
 
@@ -83,6 +84,12 @@ def command_of(words: list[str]) -> tuple[Any, list[str]]:
 # --- the tutorials ---------------------------------------------------------------------------------------------------
 
 
+def add_a_ball(system: System) -> None:
+    """What a reader reads may have had something added to it, for a while."""
+    system.at_tick(1000, lambda: system.request("add", position=[0.0, 0.3, 0.05], velocity=[0.0, 0.0, 0.0]))
+    system.at_tick(1200, lambda: system.request("remove", name="ball2"))
+
+
 @pytest.fixture(scope="module")
 def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A reader's folder: deploy/table.yaml, the README's player, and the capture of its first game."""
@@ -98,7 +105,8 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         patch.chdir(folder)
         patch.syspath_prepend(str(folder))
         plan = make_plan(RunOptions(asked["file"], "fast", asked["duration"], None, (*asked["sets"], "engine=pure")))
-        result = rehearse(plan.text, str(asked["file"]), plan.ticks, asked["nodes"], capture=asked["capture"]).json
+        given = plan.text, str(asked["file"]), plan.ticks, asked["nodes"]
+        result = rehearse(*given, prepare=add_a_ball, capture=asked["capture"]).json
         assert not result["failed"] and result["ticks"] == 2500
         yield folder
     sys.modules.pop("follower", None)
@@ -113,6 +121,7 @@ def test_the_readmes_player_plays(house: Path) -> None:
     commands = [decode_payload("position", payload) for payload in sent.payload]
     assert {command.spin for command in commands if isinstance(command, Command)} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
+    assert len(capture.frame_blocks) == 3, "something was added, and removed again"
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/capture.md", "docs/writing_a_player.md"])
@@ -144,6 +153,30 @@ def test_a_players_declaration_is_valid() -> None:
 def test_generated_parts_are_current(page: Path) -> None:
     text = page.read_text()
     assert reference().regenerated(text) == text, "write it anew: python docs/reference.py"
+
+
+NO_DEADLINES = {
+    "POLL_S",
+    "WATCH_S",
+    "LATE_EVERY_NS",
+    "AGAIN_S",
+    "QUERY_S",
+    "SWITCH_S",
+    "FORGET_EVERY_NS",
+    "LOOK_EVERY_NS",
+}
+"""How often something is done or said again, and what is no wait for another process."""
+
+
+def test_every_constant_that_waits_for_somebody_is_in_the_table_of_deadlines() -> None:
+    told = set(reference().CONSTANTS)
+    files = {module: (ROOT / f"{module.replace('.', '/')}.py").read_text() for module, _ in told}
+    found = {
+        (m, name)
+        for m, text in files.items()
+        for name in re.findall(r"^([A-Z_]+_(?:NS|MS|US|S)(?:_MAX)?)\b", text, re.M)
+    }
+    assert {(module, name) for module, name in found - told if name not in NO_DEADLINES} == set()
 
 
 def test_every_part_that_can_be_generated_stands_in_a_page() -> None:

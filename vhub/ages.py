@@ -82,30 +82,30 @@ class Ages:
         """Return what was counted since the last row, when another one is due behind the closing of a tick."""
         if (tick + 1) % self._every:
             return []
-        taken = self.untold()
+        taken = self.untold(tick)
         for pairs in self._heard.values():
             for heard in pairs.values():
                 add_counts(heard.whole, heard.recent)
                 heard.recent = {}
         return taken
 
-    def untold(self) -> list[Age]:
-        """Return what was counted since the last row, by client, source and channel."""
+    def untold(self, tick: int) -> list[Age]:
+        """Return what was counted since the last row up to the closing of a tick, by client, source and channel."""
         return [
-            Age(client, heard.source, heard.channel, dict(heard.recent))
+            Age(tick, client, heard.source, heard.channel, dict(heard.recent))
             for client, pairs in sorted(self._heard.items())
             for heard in pairs.values()
             if heard.recent
         ]
 
-    def of(self, client: str) -> list[Age]:
-        """Return the ages of what a client hears, in the whole run so far."""
+    def of(self, client: str, tick: int) -> list[Age]:
+        """Return the ages of what a client hears, in the whole run up to the closing of a tick, the last one."""
         found = []
         for heard in self._heard.get(client, {}).values():
             counts = dict(heard.whole)
             add_counts(counts, heard.recent)
             if counts:
-                found.append(Age(client, heard.source, heard.channel, counts))
+                found.append(Age(tick, client, heard.source, heard.channel, counts))
         return found
 
     def state(self) -> list[tuple[str, list[HeardState]]]:

@@ -101,6 +101,8 @@ def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_St
     for message in scan.messages():
         if message.topic != FRAME:
             held.take(scan, message)
+            if to_ns is not None and start.tick >= 0 and held.tick * tick_ns > to_ns:
+                break  # what is behind may be damaged: it is not needed
         elif start.tick < 0 or (from_ns is not None and held.tick * tick_ns <= from_ns):
             start = replace(held, in_force=held.in_force.copy())
     if start.tick < 0:

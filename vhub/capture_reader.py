@@ -32,7 +32,7 @@ from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
 from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import first_chain
-from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
+from foosim.vhub.capture_columns import AllFrames, Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
     ASSETS,
     DEPLOYMENT,
@@ -263,12 +263,9 @@ class CaptureData:
         return next(self.each_frame(), None)
 
     @property
-    def frames(self) -> Frames:
-        """The captured frames of a run whose layout never changed; `frame_blocks` has those of any run."""
-        if len(self.frame_blocks) != 1:
-            ticks = ", ".join(str(block.ticks[0]) for block in self.frame_blocks if len(block))
-            raise CaptureError(f"{self.path}: frames of {len(self.frame_blocks)} layouts (from {ticks}): frame_blocks")
-        return self.frame_blocks[0]
+    def frames(self) -> AllFrames:
+        """All captured frames, whatever was added and removed in between."""
+        return AllFrames(str(self.path), self.frame_blocks)
 
     @cached_property
     def packets(self) -> Packets:

@@ -46,10 +46,10 @@ from foosim.protocol.messages import (
     Up,
     Want,
 )
+from foosim.protocol.orphan import Orphan
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain
-from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
 from foosim.vhub.footing import Footing
@@ -85,7 +85,7 @@ class HubCore:
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
-        self.door, self.footing = Door(self), Footing(self, machine)
+        self.door, self.footing, self.orphan = Door(self), Footing(self, machine), Orphan()
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
@@ -117,7 +117,7 @@ class HubCore:
             Recall: self._on_recall,
             Build: self._on_build,
             Piece: self._on_build,
-            Tempo: self._on_tempo,
+            Tempo: self.door.tempo,
             End: self._on_end,
             Proceed: self.footing.proceed,
             ClientHello: self.door.hello,
@@ -159,7 +159,7 @@ class HubCore:
 
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
-        self.member.wake(now_ns, self._heartbeat)
+        self.member.wake(now_ns, self.heartbeat)
         self.door.wake(now_ns)
         if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
@@ -265,6 +265,7 @@ class HubCore:
         assert world is not None and state is not None and releases is not None
         tick = world.frame.tick
         self._tell_of_waits(now_ns)
+        self.door.leave_owing(state, world.closing)
         admitted = self.sessions.take_sent() if state.hears_clients else {}
         samples = self._samples.pop(tick, [])
         deliveries = state.close_robots(world.frame, admitted)
@@ -273,6 +274,7 @@ class HubCore:
             state.members[name].downlink += 1
         record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
         self.actions.append(Journal(record))
+        self.door.tell()
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         if not state.was_final:
             self._sent[tick + 1] = payload
@@ -438,12 +440,6 @@ class HubCore:
         if want.kind == channels.DELIVERIES.name and want.tick in self._sent and not self.footing.waits:
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[want.tick]))
 
-    def _on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
-        """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
-        pace = parse_pace(tempo.pace)
-        if self.releases is not None:
-            self.releases.set_tempo(0.0 if pace.kind == "fast" else float(pace.factor), tempo.paused)
-
     # --- time --------------------------------------------------------------------------------------------------------
 
     def _ask_again(self, now_ns: int) -> None:
@@ -465,9 +461,14 @@ class HubCore:
         if not self.lost:
             self.lost = reason
             self.actions.append(Say("error", reason))
-            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self._heartbeat())))
+            self.say_heartbeat()
 
-    def _heartbeat(self) -> Heartbeat:
+    def say_heartbeat(self) -> None:
+        """Say at once what the next heartbeat would."""
+        self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self.heartbeat())))
+
+    def heartbeat(self) -> Heartbeat:
+        """Return what it says of itself."""
         tick = 0 if self.state is None else self.state.closed + 1
         return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, report(self))
 

@@ -11,16 +11,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from foosim.protocol import limits
-from foosim.protocol.actions import Journal
+from foosim.protocol.actions import Journal, Say
 from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import ClientHello, Done, Go, Join, Up
-from foosim.vhub.members import Member, may_lockstep
+from foosim.protocol.messages import ClientHello, Done, Go, Join, Tempo, Up
+from foosim.protocol.standstill import TOLD_NS, told
+from foosim.protocol.units import parse_pace
+from foosim.vhub.absences import Absences
+from foosim.vhub.members import Member, may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
-from foosim.vhub.records import InputsRecord
+from foosim.vhub.records import Closing, InputsRecord
 from foosim.vhub.sessions import Session
+from foosim.vhub.state import HubState
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore
@@ -34,6 +38,10 @@ class Door:
         self.written: InputsRecord | None = None
         """Who joins and leaves at the tick that is closed next, where that is written already."""
         self._leaves: list[str] = []
+        self._owing: list[str] = []
+        """Who leaves at the tick that waits for their Dones."""
+        self.absences = Absences()
+        self._looked_ns = 0
 
     def go_on(self, written: InputsRecord | None, now_ns: int) -> None:
         """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick."""
@@ -43,7 +51,8 @@ class Door:
         here = {name for name, member in core.state.members.items() if member.active}
         if written is not None:
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        core.sessions.expect(here, now_ns + self._start_ns)  # theirs may have ended as well, and be started again
+        # Theirs may have ended as well, and be started again.
+        core.sessions.expect(dict.fromkeys(sorted(here), now_ns + self._start_ns))
 
     def _known(self, name: str) -> Member | Joining | None:
         """Return what is known of a client, the latest first: as it joins, or as the state has it."""
@@ -69,6 +78,12 @@ class Door:
         self._leaves = []
         if joins or leaves:
             core.actions.append(Journal(encode(InputsRecord(tick, joins, leaves))))
+            for name in leaves:
+                self.absences.leave(name, tick)
+            for joining in joins:
+                if joining.period and joining.name in members and not members[joining.name].active:
+                    self.absences.come_back(joining.name, tick)
+            self.tell()
         return joins, leaves
 
     def go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
@@ -95,6 +110,12 @@ class Door:
         if core.footing.waits:
             return
         if core.state is not None and core.deployment is not None and core.member.build is not None:
+            session, known = core.sessions.by_name.get(hello.name), core.state.members.get(hello.name)
+            if session is not None and session.is_late(hello):
+                core.repeated += 1
+                return
+            if session is not None and not session.boot and not hello.returns and known is not None and known.active:
+                self._miss(hello.name, "", "its process was lost while the vHub was away")
             core.sessions.hello(hello, core.member.build, core.deployment, core.state, self._said(hello.name))
 
     def join(self, join: Join, payload: bytes, now_ns: int) -> None:
@@ -103,10 +124,15 @@ class Door:
         session = self._session(join)
         if session is None or core.state is None:
             return
+        if session.is_gone:  # said before it went
+            core.repeated += 1
+            return
         if join.period and not may_lockstep(core.state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
         _check_timing(join)
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
+        self.absences.end(join.name, join.boot)
+        self.tell()
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
             core.repeated += 1
@@ -142,6 +168,7 @@ class Door:
             core.repeated += 1
             return
         self.take_done(done.name)
+        session.answered()
         session.done = done
 
     def take_done(self, client: str) -> None:
@@ -175,6 +202,16 @@ class Door:
         waiting = core.releases.first_number(name)
         return member.downlink - core.waits_for(name) if waiting is None else waiting - 1
 
+    def tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
+        """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
+        releases, pace = self._core.releases, parse_pace(tempo.pace)
+        if releases is None:
+            return
+        was_fast = not releases.factor
+        releases.set_tempo(0.0 if pace.kind == "fast" else float(pace.factor), tempo.paused)
+        if was_fast != (not releases.factor):
+            self._turn_to_pace(now_ns)
+
     # --- who is away -------------------------------------------------------------------------------------------------
 
     def gone(self, name: str, now_ns: int) -> None:
@@ -183,32 +220,133 @@ class Door:
         session = core.sessions.by_name.get(name)
         if session is None or core.state is None or core.deployment is None or core.ended is not None:
             return
+        session.is_gone = True
         if self._is_waited_for(name):
-            session.away_ns = now_ns + (core.deployment.deadlines.client_back_ns if core.epoch else self._start_ns)
+            session.away_ns = now_ns + self._back_ns(name)
+            self._miss(name, session.boot, "its connection closed")
             return
         self._leave(name)
 
+    def _miss(self, name: str, boot: str, reason: str) -> None:
+        """Note that a player's process is away from a run that has begun."""
+        core = self._core
+        if core.deployment is not None and may_restart(core.deployment, name) and core.epoch > 0:
+            self.absences.begin(name, boot, reason, self._tick)
+            self.tell()
+
+    def tell(self) -> None:
+        """Tell the supervisor at once of whoever has gone or come, when that is written: a run may end soon."""
+        if self.absences.is_new:
+            self.absences.is_new = False
+            self._core.say_heartbeat()
+
+    def _back_ns(self, name: str) -> int:
+        """Return for how long the run waits for a client that is away."""
+        core = self._core
+        assert core.deployment is not None
+        is_started_again = may_restart(core.deployment, name) and not self._may_go_on_without(name)
+        return self._start_ns if is_started_again or not core.epoch else core.deployment.deadlines.client_back_ns
+
+    def _may_go_on_without(self, name: str) -> bool:
+        """Whether the run goes on while a client is started again: in realtime, once it has begun."""
+        core = self._core
+        assert core.deployment is not None
+        is_realtime = core.releases is not None and core.releases.factor > 0
+        return may_restart(core.deployment, name) and is_realtime and core.epoch > 0
+
+    def _turn_to_pace(self, now_ns: int) -> None:
+        """The run goes by the wall clock now, or does not any more: players that are away have the time of then."""
+        deployment = self._core.deployment
+        for name, session in self._core.sessions.by_name.items():
+            if session.away_ns >= 0 and deployment is not None and may_restart(deployment, name):
+                session.away_ns = now_ns + self._back_ns(name)
+
+    @property
+    def _tick(self) -> int:
+        """The tick that is closed next."""
+        return 0 if self._core.state is None else self._core.state.closed + 1
+
+    @property
+    def holds(self) -> bool:
+        """Whether the vHub waits for its supervisor: nothing can go on, and nobody is let in."""
+        return self._core.orphan.is_alone or self._core.footing.waits
+
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The vHub's own loop stood still for so long: that counts against no client, and not against the supervisor.
+
+        Where connections may have closed by it, clients have their whole time from now on (`standstill`).
+        """
+        core = self._core
+        core.orphan.rest(stood_ns, now_ns)
+        if stood_ns >= TOLD_NS:
+            core.actions.append(Say("warning", told(stood_ns)))
+        self._rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
+        self._looked_ns = now_ns
+
+    def _rest(self, for_ns: int, now_ns: int) -> None:
+        if self._core.deployment is not None:
+            self._core.sessions.rest(for_ns, self._back_ns, now_ns)
+
     def wake(self, now_ns: int) -> None:
-        """Say Go again, and give up who has not answered or was away for too long."""
+        """Say Go again, lose who has not answered in time, and give up who was away for too long.
+
+        Both clocks rest while the run is paused; they begin anew when the vHub has waited for its supervisor, since
+        what closed that connection may have closed those of clients as well.
+        """
         core = self._core
         if core.state is None:
             return
-        if core.waited and core.releases is not None:
-            core.sessions.repeat(core.waited, now_ns)
-            for late in core.sessions.overdue(core.waited, core.releases.paused, now_ns):
-                core.give_up(late.unanswered)
+        core.sessions.repeat(core.waited, now_ns)
+        passed_ns, self._looked_ns = now_ns - self._looked_ns, now_ns
+        if self.holds:
+            self._rest(limits.COUNTER_MAX, now_ns)
+        elif core.releases is not None and core.releases.paused:
+            self._rest(passed_ns, now_ns)
+        for late in core.sessions.overdue(now_ns):
+            core.give_up(late.unanswered)
         for name in core.sessions.late(now_ns):
             session = core.sessions.by_name[name]
-            if self._is_waited_for(name):
-                session.away_ns = -1  # its session stays: a tick may be waiting for it
-                core.lose(name, "its connection closed" if session.boot else "it did not come back to the vHub")
-            else:
+            if not self._is_waited_for(name):
                 self._leave(name)
+                continue
+            session.away_ns = -1  # its session stays: a tick may be waiting for it, and another process may come
+            if self._may_go_on_without(name):
+                self._go_on_without(name)
+            else:
+                core.lose(name, self._why_lost(session))
+
+    def _why_lost(self, session: Session) -> str:
+        """Return why the run does not wait any longer for a client that is away."""
+        deployment = self._core.deployment
+        assert deployment is not None
+        if may_restart(deployment, session.name):
+            return f"it was not started again within {deployment.deadlines.start_ns / 1e9:g} s (deadlines.start)"
+        return "its connection closed" if session.boot else "it did not come back to the vHub"
+
+    def _go_on_without(self, name: str) -> None:
+        """A player leaves until it is started again: at the tick whose Done it owes, or at the next one."""
+        core = self._core
+        core.sessions.joins.pop(name, None)
+        core.sessions.by_name[name].answered()
+        if core.waits_for(name):
+            core.waited.remove(name)
+            self._owing.append(name)
+        else:
+            self._leaves.append(name)
+
+    def leave_owing(self, state: HubState, closing: Closing) -> None:
+        """Let those go without whose Dones the tick is closed; its record says so, before anything else does."""
+        closing.owing += sorted(self._owing)
+        for name in closing.owing:
+            state.leave(name)
+            self.absences.leave(name, closing.frame.tick)
+        self._owing = []
 
     def _is_waited_for(self, name: str) -> bool:
         """Whether the run waits for a client: it is in lockstep, or a tick still waits for its Done."""
         known = self._known(name)
-        return self._core.waits_for(name) or (known is not None and known.period > 0)
+        is_here = isinstance(known, Joining) or (known is not None and known.active and name not in self._leaves)
+        return self._core.waits_for(name) or (known is not None and is_here and known.period > 0)
 
     @property
     def _start_ns(self) -> int:

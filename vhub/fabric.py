@@ -114,7 +114,7 @@ class Fabric:
         """Take up what was written down of a network in which nothing has been sent yet."""
         self.states = {(source, destination, name): state for source, destination, name, state in links}
         self.radios = {(endpoint, radio): state for endpoint, radio, state in radios}
-        self.airs = {name: Air(state) for name, state in airs}
+        self.airs = {name: Air(state, self.radios) for name, state in airs}
         for tick, text in asked:
             self.take(tick, tick * self.deployment.tick_ns, text)
 
@@ -124,6 +124,7 @@ class Fabric:
         settings, name = profile.settings, profile.radio or self.network.defaults.preset
         if settings.is_on_air:
             self._air(name, settings).restore(flight, self._propagation(name, settings))
+            self.link(flight.source, flight.destination, flight.channel).restore(flight)
 
     def setup(
         self,
@@ -191,7 +192,7 @@ class Fabric:
         name = settings.air or name
         found = self.airs.get(name)
         if found is None:
-            found = self.airs[name] = Air(AirState())
+            found = self.airs[name] = Air(AirState(), self.radios)
         return found
 
     def _model(self, settings: Radio) -> LinkModel | None:

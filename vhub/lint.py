@@ -20,6 +20,7 @@ from foosim.protocol.radio_references import unheeded
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.jitter import interpolate_ns, moments_ns, quantiles_ns
+from foosim.vhub.lint_phase import phase_warnings
 from foosim.vhub.profiles import NO_RADIO, Profile, Profiles, over, preset_radio
 from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
@@ -160,10 +161,11 @@ def meanings(deployment: Deployment) -> list[Meaning]:
     uses = uses_of(deployment)
     offered = _offered(deployment, uses)
     files = deployment.asset_files
+    phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])
     found = []
     for use in uses:
         meaning = meaning_of(use, files)
-        warnings = [*meaning.warnings]
+        warnings = [*meaning.warnings, *phased.get((use.rule, use.radio), ())]
         if use.links == 0:
             warnings.append("no link uses it")
         capacity_hz = _capacity_hz(meaning)

@@ -107,9 +107,10 @@ class Described:
 
 
 class Span:
-    """The times of one chunk: as its head tells them, and as its indexes do."""
+    """The times of the chunk at a byte: as its head tells them, and as its indexes do."""
 
-    def __init__(self, first_ns: int, last_ns: int) -> None:
+    def __init__(self, at: int, first_ns: int, last_ns: int) -> None:
+        self.at = at
         self._told = first_ns, last_ns
         self._first_ns: list[int] = []
         self._last_ns: list[int] = []
@@ -127,7 +128,9 @@ class Span:
     def check(self) -> None:
         """Compare, when all indexes have come. Raises ValueError; a chunk without any is not checked."""
         if self._first_ns and (found := (min(self._first_ns), max(self._last_ns))) != self._told:
-            raise ValueError(f"indexes from {found[0]} to {found[1]} ns, their chunk is from {self._told}")
+            first_ns, last_ns = self._told
+            told = f"the chunk at byte {self.at} is from {first_ns} to {last_ns} ns"
+            raise ValueError(f"{told}, its indexes from {found[0]} to {found[1]} ns")
 
 
 def combined_crc(first: int, second: int, second_bytes: int) -> int:

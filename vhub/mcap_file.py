@@ -48,7 +48,7 @@ IN_DATA: Final = frozenset(
         *(Opcode.ATTACHMENT, Opcode.METADATA, Opcode.DATA_END),
     }
 )
-_IN_SUMMARY: Final = frozenset(
+IN_SUMMARY: Final = frozenset(
     {
         *(Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX, Opcode.ATTACHMENT_INDEX),
         *(Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET, Opcode.FOOTER),
@@ -167,11 +167,11 @@ class McapFile:
             self._span.check()
             self._span = None
         if opcode == Opcode.CHUNK:
-            self._span = Span(*CHUNK_FIELDS.unpack_from(content)[:2])
+            self._span = Span(self._at, *CHUNK_FIELDS.unpack_from(content)[:2])
         elif opcode == Opcode.DATA_END:
             if self._crc is not None:
                 self._compare_data(self._crc, *_CRC.unpack(content))
-            self._crc, self._known = 0, _IN_SUMMARY
+            self._crc, self._known = 0, IN_SUMMARY
         elif opcode == Opcode.FOOTER:
             assert self._crc is not None, "nothing of the summary is passed by"
             crc = crc32(content[: -_CRC.size], crc32(RECORD.pack(opcode, len(content)), self._crc))

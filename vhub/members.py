@@ -20,6 +20,11 @@ def may_lockstep(deployment: Deployment, name: str) -> bool:
     return declared is not None and declared.lockstep
 
 
+def may_restart(deployment: Deployment, name: str) -> bool:
+    """Whether a client's process is started again when it has ended."""
+    return name in deployment.players and deployment.players[name].restart
+
+
 class Member:
     """One client. In lockstep its ticks are those that leave the remainder `offset` by `period`; with `arrivals` those
     at which a packet of such an (endpoint, channel) reaches it, or at which it has not been called for a period.

@@ -96,6 +96,13 @@ class Transmission(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     position: tuple[float, float, float]
     power_cdbm: int
     spreading_factor: int = 0
+    ready_ns: int = 0
+    """When its packet was the first of its radio's queue."""
+    turn_ns: int = -1
+    """When its station's turn begins: until then it is put off by who comes in between; -1 where turns are for good."""
+    radio: str = ""
+    hears: list[str] = []
+    """Where it can be put off: its sender's radio, and whom the sender hears of those that can be, too."""
 
 
 class AirState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
@@ -176,6 +183,8 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Of LoRa: the interference by spreading factor, from 7 on."""
     held_ns: int = 0
     """For how long clogs put off its due time."""
+    put_off_ns: int = 0
+    """For how long others did who had their turn on the air before it, after it was sent."""
     model_ns: int = 0
     """What a link model of one's own adds to its delay."""
     outcome: str = ""
@@ -205,8 +214,9 @@ class HeardState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class Age(msgspec.Struct, frozen=True):
-    """The ages at use of one channel at one client, of some time or of the whole run."""
+    """The ages at use of one channel at one client, of some time or of the whole run, up to the closing of a tick."""
 
+    tick: int
     client: str
     source: str
     channel: str

@@ -90,6 +90,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
             "links": core.links_told.lines(state, anew=is_last),
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
+            "absences": {"boot": core.member.boot, **core.door.absences.report()},
             "lateness_ms": lateness.as_json() if lateness is not None and lateness.count else None,
             "capture": core.capture,
             "recording": core.recording,
@@ -103,7 +104,7 @@ def _links(state: HubState) -> list[list[Any]]:
     fabric, now_ns = state.fabric, state.closed * state.tick_ns
     ages: dict[LinkKey, list[tuple[str, int, int, int]]] = {}
     for name in state.members:
-        for age in state.ages.of(name):
+        for age in state.ages.of(name, state.closed):
             key = age.source, name, name_of(fabric.profiles.find(age.source, name, age.channel))
             p50, p99 = (quantile(age.counts, share) * state.tick_ns for share in (0.5, 0.99))
             ages.setdefault(key, []).append((age.channel, sum(age.counts.values()), p50, p99))

@@ -216,12 +216,13 @@ class SubscriptionRow(Row, frozen=True):
 class ClientRow(Row, frozen=True):
     """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks.
 
-    One with `arrivals` acts when a packet of these channels reaches it, and when it has not for a period.
+    One with `arrivals` acts when a packet of these channels reaches it, and when it has not for a period. One that
+    `leaves_owing` was told its turn at that tick, and is gone without an answer.
     """
 
     tick: Counter
     client: str
-    event: Literal["joins", "leaves"]
+    event: Literal["joins", "leaves", "leaves_owing"]
     period: Counter
     subscriptions: list[SubscriptionRow]
     offset: Counter = 0

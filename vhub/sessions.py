@@ -7,7 +7,7 @@ world must remember of a client is in `state`. Neighbours: `core`, `door` (what 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from foosim.protocol import channels, limits
@@ -28,7 +28,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.names import nearest_name
 from foosim.vhub.downlinks import Downlinks
-from foosim.vhub.members import may_lockstep
+from foosim.vhub.members import may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.state import HubState
 
@@ -46,8 +46,15 @@ class Session:
     """The last downlink up to which it had all at its hello."""
     is_behind: bool = True
     """Whether it is to be told what it had not received then."""
+    is_gone: bool = False
+    """Whether its process has gone, and has not come back, nor another one."""
+    returns: int = 0
+    """How often its process had lost the vHub when it said hello."""
+    before: set[str] = field(default_factory=set)
+    """Boots of processes that are gone for good: what comes late of them is of nobody."""
     away_ns: int = -1
-    """Until when a client that is away may come back; -1 while it is here."""
+    """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
+    here."""
     next_sequence: int = 1
     """The number of its next packet: nothing behind a gap is taken."""
     heard: int = 0
@@ -58,6 +65,7 @@ class Session:
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
+    """By when it is to answer; 0 while no answer is waited for."""
     allowed_ns: int = 0
     deadline: str = ""
     """Which one of the deployment's that is."""
@@ -66,13 +74,38 @@ class Session:
     inbox_bytes: int = 0
     """As they came."""
 
-    def come(self, boot: str, received: int, sequence: int) -> None:
-        """A process of the client is here; it goes on behind these numbers."""
+    def is_late(self, hello: ClientHello) -> bool:
+        """Whether a hello was said by a process that has gone since: one that comes back counts one return more."""
+        is_of_gone = self.is_gone and hello.boot == self.boot and hello.returns <= self.returns
+        return is_of_gone or hello.boot in self.before
+
+    def come(self, boot: str, received: int, sequence: int, joins_first: bool = False) -> None:
+        """A process of the client is here; it goes on behind these numbers. It may be away until it `joins_first`."""
         if boot != self.boot:
+            if self.boot:
+                self.before.add(self.boot)
             self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
         self.is_present = self.is_present and boot == self.boot
-        self.boot, self.received, self.is_behind, self.away_ns = boot, received, True, -1
+        self.boot, self.received, self.is_behind, self.is_gone = boot, received, True, False
+        self.away_ns = self.away_ns if joins_first else -1
         self.next_sequence = max(self.next_sequence, sequence + 1)
+
+    @property
+    def lost_ns(self) -> int:
+        """When a client that is away is lost: its process may be gone, or only stand still, so the later time counts
+        of those for coming back and for its answer."""
+        return max(self.away_ns, self.deadline_ns)
+
+    def answered(self) -> None:
+        """No answer is waited for."""
+        self.deadline_ns = 0
+
+    def rest(self, for_ns: int, back_ns: int, now_ns: int) -> None:
+        """For so long the client could do nothing: move its deadlines, at most to where they would begin now."""
+        if self.away_ns >= 0:
+            self.away_ns = max(self.away_ns, min(self.away_ns + for_ns, now_ns + back_ns))
+        if self.deadline_ns:
+            self.deadline_ns = min(self.deadline_ns + for_ns, now_ns + self.allowed_ns)
 
     def take(self, packets: Sequence[Sent]) -> int:
         """Take what the client sends, each number once and in order; return how many were taken before."""
@@ -139,10 +172,12 @@ class Sessions:
             downlink = min(has, downlink)
         else:  # another process: the numbers of what the one before has sent are taken
             waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
+            waiting += [] if session.done is None else session.done.packets
             sequence = max([sequence, *(packet.sequence for packet in waiting)])
         if session.boot != hello.boot:
             self._left_behind.setdefault(hello.name, []).extend(session.inbox)
-        session.come(hello.boot, downlink, sequence)
+        session.returns = hello.returns
+        session.come(hello.boot, downlink, sequence, hello.returns == 0 and may_restart(deployment, hello.name))
         welcome = ClientWelcome(
             hello.name,
             hello.boot,
@@ -169,7 +204,7 @@ class Sessions:
             hint = f", nearest is {nearest}" if nearest else ""
             return f"no client {hello.name} is declared; declared are {', '.join(sorted(declared)) or 'none'}{hint}"
         session = self.by_name.get(hello.name)
-        if session is not None and session.boot not in ("", hello.boot) and session.away_ns < 0:
+        if session is not None and session.boot not in ("", hello.boot) and not session.is_gone:
             return f"a client {hello.name} is already here"
         return ""
 
@@ -179,19 +214,20 @@ class Sessions:
         here = {name for name, member in state.members.items() if member.active} | self.joins.keys()
         return [name for name in declared if may_lockstep(deployment, name) and name not in here]
 
-    def expect(self, names: Iterable[str], until_ns: int) -> None:
-        """These clients come back, by then, to this vHub, which is another one."""
-        for name in sorted(names):
-            self.by_name[name] = Session(name, "", away_ns=until_ns)
+    def expect(self, until_ns: Mapping[str, int]) -> None:
+        """These clients come back, each by a time, to this vHub, which is another one."""
+        for name, at_ns in until_ns.items():
+            self.by_name[name] = Session(name, "", away_ns=at_ns)
 
     def late(self, now_ns: int) -> list[str]:
         """Return the clients that were away for too long, in name order."""
-        return [name for name, session in sorted(self.by_name.items()) if 0 <= session.away_ns <= now_ns]
+        away = [(name, session) for name, session in sorted(self.by_name.items()) if session.away_ns >= 0]
+        return [name for name, session in away if session.lost_ns <= now_ns]
 
     @property
     def late_ns(self) -> int | None:
         """When the next client has been away for too long."""
-        return min((session.away_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
+        return min((session.lost_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
 
     def join(self, join: Join) -> None:
         """Note a join; it takes effect when the hub closes a tick that suits it."""
@@ -260,8 +296,9 @@ class Sessions:
     def catch_up(self, session: Session, waits: bool, now_ns: int) -> None:
         """A client has joined (again): say what it had not received; `waits` is whether a tick waits for its Done."""
         session.is_present = True
+        session.away_ns = -1
         if session.is_behind:
-            session.deadline_ns = now_ns + session.allowed_ns
+            session.deadline_ns = now_ns + session.allowed_ns if waits else 0
             session.is_behind = False
             missed = [*self.downlinks.behind(session.name, session.received), *([session.go] if waits else [])]
             self._actions += [Publish(channels.DOWN, session.name, payload) for payload in missed]
@@ -276,13 +313,15 @@ class Sessions:
                 session.heard, session.heard_ns = member.sequence, now_ns
                 self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence, state.branch))))
 
-    def overdue(self, waited: Sequence[str], paused: bool, now_ns: int) -> list[Session]:
-        """Return those whose deadline has passed; while the run is paused none passes."""
-        sessions = [self.by_name[name] for name in waited]
-        if paused:
-            for session in sessions:
-                session.deadline_ns = max(session.deadline_ns, now_ns + limits.WANT_EVERY_NS_MAX)
-        return [session for session in sessions if now_ns >= session.deadline_ns and session.away_ns < 0]
+    def rest(self, for_ns: int, back_ns: Callable[[str], int], now_ns: int) -> None:
+        """For so long no client could do anything; `back_ns` is what each that is away has to come back."""
+        for name, session in self.by_name.items():
+            session.rest(for_ns, back_ns(name), now_ns)
+
+    def overdue(self, now_ns: int) -> list[Session]:
+        """Return those who are here and have not answered in time, in name order."""
+        waited = [session for _, session in sorted(self.by_name.items()) if session.deadline_ns]
+        return [session for session in waited if now_ns >= session.deadline_ns and session.away_ns < 0]
 
     def again_ns(self, waited: Sequence[str]) -> int:
         """When the next Go is said again."""

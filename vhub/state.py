@@ -374,6 +374,10 @@ class HubState:
         rest = [flight for flight in flights if (flight.destination in robots) is not to_robots]
         if rest:
             self._flights[tick] = rest
+        late = [flight for flight in taken if flight.put_off_ns and flight.due_ns > tick * self.tick_ns]
+        for flight in late:
+            taken.remove(flight)
+            self._let_fly(flight, tick + 1)
         taken.sort(key=order_of)
         return taken
 

@@ -184,6 +184,15 @@ def _cut_dones(planting: Planting) -> None:
     before: Any = planting.swap(Door, "done", done)
 
 
+@register("who leaves is not written", "leaving is an input of the tick whose Done is owed", 71)
+def _unwritten_leave(planting: Planting) -> None:
+    def leave_owing(self: Any, state: Any, closing: Any) -> None:
+        before(self, state, closing)
+        closing.owing = []
+
+    before: Any = planting.swap(Door, "leave_owing", leave_owing)
+
+
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)
 def _kept_commits(planting: Planting) -> None:
     planting.swap(Commits, "forget", lambda self, tick: None)

@@ -45,6 +45,7 @@ NETWORKS: Final[dict[str, tuple[str, ...]]] = {
     **{f"radio {preset}": radio(preset) for preset in PRESETS},
     **{f"default {preset}": (f"network.defaults={{preset: {preset}}}", PLACES) for preset in PRESETS},
     "wifi fading": radio("wifi_5_indoor", ", fading: {kind: nakagami}, duplicate: 30 %, retries: 1"),
+    "wifi hidden": (*radio("wifi_5_indoor", ", tx_power: -28 dBm, duplicate: 20 %"), "network.defaults={phase: 2 ms}"),
     "dot11p crowded": radio("dot11p", ", duplicate: 30 %, path_loss: {environment: log_distance, exponent: 3.6}"),
     "lora busy": radio("lora_eu868", ", duty_cycle: 100 %, spreading_factor: 9, duplicate: 20 %, queue: {packets: 50}"),
     "lora duty": radio("lora_eu868", ", duty_cycle: 2 %, duty_window: 10 s"),

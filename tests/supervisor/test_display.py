@@ -10,7 +10,15 @@ from rich.console import Console
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.display import LINKS_SHOWN_MAX, Display, fitted, plain_line, recovery_text, render_text
+from foosim.supervisor.display import (
+    LINKS_SHOWN_MAX,
+    Display,
+    closing_text,
+    fitted,
+    plain_line,
+    recovery_text,
+    render_text,
+)
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import status
 
@@ -200,3 +208,14 @@ def test_a_capture_that_is_full_is_shown_wherever_a_run_is_looked_at(running: di
     running["recording"] = {**running["recording"], **problem}
     text = "capture ended: run.mcap: 0.1 MB left on its disk (812 rows are not in it)"
     assert f" | {text} | load" in plain_line(running) and text in render_text(running)
+
+
+def test_a_run_that_has_ended_shows_how_far_it_is_with_its_capture(running: dict[str, Any]) -> None:
+    stream = io.StringIO()
+    display = Display(stream)
+    assert closing_text(running) == ""
+    display.show_closing(running)
+    counts = {"state": "closing", "offered": 90_000, "written": 8_790, "refused": 10, "bytes": 12_345_678}
+    running["recording"] = {**running["recording"], **counts}
+    display.show_closing(running)
+    assert stream.getvalue() == "closing the capture: 81,200 rows are left, 12.3 MB are written\n"

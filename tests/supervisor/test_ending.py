@@ -26,6 +26,7 @@ REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the superviso
         ),
         (Ending(-11, "SIGSEGV", ["anything"]), "was killed by SIGSEGV, not by foosim"),
         (Ending(1, "", ["  File ...", "MemoryError"]), "ended with exit code 1: too little memory"),
+        (Ending(1, "", ["RuntimeError: can't start new thread"]), "ended with exit code 1: too little memory"),
         (Ending(1, "", ["no journal of this version"]), "ended with exit code 1"),
         (
             Ending(3, "", ["before", REFUSED]),

@@ -16,6 +16,7 @@ from foosim.protocol.journal import Journal, journal_files
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.cli import main
+from foosim.supervisor.main import _history as history_of
 from foosim.supervisor.outcome import plan_facts, result_without_supervisor, with_capture
 from foosim.supervisor.plan import RunOptions, launch_of, make_plan, plan_again
 from foosim.supervisor.run_folder import RunFolder, create_run
@@ -139,6 +140,15 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
         plan_again(folder)
     assert problems[what] in str(refused.value), refused.value
     assert f"foosim-supervisor up {TABLE}" in str(refused.value) and "begins a new run" in str(refused.value)
+
+
+def test_a_supervisor_goes_on_from_no_journal_that_has_nothing_and_from_none_that_is_damaged(left: Left) -> None:
+    plan, folder = make_plan(RunOptions(TABLE, sets=("engine=pure",))), left.folder
+    damage(left.journal(SUPERVISOR))
+    with pytest.raises(Refused, match=r"run mine cannot go on: .*record"):
+        history_of(plan, folder)
+    left.journal(SUPERVISOR).write_bytes(b"")
+    assert history_of(plan, folder) is None, "the one before was killed when it had made the file: the run begins"
 
 
 def test_a_resume_of_a_run_that_has_ended_reports_its_result(run: Run, left: Left, typed: Typed) -> None:

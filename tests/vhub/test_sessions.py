@@ -285,7 +285,7 @@ def test_a_go_is_said_again_with_doubling_waits_until_it_is_answered() -> None:
     assert not hub.said(channels.DOWN)
 
 
-@pytest.mark.parametrize(("pace", "allowed_ms"), [("fast", 10_000), ("realtime", 1_000), ("2x", 1_000)])
+@pytest.mark.parametrize(("pace", "allowed_ms"), [("fast", 10_000), ("realtime", 2_000), ("2x", 2_000)])
 def test_who_does_not_answer_within_its_deadline_is_lost(pace: str, allowed_ms: int) -> None:
     hub = Hub().begin()
     hub.say(channels.TEMPO, "supervisor", Tempo(pace, False))
@@ -312,25 +312,26 @@ def test_no_deadline_passes_while_the_run_is_paused() -> None:
     hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
     hub.core.wake(99_900 * MS)
     assert hub.core.lost == ""
-    hub.core.wake(101_000 * MS)
-    assert hub.core.lost.startswith("hand has not answered tick 0 for 1 s")
+    hub.core.wake(102_000 * MS)
+    assert hub.core.lost.startswith("hand has not answered tick 0 for 2 s")
 
 
 def test_a_lockstep_client_that_goes_is_lost_and_nothing_breaks() -> None:
-    for tick_waits in (True, False):
+    for tick_waits, back_ms in ((True, 10_000), (False, 2_000)):  # of its two deadlines the longer one
         hub = Hub().begin()
         if tick_waits:
             hub.commit(0)
+            hub.done("knee", 0)
         else:
             hub.close(0)
         hub.core.client_gone("hand", 0)
-        hub.core.wake(1_999 * MS)
+        hub.core.wake((back_ms - 1) * MS)
         assert not any(beat.lost for beat in hub.said(channels.HEARTBEAT)), "it may come back"
-        hub.core.wake(2_000 * MS)
+        hub.core.wake(back_ms * MS)
         beat = hub.said(channels.HEARTBEAT)[-1]
         assert isinstance(beat, Heartbeat) and beat.lost == "lost hand: its connection closed"
-        hub.core.wake(5_000 * MS)
-        assert hub.core.deadline_ns() > 5_000 * MS
+        hub.core.wake(15_000 * MS)
+        assert hub.core.deadline_ns() > 15_000 * MS
 
 
 # --- free-running ----------------------------------------------------------------------------------------------------

@@ -9,10 +9,14 @@ import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
+
 from foosim.protocol import channels
+from foosim.protocol.errors import Refused
 from foosim.protocol.journal import journal_files, read_records
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.verify import verify_capture
+from foosim.supervisor.plan import plan_again
 from foosim.supervisor.run_folder import open_run
 from foosim.vhub.capture_reader import open_capture
 from tests.wire.conftest import LONG, SLOW
@@ -32,6 +36,14 @@ def tear(folder: Path, stem: str, count: int) -> None:
     os.truncate(path, ends[-count])
 
 
+def flip(folder: Path, stem: str) -> None:
+    """Turn a bit in the midst of a journal."""
+    path = journal_files(folder, stem)[0]
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
 def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     options = ("--run", "far", "--capture", "far.mcap")
     code, out, err = house.run("foosim-supervisor", "up", house.table, *BARE, *options, "--detach")
@@ -44,6 +56,10 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     folder = open_run("far")
     house.wait_for("all to be gone with it", lambda: folder.is_left() and not house.processes_with("--run far"))
     assert folder.result() is None
+    flip(folder.journals, channels.VHUB)
+    with pytest.raises(Refused, match=r"run far cannot go on: .*vhub-0\d+\.journal: byte \d+: .* --from .*far.mcap@\d"):
+        plan_again(folder)
+    flip(folder.journals, channels.VHUB)
     (journal,) = journal_files(folder.journals, channels.VHUB)
     journal.rename(journal.with_suffix(".away"))
     code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")

@@ -16,6 +16,7 @@ import pytest
 from foosim.protocol.names import LINE_NAMES, TEAMS
 from foosim.protocol.units import parse_pace
 from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.verify import verify_capture
 from foosim.supervisor import control
 from foosim.supervisor.control import Control, RequestRefused
 from foosim.vhub.capture_reader import open_capture
@@ -145,16 +146,14 @@ def test_a_second_ctrl_c_kills_everything(house: House) -> None:
     assert house.processes_with(info.simulation) == {}
 
 
-@pytest.mark.parametrize("process", ["red", "player-blue"])
-def test_a_process_that_is_lost_ends_the_run_in_order_and_is_named(house: House, process: str) -> None:
-    up = house.up("--json", "--set", "nodes.red.required=true", players=process.startswith("player"))
+def test_a_required_node_that_is_lost_ends_the_run_in_order_and_is_named(house: House) -> None:
+    up = house.up("--json", "--set", "nodes.red.required=true")
     house.ticking(5)
-    house.kill(process)
+    house.kill("red")
     code, out, err = house.end(up)
     assert code == 1, err
-    assert process == "red" or f"{process} was killed by SIGKILL" in err
     content = last_json(out)
-    assert content["reason"] == f"lost {process}: its connection closed"
+    assert content["reason"] == "lost red: its connection closed"
     assert content["failed"]
     (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
     journals = {path.name for path in (run / "journals").iterdir()}
@@ -162,8 +161,53 @@ def test_a_process_that_is_lost_ends_the_run_in_order_and_is_named(house: House,
     capture = next((house.folder / "captures").iterdir())
     about = open_capture(capture).about
     assert about.finished
-    assert about.end["reason"] == f"lost {process}: its connection closed"
+    assert about.end["reason"] == "lost red: its connection closed"
     assert house.processes_with(str(house.folder)) == {}
+
+
+TRIPS = """
+from pathlib import Path
+
+from foosim.client.players import Team
+
+class Trips(Team):
+    def __init__(self, deployment, parameters):
+        super().__init__(deployment, {"team": "red"})
+        self.wire = Path(parameters["wire"])
+
+    def act(self, tick, samples):
+        if self.wire.exists():
+            raise LookupError("tripped")
+        return super().act(tick, samples)
+"""
+
+
+def test_a_player_that_is_killed_plays_again_and_one_that_raises_ends_the_run(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (house.folder / "own_trips.py").write_text(TRIPS)
+    monkeypatch.setenv("PYTHONPATH", str(house.folder))
+    wire = house.folder / "wire"
+    player = f"players.player-red.parameters={{team: red, wire: {wire}}}"
+    own = "--set", "players.player-red.class=own_trips:Trips", "--set", player
+    up = house.up("--json", "--pace", "fast", *own, players=True)
+    house.ticking(50)
+    house.kill("player-blue")
+    entry = house.wait_for("a player that is back", lambda: next(iter(house.ticking()["recoveries"]), None))
+    assert (entry["what"], entry["name"], entry["reason"]) == ("player", "player-blue", "its connection closed")
+    house.ticking(entry["tick"] + 50)
+    wire.touch()
+    code, out, err = house.end(up)
+    content = last_json(out)
+    raised = next(at for at, line in enumerate(TRIPS.splitlines(), 1) if "raise" in line)
+    place = f'({house.folder / "own_trips.py"}:{raised}: raise LookupError("tripped"))'
+    said, _, where = content["reason"].partition(": LookupError: tripped ")
+    assert (code, content["failed"], where) == (1, True, place), err
+    assert said.startswith("player-red failed at tick ") and content["reason"] in err
+    assert "player-blue was killed by SIGKILL" in err and "starts again in 0.5 s" in err
+    (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
+    assert "Traceback (most recent call last):" in (run / "logs" / "player-red.log").read_text()
+    assert verify_capture(house.folder / content["capture"]).equal
 
 
 def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House) -> None:
