@@ -31,7 +31,7 @@ def runs_of_losses(lost: list[bool]) -> list[int]:
 
 @pytest.mark.parametrize("percent", [0.1, 1.0, 10.0, 50.0, 99.0])
 def test_independent_loss_has_its_probability(proof: Proof, percent: float) -> None:
-    n = proof.size(50_000, 1_000_000)
+    n = proof.size(100_000, 1_000_000)
     count = sum(losses(f"loss: {percent} %", n, proof.seed))
     proof.likely("T1", f"independent loss of {percent:g} % (exact binomial)", binomial_p(count, n, percent / 100), n)
 
@@ -43,7 +43,7 @@ def test_independent_loss_has_its_cause() -> None:
 
 @pytest.mark.parametrize("by", ["size", "channel", "time of day", "time between packets", "the packet before"])
 def test_loss_is_independent(proof: Proof, by: str) -> None:
-    n, classes = proof.size(30_000, 600_000), 4
+    n, classes = proof.size(60_000, 600_000), 4
     fabric = fabric_of("loss: 10 %", proof.seed)
     drawn = [int(classes * u) for u in uniforms(n, proof.seed, by)]
     times = poisson_ns(n, 1000.0, proof.seed)
@@ -77,7 +77,7 @@ def chain_z(lost: list[bool], loss: float, eigenvalue: float) -> float:
 )
 def test_bursts_of_packets(proof: Proof, loss: float, burst: float) -> None:
     """The mean loss, the mean length of losses in a row, and the law of these: geometric."""
-    n = proof.size(50_000, 1_000_000)
+    n = proof.size(100_000, 1_000_000)
     lost = losses(f"burst: {{loss: {100 * loss:g} %, mean_burst: {burst:g}}}", n, proof.seed)
     r = 1 / burst
     p = r * loss / (1 - loss)
@@ -97,7 +97,7 @@ def test_bursts_of_packets(proof: Proof, loss: float, burst: float) -> None:
 
 def test_bursts_that_lose_a_part(proof: Proof) -> None:
     """In a bad state that loses 60 %, the mean loss and the mean losses in a row are still the configured ones."""
-    n, loss, burst, bad = proof.size(100_000, 1_000_000), 0.05, 1.8, 0.6
+    n, loss, burst, bad = proof.size(200_000, 1_000_000), 0.05, 1.8, 0.6
     settings = f"burst: {{loss: {100 * loss} %, mean_burst: {burst}, bad_loss: {100 * bad} %}}"
     lost = losses(settings, n, proof.seed)
     share, r = loss / bad, 1 - (1 - 1 / burst) / bad
@@ -113,7 +113,7 @@ def test_bursts_that_lose_a_part(proof: Proof) -> None:
 
 def test_the_expert_form_of_two_states(proof: Proof) -> None:
     """p, r, h, k of netem's gemodel: the mean loss, and losses in a row by L / (L - P2)."""
-    n, p, r, h, k = proof.size(100_000, 1_000_000), 0.02, 0.25, 0.3, 0.99
+    n, p, r, h, k = proof.size(200_000, 1_000_000), 0.02, 0.25, 0.3, 0.99
     settings = "gilbert_elliott: {p: 2 %, r: 25 %, h: 30 %, k: 99 %}"
     lost = losses(settings, n, proof.seed)
     bad, good_loss, bad_loss = p / (p + r), 1 - k, 1 - h
@@ -140,7 +140,7 @@ def stationary(steps: list[list[float]]) -> list[float]:
 
 def test_the_expert_form_of_four_states(proof: Proof) -> None:
     """States 1 good, 2 a delivery within a burst, 3 a burst, 4 a single loss; lost are 3 and 4."""
-    n = proof.size(100_000, 1_000_000)
+    n = proof.size(200_000, 1_000_000)
     p13, p31, p32, p23, p14 = 0.01, 0.2, 0.1, 0.4, 0.005
     settings = "markov4: {p13: 1 %, p31: 20 %, p32: 10 %, p23: 40 %, p14: 0.5 %}"
     steps: list[list[float]] = [
@@ -162,7 +162,7 @@ def test_the_expert_form_of_four_states(proof: Proof) -> None:
 
 def test_single_losses_beside_bursts_add_up(proof: Proof) -> None:
     """What a burst spares is lost independently: each has its own cause, and its own share."""
-    n = proof.size(50_000, 1_000_000)
+    n = proof.size(100_000, 1_000_000)
     settings = "loss: 5 %, gilbert_elliott: {p: 10 %, r: 50 %}"
     causes = Counter(flight.cause for flight in fates(fabric_of(settings, proof.seed), every(MS, n)))
     burst, spared = causes["burst_loss"], n - causes["burst_loss"]
@@ -173,7 +173,7 @@ def test_single_losses_beside_bursts_add_up(proof: Proof) -> None:
 
 
 def test_what_a_packet_draws_for_loss_is_uniform(proof: Proof) -> None:
-    n = proof.size(25_000, 1_000_000)
+    n = proof.size(50_000, 1_000_000)
     counts = [0] * 256
     for flight in fates(fabric_of("loss: 1 %", proof.seed), every(MS, n)):
         counts[flight.words[Slot.LOSS] >> 56] += 1

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.rows import PacketRow
+from tests.wire.test_run import assert_finished, last_json
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
 
 
 def test_a_partition_by_request_cuts_and_a_heal_joins_again(house: House) -> None:
-    up = house.up("--capture", "run.mcap", "--set", "engine=pure", players=True)
+    """A Ctrl-C then ends the run in order."""
+    up = house.up("--capture", "run.mcap", "--set", "engine=pure", "--json", players=True)
     house.ticking(50)
     code, out, err = house.ask("foosim-net", "partition", "player-red", "rest", "--json")
     assert code == 0, err
@@ -39,7 +41,10 @@ def test_a_partition_by_request_cuts_and_a_heal_joins_again(house: House) -> Non
     assert house.end(top)[0] == 0
 
     up.send_signal(signal.SIGINT)
-    assert house.end(up)[0] == 0
+    code, out, err = house.end(up)
+    assert code == 0, err
+    assert (last_json(out)["reason"], last_json(out)["failed"]) == ("stopped", False)
+    assert_finished(house, last_json(out))
     capture = open_capture(house.folder / "run.mcap")
     rows = [row for row in capture.rows("/packets") if isinstance(row, PacketRow)]
     lost = [row for row in rows if row.cause == "partition" and row.arrival_tick < 0]

@@ -115,18 +115,6 @@ def assert_nodes_that_do_not_fit_are_refused(house: House, address: str) -> None
     assert code == 3 and "protocol version 2, this is 1" in err
 
 
-def test_ctrl_c_ends_the_run_in_order(house: House) -> None:
-    up = house.up("--json")
-    house.ticking()
-    up.send_signal(signal.SIGINT)
-    code, out, err = house.end(up)
-    assert code == 0, err
-    content = last_json(out)
-    assert (content["reason"], content["failed"]) == ("stopped", False)
-    assert content["ticks"] >= 1
-    assert_finished(house, content)
-
-
 def test_ctrl_c_before_the_first_tick_ends_it_too(house: House) -> None:
     up = house.up("--set", "nodes.blue.launch=manual", "--json")
     house.read_until(up.stderr, "waiting for node blue")
