@@ -23,7 +23,6 @@ from foosim.protocol.hosts import places
 from foosim.protocol.messages import Origin
 from foosim.protocol.start import Start
 from foosim.protocol.units import Pace, parse_ns, parse_pace
-from foosim.supervisor.journal_check import check_journals
 from foosim.supervisor.resumable import check_resumable
 from foosim.supervisor.run_folder import Launch, RunFolder
 from foosim.vhub.branching import Branch, read_branch
@@ -209,6 +208,5 @@ def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
         raise Refused(f"run {folder.name} has no launcher that was lost: what was started by hand is so again")
     capture = Path(launch.capture) if launch.capture else None
     plan = make_plan(options_of(launch))
-    check_resumable(folder, plan.options.file, capture, has_hub_here=VHUB not in places(plan.deployment))
-    check_journals(folder, plan.options)
+    check_resumable(folder, plan.options, capture, has_hub_here=VHUB not in places(plan.deployment))
     return plan, capture

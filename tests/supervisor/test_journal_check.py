@@ -108,9 +108,8 @@ def test_a_journal_whose_only_record_is_damaged_is_said_to_have_none(folder: Run
     records = read_records(path)
     next(records)
     path.write_bytes(path.read_bytes()[: records.valid_bytes - 1])
-    assert refused(folder).startswith(f"run rehearsal cannot go on: {path}: its first record is damaged; foosim-")
-    with pytest.raises(Refused, match=r"no file of the journal of supervisor in .* has a whole record\. A new"):
-        check_journals(folder, RunOptions(TABLE))
+    what = f"no file of the journal of supervisor in {folder.journals} has a whole record"
+    assert refused(folder).startswith(f"run rehearsal cannot go on: {what}. A new run begins")
 
 
 def test_what_helps_is_said_where_there_is_no_capture(folder: RunFolder, tmp_path: Path) -> None:

@@ -139,7 +139,8 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
     with pytest.raises(Refused) as refused:
         plan_again(folder)
     assert problems[what] in str(refused.value), refused.value
-    assert f"foosim-supervisor up {TABLE}" in str(refused.value) and "begins a new run" in str(refused.value)
+    begins = "A new run begins with the last captured frame: " if what in ("supervisor", "vhub") else " begins a new run"
+    assert f"foosim-supervisor up {TABLE}" in str(refused.value) and begins in str(refused.value)
 
 
 def test_a_supervisor_goes_on_from_no_journal_that_has_nothing_and_from_none_that_is_damaged(left: Left) -> None:
