@@ -8,16 +8,20 @@ SEEDS ?= 100
 N ?=
 SEED ?= 17
 
+# Where Python is told to write no bytecode, each process compiles all of foosim when it starts: a third of its start.
+export PYTHONDONTWRITEBYTECODE :=
+
 # One worker more than cores, since tests of real processes wait for these; at most 8. The shell's PYTHONPATH (ROS sets
 # one) would load other people's pytest plugins.
 WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test play minutes swarm swarm-gate faults fuzz stats machines lint bench compiled clean environment
+.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats machines lint bench compiled clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
 	@echo 'make test    lint, type check and all tests (ARGS: options of pytest)'
+	@echo 'make slow    tests of processes on a machine made slow: each start takes 7 s longer, all cores are busy'
 	@echo 'make play    minutes of the table as deployed: goals, hand-overs; law 1 by further seeds'
 	@echo 'make minutes minutes of the table under a thousand faults each: no digest changes; takes hours (ARGS: -k NAME)'
 	@echo 'make swarm   runs under random faults, by seed (SEEDS=100; ARGS: --seed N, --json)'
@@ -66,7 +70,10 @@ swarm-gate: environment
 
 # Last in it is pytest, so that its summary ends the output.
 test: lint
-	@$(PYTEST) $(ARGS)
+	@$(PYTEST) --durations 20 $(ARGS)
+
+slow: environment
+	@$(PYTEST) --slow-start 7 --load $$(nproc) tests/wire $(ARGS)
 
 lint: environment
 	@$(PYTHON) -m ruff check .

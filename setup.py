@@ -66,12 +66,14 @@ COMPILED: Final = {
     "supervisor/arrivals": "each part of a frame that arrives",
     "supervisor/core": "the supervisor's tick: orders, parts, commits",
     "supervisor/pacing": "when the next tick may begin",
+    "vhub/ages": "how old a packet is when a client uses it, at each turn",
     "vhub/air": "who hears whom, for each radio packet",
     "vhub/budget": "the power that each radio packet is received with",
     "vhub/fabric": "finds the link of each packet",
     "vhub/geometry": "a line of sight against each surface",
     "vhub/jitter": "the delay of each packet",
     "vhub/links": "takes each packet through its stages",
+    "vhub/members": "a client's part of the vHub's state, at each tick",
     "vhub/numbers": "powers and decibels of each radio packet",
     "vhub/packet": "each packet on its way",
     "vhub/propagation": "what is between two radios, for each packet",
@@ -98,6 +100,7 @@ COMPILED: Final = {
     "vhub/state": "the vHub's memory: each packet, each delivery",
     "vhub/to_rows": "the row of each packet",
     "vhub/transit": "what is on its way, by its due tick",
+    "vhub/turns": "whose turn it is on a shared medium, for each radio packet",
     "vhub/world": "the world as a packet meets it, at each tick",
 }
 """Modules by path, each with what it does so often that it is compiled.

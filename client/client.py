@@ -49,6 +49,8 @@ _LOG: Final = logging.getLogger("foosim.client")
 _LOG.addHandler(logging.NullHandler())
 
 T = TypeVar("T")
+Turns = tuple[int, int, tuple[tuple[str, str], ...]]
+"""Period and offset in ticks, and at the arrival of what a client acts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +163,7 @@ class Link:
         self._wire = Wire(session, Plane.RADIO, self._inbox, core.name)
         self._loop = Loop(core, self._inbox, _LOG, lambda now_ns: max(now_ns, min(core.deadline_ns(), self._until_ns)))
         self._loop.connect(self._wire)
-        self._loop.on_alive = self._on_alive
+        self._loop.on_alive, self._loop.stood = self._on_alive, core.rest
         self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
 
     def be_present(self) -> None:
@@ -224,6 +226,8 @@ class Client:
         self._newest = Newest({})
         self._branch = link.core.branch
         self._period: int | None = None
+        self._turns: Turns = (0, 0, ())
+        """As it has joined."""
         self._commands: dict[str, Outgoing] = {}
         self._outgoing: deque[Outgoing] = deque()
 
@@ -258,16 +262,16 @@ class Client:
     def lockstep(self, rate_hz: float | Fraction | None = None) -> Iterator[int]:
         """Take part in lockstep: yield each of the client's ticks while the run waits, until the run ends.
 
-        `rate_hz` is a whole number of ticks; None is the rate that the deployment declares. The client joins when the
-        loop begins. What the loop's body sends leaves when the loop comes round or is left; a client that does not go
-        on holds the run, up to the deployment's deadline. Where a machine was lost with the run's last ticks, the run
-        goes on from before them: lower ticks come again, and the log says so. Raises BadValue for a rate, NotJoined,
-        ConnectionFailed, and PacketError when a tick's packets are too many for one answer.
+        `rate_hz` is a whole number of ticks; None is the rate, with its offset, that the deployment declares. The
+        client joins when the loop begins. What the loop's body sends leaves when the loop comes round or is left; a
+        client that does not go on holds the run, up to the deployment's deadline. Where a machine was lost with the
+        run's last ticks, the run goes on from before them: lower ticks come again, and the log says so. Raises BadValue
+        for a rate, NotJoined, ConnectionFailed, and PacketError when a tick's packets are too many for one answer.
         """
-        period = self._period_ticks(rate_hz)
-        if self._period is not None and self._period != period:
+        turns = self._turns_at(rate_hz)
+        if self._period is not None and self._turns != turns:
             raise NotJoined("lockstep at another rate, or after listen(): a client joins once")
-        return self._ticks(period)
+        return self._ticks(turns)
 
     def listen(self, subscriptions: Iterable[tuple[str, str]] = ()) -> None:
         """Take part without being waited for, and hear these (endpoint, channel) beside those of `subscribe`.
@@ -279,7 +283,7 @@ class Client:
             self.subscribe(source, channel)
         if self._period:
             raise NotJoined("listen() after lockstep(): a client joins once")
-        self._join(0)
+        self._join((0, 0, ()))
 
     # --- packets -----------------------------------------------------------------------------------------------------
 
@@ -337,10 +341,13 @@ class Client:
 
     # --- inside ------------------------------------------------------------------------------------------------------
 
-    def _period_ticks(self, rate_hz: float | Fraction | None) -> int:
+    def _turns_at(self, rate_hz: float | Fraction | None) -> Turns:
+        offset, arrivals = 0, list[tuple[str, str]]()
         if rate_hz is None:
             spec = self.deployment.clients.get(self.name) or self.deployment.players.get(self.name)
             rate_hz = None if spec is None else spec.rate_hz
+            offset = 0 if spec is None else spec.offset_ns // self.deployment.tick_ns
+            arrivals = self.deployment.arrivals_of(self.name)
         if rate_hz is None:
             raise BadValue(f"no rate for lockstep, and the deployment declares none for {self.name}", rate_hz)
         try:
@@ -350,12 +357,12 @@ class Client:
             raise BadValue("not a rate in Hz", rate_hz) from None
         if rate <= 0:
             raise BadValue("not a rate above 0 Hz", rate_hz)
-        return self.deployment.ticks(rate)
+        return self.deployment.ticks(rate), offset, tuple(arrivals)
 
-    def _ticks(self, period: int) -> Iterator[int]:
+    def _ticks(self, turns: Turns) -> Iterator[int]:
         core = self._core
         if self._period is None:
-            self._join(period)
+            self._join(turns)
         while True:
             self._link.wait(lambda: core.go is not None or core.ended, None)
             if core.go is None:
@@ -378,11 +385,13 @@ class Client:
         self._core.done(packets)
         self._link.perform()
 
-    def _join(self, period: int) -> None:
+    def _join(self, turns: Turns) -> None:
+        period, offset, arrivals = turns
+        self._subscriptions.update(arrivals)
         wanted = sorted(self._subscriptions)
         self._newest = Newest({pair: channel_kind(self.deployment, *pair) for pair in wanted})
-        self._core.join(period, wanted)
-        self._period = period
+        self._core.join(period, wanted, offset, arrivals)
+        self._period, self._turns = period, turns
         self._link.perform()
 
     def _command(self, robot: str, payload: bytes, channel: str) -> None:

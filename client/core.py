@@ -23,6 +23,7 @@ from foosim.client.packets import Outgoing, check_packet, check_subscription, sp
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
+from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
@@ -108,8 +109,10 @@ class ClientCore:
         """How often the vHub was gone. What one of before said to a hello of before is no answer."""
         self._unrecorded: deque[Sent] = deque()
         self._resend_ns = NEVER_NS
-        self._period = 0
-        self._sequence = 0
+        self._period = self._offset = 0
+        self._on_arrival = False
+        self._sequence = self.first_sequence = 0
+        """The number of its last packet; and of the last one of processes before it, whose place it takes."""
         self._downlink = 0
         self._gaps: set[int] = set()
         self._done = b""
@@ -184,6 +187,11 @@ class ClientCore:
         if self.is_away:
             self._again_ns = now_ns
 
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The client's own loop stood still for so long: the vHub could not come back to it (`standstill`)."""
+        if self._lost_ns != NEVER_NS and self.deployment is not None:
+            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self.deployment.deadlines.vhub_back_ns)
+
     def statistics(self) -> ClientStatistics:
         downlinks = self._downlinks, self._repeated, self._missing, self._malformed, self._overflowed
         packets = self._received, self._sent, self._answered, self._unsent
@@ -191,19 +199,30 @@ class ClientCore:
 
     # --- what the client does --------------------------------------------------------------------------------------
 
-    def join(self, period_ticks: int, subscriptions: Iterable[tuple[str, str]]) -> None:
+    def join(
+        self,
+        period_ticks: int,
+        subscriptions: Iterable[tuple[str, str]],
+        offset_ticks: int = 0,
+        arrivals: Iterable[tuple[str, str]] = (),
+    ) -> None:
         """Take part: in lockstep every `period_ticks`, or free-running with 0; hear these (endpoint, channel).
+
+        Its ticks are those that leave the remainder `offset_ticks`, which is below the period. With `arrivals`, which
+        are some of what it hears, they are those at which a packet of these arrives, or a period has passed.
 
         Raises UnknownName for an endpoint or a robot's channel that the deployment does not have.
         """
         assert self.deployment is not None and self.welcome is not None, "join before a welcome"
-        assert period_ticks >= 0, period_ticks
+        assert 0 <= offset_ticks < max(1, period_ticks), (offset_ticks, period_ticks)
         wanted = sorted(set(subscriptions))
         for source, channel in wanted:
             check_subscription(self.deployment, source, channel)
         items = [Subscription(source, channel) for source, channel in wanted]
-        self._join = encode(Join(self.name, self.boot, period_ticks, items))
-        self._period = period_ticks
+        calling = [Subscription(source, channel) for source, channel in sorted(set(arrivals))]
+        assert all(item in items for item in calling), (calling, items)
+        self._join = encode(Join(self.name, self.boot, period_ticks, items, offset_ticks, calling))
+        self._period, self._offset, self._on_arrival = period_ticks, offset_ticks, bool(calling)
         if not self.is_away:
             self._publish(self._join)
         self._again_after_ns = AGAIN_NS
@@ -247,6 +266,13 @@ class ClientCore:
         for part in split(sent, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part, self.branch)))
 
+    def fail(self, reason: str, trace: str = "") -> None:
+        """Say that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
+        if trace:
+            self.actions.append(Say("error", trace))
+        self.actions.append(Say("error", reason))
+        self._publish(encode(Failure(self.name, self.boot, reason)))
+
     # --- messages --------------------------------------------------------------------------------------------------
 
     def _on_welcome(self, welcome: ClientWelcome) -> None:
@@ -265,7 +291,7 @@ class ClientCore:
             return
         self.welcome = welcome
         self.deployment = deployment
-        self._sequence = welcome.sequence
+        self._sequence = self.first_sequence = welcome.sequence
         self._downlink = welcome.downlink
         self.branch = welcome.branch
 
@@ -354,8 +380,9 @@ class ClientCore:
             return
         if not self._is_new(go):
             return
-        if self._period == 0 or go.tick % self._period != 0:
-            raise Malformed(f"Go for tick {go.tick} to a client with a period of {self._period} ticks")
+        if self._period == 0 or (not self._on_arrival and go.tick % self._period != self._offset):
+            timing = f"a period of {self._period} ticks and an offset of {self._offset}"
+            raise Malformed(f"Go for tick {go.tick} to a client with {timing}")
         if go.tick <= self.tick or self.ended:
             self._repeated += 1
             return

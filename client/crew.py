@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from foosim.client.core import ClientCore
+from foosim.client.errors import PlayerError
+from foosim.client.failing import tell_failure
 from foosim.client.player import PlayerFactory, PlayerLoop, load_player
 from foosim.protocol.actions import Action, Say
 from foosim.protocol.channels import Channel
@@ -44,11 +46,16 @@ class Crew:
         self._stirred = dict(self._players)
 
     def step(self, now_ns: int) -> None:
-        """Let those act whose turn it is. Raises PlayerError for the first one that fails."""
+        """Let those act whose turn it is. Raises PlayerError for the first one that fails; the vHub is told why."""
         stirred, self._stirred = self._stirred, {}
         for player in stirred.values():
-            player.step(now_ns)
-            self._speak(player.core)
+            try:
+                player.step(now_ns)
+            except PlayerError as error:
+                tell_failure(player.core, error)
+                raise
+            finally:
+                self._speak(player.core)
 
     def _speak(self, core: ClientCore) -> None:
         """Take what a core has to say; of several, a line for people says whose it is."""
@@ -66,6 +73,11 @@ class Crew:
         for core in self.cores:
             (core.hub_here if is_alive else core.hub_gone)(now_ns)
         self._stirred = dict(self._players)
+
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The loop of all of them stood still for so long."""
+        for core in self.cores:
+            core.rest(stood_ns, now_ns)
 
     def deadline_ns(self) -> int:
         """When `wake` has something to do next, or somebody acts."""

@@ -19,6 +19,7 @@ import typer
 
 from foosim.client.core import ClientCore
 from foosim.client.crew import Crew
+from foosim.client.errors import PlayerError
 from foosim.protocol import channels, identity, limits
 from foosim.protocol.admission import Admission
 from foosim.protocol.certificates import Credentials, load_credentials, warn_of_end
@@ -61,14 +62,18 @@ class PlayerProcess:
         self._loop.connect(self._absent[0])
         self._loop.show_progress(progress)
         self._loop.turn = self._turn
-        self._loop.on_alive = self._on_alive
+        self._loop.on_alive, self._loop.stood = self._on_alive, self.crew.rest
         for wire in self._absent:  # who is alone waits for its downlinks itself; of several queues nobody can
             wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS if len(names) == 1 else ())
         self._absent[0].watch_alive(VHUB)
 
     def run(self) -> int:
-        """Take part until the end; return the exit code."""
-        self._loop.run(lambda: self.stopped or self.crew.is_over)
+        """Take part until the end; return the exit code. Raises PlayerError for a player that fails."""
+        try:
+            self._loop.run(lambda: self.stopped or self.crew.is_over)
+        except PlayerError:
+            self._loop.perform()  # the vHub is told, and the log has where
+            raise
         code = self.crew.leave()
         self._loop.perform()
         return code

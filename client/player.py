@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple, Protocol, cast
 
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PacketError, PlayerError, UnknownName
+from foosim.client.failing import Unanswered, describe, failed
 from foosim.client.packets import Outgoing, check_packet
 from foosim.client.payloads import Command, Drive, Value, channel_kind, command_channel, decode_payload, encode_command
 from foosim.protocol.deployment import Deployment
@@ -80,7 +81,7 @@ def load_player(path: str) -> PlayerFactory:
         missing = "" if error.name == module_name else f" (it imports {error.name})"
         raise PlayerError(f"player {path}: there is no module {error.name}{missing}") from error
     except Exception as error:
-        raise PlayerError(f"player {path}: importing {module_name} failed: {_describe(error)}") from error
+        raise PlayerError(f"player {path}: importing {module_name} failed: {describe(error)}") from error
     made: Any = getattr(module, class_name, None)
     if made is None:
         classes = [name for name, value in vars(module).items() if inspect.isclass(value) and hasattr(value, "act")]
@@ -179,7 +180,8 @@ class PlayerLoop:
         wanted = deployment.heard_by(name)
         self.newest = Newest({pair: channel_kind(deployment, *pair) for pair in wanted})
         if declared.lockstep:
-            self.core.join(deployment.ticks(declared.rate_hz), wanted)
+            period, offset = deployment.turns(declared)
+            self.core.join(period, wanted, offset, deployment.arrivals_of(name))
         else:
             self.core.join(0, wanted)
             self._period_ns = int(NS_PER_S / declared.rate_hz)
@@ -189,15 +191,16 @@ class PlayerLoop:
         """Make the player that is declared."""
         declared = self._declaration
         assert declared is not None
+        factory = self._load(declared.class_)
         try:
-            return self._load(declared.class_)(deployment, declared.parameters)
-        except PlayerError:
-            raise
+            return factory(deployment, declared.parameters)
         except Refused as error:
             raise PlayerError(f"player {self.core.name}: {error}") from error
-        except Exception as error:
-            what = f"{declared.class_} cannot be made: {_describe(error)}"
-            raise PlayerError(f"player {self.core.name}: {what}") from error
+        except (KeyboardInterrupt, Unanswered):
+            raise
+        except BaseException as error:
+            when = f"at tick {self.core.tick}" if self.core.tick >= 0 else "before its first tick"
+            raise failed(f"{self.core.name} failed {when}", error, _module_of(declared)) from error
 
     def _say(self, tick: int, now_ns: int) -> None:
         """Have the player act, and say it."""
@@ -208,16 +211,18 @@ class PlayerLoop:
             else:
                 core.send(packets, now_ns)
         except PacketError as error:
-            raise PlayerError(f"player {core.name} at tick {tick}: {error}") from error
+            raise PlayerError(f"{core.name} failed at tick {tick}: {error}") from error
 
     def _act(self, tick: int) -> list[Outgoing]:
         """Ask the player, and check what it says and commands; commands are last, in the robots' name order."""
-        assert self._player is not None
-        where = f"player {self.core.name} at tick {tick}"
+        assert self._player is not None and self._declaration is not None
+        where = f"{self.core.name} failed at tick {tick}"
         try:
             turn = self._player.act(tick, self.newest.samples)
-        except Exception as error:
-            raise PlayerError(f"{where}: act failed: {_describe(error)}") from error
+        except (KeyboardInterrupt, Unanswered):
+            raise
+        except BaseException as error:  # SystemExit, too: whatever it is, the run cannot go on without the player
+            raise failed(where, error, _module_of(self._declaration)) from error
         if not isinstance(turn, Turn):
             turn = Turn(turn)
         return [*self._packets(turn.packets, where), *self._commands(turn.commands, where)]
@@ -265,6 +270,6 @@ def _by_name(item: tuple[object, object]) -> str:
     return str(item[0])
 
 
-def _describe(error: Exception) -> str:
-    """An error of somebody's own code on one line."""
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+def _module_of(declaration: Declaration) -> str:
+    """The module of a player's class."""
+    return declaration.class_.partition(":")[0]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -44,6 +45,79 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-pki": pki_app,
     "foosim-doctor": doctor_app,
 }
+DEADLINES: Final[Mapping[str, tuple[str, str]]] = {
+    "heartbeat": ("supervisor", "a word of a node or the vHub; one that is silent for longer is lost"),
+    "tick_named": ("supervisor", "the parts or deliveries of a tick; the log names who is waited for"),
+    "tick_lost": ("supervisor", "the same; who is waited for is lost"),
+    "lockstep_fast": ("vHub", "a lockstep client's answer, in `fast`; then the client is lost"),
+    "lockstep_realtime": (
+        "vHub",
+        "the same at any other pace; it is longer than a connection takes to close, so that a cut is no silence",
+    ),
+    "start": (
+        "supervisor, `up`",
+        "processes and players of a run that is started or resumed; until its first commit nothing else counts",
+    ),
+    "orphan": ("nodes, vHub", "a supervisor that is gone; then they end, and the run can be resumed"),
+    "vhub_back": ("supervisor, clients", "a vHub that is gone; then the run ends, or the client does"),
+    "client_back": (
+        "vHub",
+        "a client whose connection has closed; then it is lost, unless the time for its answer ends later",
+    ),
+    "close": ("supervisor", "progress of the vHub in closing its capture; then the capture is cut off"),
+}
+"""Who waits how long for what: the deadlines of a deployment."""
+CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
+    ("protocol.session_settings", "LEASE_MS"): ("every process", "a word on a connection; then it is closed"),
+    ("protocol.session_settings", "BLOCK_US"): (
+        "every process",
+        "a reader that takes nothing; its connection is closed",
+    ),
+    ("protocol.standstill", "STOOD_NS"): ("every process", "its own loop; what is longer is its own standstill"),
+    ("protocol.standstill", "TOLD_NS"): (
+        "supervisor, vHub",
+        "their own loop; one that stood still for longer says so, and takes no closed connection for a loss",
+    ),
+    ("protocol.orphan", "UNKNOWN_NS"): ("nodes, vHub", "a supervisor that went before it told the deployment"),
+    ("supervisor.watch", "DOUBT_NS"): (
+        "supervisor",
+        "connections that close behind a standstill of its own: their processes have `heartbeat` to be heard again",
+    ),
+    ("supervisor.watch", "CUT_SEEN_NS"): (
+        "supervisor",
+        "the end of the vHub's connection, before nodes are lost whose samples it lacks though they have sent them",
+    ),
+    ("supervisor.absence", "SAID_NS"): ("supervisor", "what a process said before its connection closed"),
+    ("supervisor.closing", "GONE_NS"): ("supervisor", "the last word of a vHub that ends while it closes its capture"),
+    ("supervisor.take_over", "REJOIN_NS"): (
+        "supervisor",
+        "nodes that have to find one that was started again, beside `heartbeat`; then it goes on without them",
+    ),
+    ("supervisor.liveness", "QUESTION_S"): (
+        "`up`",
+        "the supervisor's answer; after five in a row that do not come it is killed, and started again",
+    ),
+    ("supervisor.liveness", "STALLED_S"): ("`up`", "a lost process that lives to be taken back; then it is killed"),
+    ("supervisor.liveness", "CUT_OFF_S"): ("`up`", "the same on another machine"),
+    ("supervisor.liveness", "LOOK_S_MAX"): ("`up`", "its own loop; what is longer is its own standstill"),
+    ("supervisor.restarts", "WAITS_S"): ("`up`", "before a process that ended is started again, once more each time"),
+    ("supervisor.restarts", "AWAY_S"): ("`up`", "the same where the machine could not be reached"),
+    ("supervisor.restarts", "WINDOW_S"): ("`up`", "in which as many ends and one more give a process up"),
+    ("supervisor.up", "LOST_S"): ("`up`", "the supervisor to notice that a process has ended; then the run is ended"),
+    ("supervisor.up", "END_S"): ("`up`", "a supervisor that was told to end and does not answer; then all are ended"),
+    ("supervisor.up", "LEAVE_S"): ("`up`", "the others to end once the supervisor has; then they are ended"),
+    ("supervisor.up", "AWAY_S"): ("`up`", "the same on other machines"),
+    ("supervisor.children", "GRACE_S"): ("`up`, `foosim-guard`", "a process that was told to end; then it is killed"),
+    ("supervisor.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the guard of the process before to end"),
+    ("supervisor.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
+    ("supervisor.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),
+    ("vhub.main", "CONNECT_S"): ("vHub", "a supervisor to connect to; then it fails"),
+    ("node.main", "CONNECT_S"): ("nodes", "the same"),
+    ("client.main", "CONNECT_S"): ("players", "a vHub to connect to; then they fail"),
+    ("client.client", "CONNECT_S"): ("`connect` in a program", "the same, unless it says another time"),
+    ("protocol.admission", "ADMISSION_NS"): ("every process", "with certificates, to be let in; then the log says so"),
+}
+"""The same of what no deployment sets: constants, whose names end with their units."""
 _PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
 
 
@@ -186,6 +260,27 @@ def write_limits() -> Iterator[str]:
             yield f"| `{name}` | {'2^63 - 1' if value == limits.COUNTER_MAX else f'{value:,}'} |\n"
 
 
+def write_deadlines() -> Iterator[str]:
+    """Yield all that guards against a slow machine: the deployment's deadlines, then those that are constants."""
+    keys = deployment_schema()["$defs"]["Deadlines"]["properties"]
+    assert keys.keys() == DEADLINES.keys(), f"who waits how long for what? {sorted(keys.keys() ^ DEADLINES.keys())}"
+    yield "| deadline | time | who waits | for what, and what follows |\n|---|---|---|---|\n"
+    for key, (who, what) in DEADLINES.items():
+        yield f"| `{key}` | `{keys[key]['default']}` | {who} | {what} |\n"
+    for (module, name), (who, what) in CONSTANTS.items():
+        yield f"| `{module.replace('.', '/')}.py:{name}` | {_time(module, name)} | {who} | {what} |\n"
+
+
+def _time(module: str, name: str) -> str:
+    """Return the value of a constant whose name ends with its unit."""
+    value = getattr(import_module(f"foosim.{module}"), name)
+    unit = name.removesuffix("_MAX").rpartition("_")[2]
+    seconds = [
+        each / {"S": 1, "MS": 1e3, "US": 1e6, "NS": 1e9}[unit] for each in (value if type(value) is tuple else [value])
+    ]
+    return ", ".join(f"{each:g}" for each in seconds) + " s"
+
+
 def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|")
 
@@ -197,6 +292,7 @@ WRITERS: Final[Mapping[str, Callable[[], Iterator[str]]]] = {
     "channels": write_channels,
     "rows": write_rows,
     "limits": write_limits,
+    "deadlines": write_deadlines,
 }
 
 

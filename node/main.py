@@ -63,7 +63,7 @@ class NodeProcess:
         self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.lacking = lambda: self.core.lacking
-        self._loop.on_alive = self._on_alive
+        self._loop.on_alive, self._loop.stood = self._on_alive, self._orphan.rest
         self._wire.read(channels.NODE_READS, channels.NODE_WAITS)
         self._wire.watch_alive(SUPERVISOR)
 

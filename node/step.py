@@ -17,7 +17,7 @@ from foosim.node.engines.interface import Engine
 from foosim.node.sensors import Sensor, make_sensor, sample_all
 from foosim.node.world import world_of
 from foosim.protocol import limits
-from foosim.protocol.deployment import Deployment, period_ticks
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment import Sensor as SensorSpec
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
@@ -50,12 +50,12 @@ class Stepper:
         self.layout = layout
         self.world = world_of(deployment, layout)
         self.substeps = deployment.substeps
-        self._sensors: dict[str, list[tuple[str, int, int, Sensor]]] = {}
+        self._sensors: dict[str, list[tuple[str, tuple[int, int], int, Sensor]]] = {}
         for robot in layout.robots:
             self._sensors[robot.name] = [
                 (
                     channel,
-                    period_ticks(settings.rate_hz, deployment.tick_ns),
+                    deployment.turns(settings),
                     robot.offsets[f"sampled.{channel}"],
                     make_sensor(settings, deployment, layout, robot, channel),
                 )
@@ -69,7 +69,10 @@ class Stepper:
         counters: list[int] = []
         tick, outboxes = frame.tick, frame.outboxes
         awake = [robot for robot in robots if frame.numbers[robot.offsets["down"]] == 0.0]
-        due = {robot.name: [sensor for sensor in self._sensors[robot.name] if tick % sensor[1] == 0] for robot in awake}
+        due = {
+            robot.name: [sensor for sensor in self._sensors[robot.name] if tick % sensor[1][0] == sensor[1][1]]
+            for robot in awake
+        }
         payloads = iter(sample_all([sensor[3] for sensors in due.values() for sensor in sensors], frame.numbers, tick))
         for robot in awake:
             sends: list[tuple[str, str, bytes]] = []

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, get_args
 
-from foosim.protocol import asset_messages, hub_messages, limits, messages, replay_messages
+from foosim.protocol import asset_messages, client_messages, hub_messages, limits, messages, replay_messages
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import Malformed
 
@@ -113,7 +113,8 @@ ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named 
 CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
 CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
-UP: Final = _radio("up", messages.Join | messages.Up | messages.Done, "client", "vhub", "the client's rate")
+_SAID: Final = messages.Join | messages.Up | messages.Done | client_messages.Failure
+UP: Final = _radio("up", _SAID, "client", "vhub", "the client's rate")
 DOWN: Final = _radio("down", messages.Go | messages.Down | messages.Heard, "vhub", "the named one", "the client's rate")
 
 PLAYED: Final = _replay("played", replay_messages.Played, "replay", "operator", "as captured")

@@ -61,5 +61,8 @@ def run_app(app: typer.Typer, name: str) -> None:
     except Refused as refused:
         print(str(refused), file=sys.stderr)
         sys.exit(refused.exit_code)
+    except MemoryError:
+        print(f"{name}: too little memory (MemoryError)", file=sys.stderr)
+        sys.exit(FAILED)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)

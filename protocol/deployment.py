@@ -22,7 +22,7 @@ from foosim.protocol.hosts import Host, Listen, Name, Placed
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.names import LineName, Team
 from foosim.protocol.network import LinkRule, Network, Selector
-from foosim.protocol.rovers import RoverRobot, RoverSensor, StationRobot
+from foosim.protocol.rovers import Offset, RoverRobot, RoverSensor, StationRobot
 from foosim.protocol.scene import Shape
 from foosim.protocol.scenery import (
     SCENERY_MAX,
@@ -66,6 +66,7 @@ class RodSensor(Part):
 
     kind: Literal["encoder"]
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     position_noise: LengthNoise
     angle_noise: AngleNoise
 
@@ -75,6 +76,7 @@ class BallSensor(Part):
 
     kind: Literal["ball"]
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     noise: LengthNoise
 
 
@@ -113,14 +115,20 @@ class Player(Placed):
 
     It may command its `robots` and hears their channels, and those of others that `hears` selects. One that is `on` a
     robot is on board of it: its packets leave from and come to where the robot is. Players that name the same `process`
-    share one; else each has its own.
+    share one; else each has its own. One that acts at `arrival` is called at each tick at which a packet arrives of
+    what `arrivals` selects, and when it has not been called for the period of its rate.
     """
 
     class_: ClassPath = Field(alias="class")
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     lockstep: bool = True
+    act: Literal["period", "arrival"] = "period"
+    arrivals: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     on: RobotName | None = None
     process: Name | None = None
+    restart: bool = True
+    """Whether its process is started again when a signal has ended it, or it was lost with its machine."""
     robots: dict[RobotName, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     hears: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
@@ -139,6 +147,7 @@ class ClientSpec(Part):
     on: RobotName | None = None
     lockstep: bool = False
     rate_hz: Rate | None = Field(default=None, alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
 
 
 class Capture(Part):
@@ -180,12 +189,13 @@ class Deadlines(Part):
     tick_named_ns: Deadline = _default("500 ms", "tick_named")
     tick_lost_ns: Deadline = _default("1 s", "tick_lost")
     lockstep_fast_ns: Deadline = _default("10 s", "lockstep_fast")
-    lockstep_realtime_ns: Deadline = _default("1 s", "lockstep_realtime")
+    lockstep_realtime_ns: Deadline = _default("2 s", "lockstep_realtime")
     start_ns: Deadline = _default("60 s", "start")
     orphan_ns: Deadline = _default("30 s", "orphan")
     """Nodes and vHub end when their supervisor has been gone for so long."""
     vhub_back_ns: Deadline = _default("30 s", "vhub_back")
     client_back_ns: Deadline = _default("2 s", "client_back")
+    close_ns: Deadline = _default("30 s", "close")
 
 
 def _int_only(value: object) -> object:
@@ -304,6 +314,18 @@ class Deployment(Part):
                     heard.update((other, channel) for channel in channels if self._has(other, channel))
         return sorted(heard)
 
+    def arrivals_of(self, name: str) -> list[tuple[str, str]]:
+        """The (endpoint, channel) at the arrival of whose packets a player acts, sorted; none for one by period."""
+        player = self.players.get(name)
+        if player is None or player.act != "arrival":
+            return []
+        chosen = player.arrivals.items()
+        return [
+            (source, channel)
+            for source, channel in self.heard_by(name)
+            if any(channel in channels and fnmatchcase(source, glob) for glob, channels in chosen)
+        ]
+
     def _has(self, endpoint: str, channel: str) -> bool:
         """Whether an endpoint may say something on a channel: players and clients on any, robots on their own."""
         robot = self.robots.get(endpoint)
@@ -317,6 +339,10 @@ class Deployment(Part):
     def ticks(self, rate_hz: Fraction) -> int:
         """The period of a rate in ticks of this deployment."""
         return period_ticks(rate_hz, self.tick_ns)
+
+    def turns(self, timed: Sensor | Player) -> tuple[int, int]:
+        """Period and offset, in ticks, of a sensor or of a player in lockstep: its ticks are offset + n periods."""
+        return self.ticks(timed.rate_hz), timed.offset_ns // self.tick_ns
 
 
 def deployment_schema() -> dict[str, Any]:

@@ -28,6 +28,7 @@ from foosim.protocol.radio_references import place_findings, rule_findings
 from foosim.protocol.references import Finding, check_references, path_text
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.settings import place_sets
+from foosim.protocol.timing_references import check_timing
 from foosim.protocol.yaml_tree import (
     DEPTH_MAX,
     NODES_MAX,
@@ -182,7 +183,8 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
     found = list(problems)
     if tree is not None:
         data = plain(tree)
-        findings = list(islice(chain(check_references(data), check_network(data)), PROBLEMS_MAX + 1))
+        found_first = chain(check_references(data), check_timing(data), check_network(data))
+        findings = list(islice(found_first, PROBLEMS_MAX + 1))
         try:
             deployment = Deployment.model_validate(data)
         except ValidationError as error:

@@ -1,9 +1,9 @@
 """Journals: append-only files of framed records, which a process writes before it speaks.
 
-One record is one `write`: its length, a CRC of length and payload, the payload. A killed process loses nothing that
-was appended; a dead machine at most what `fdatasync`, called each second in a thread, had not reached. A file starts
-with a signature, then with the record that its writer gives as head, so that older files can go. `flock` keeps a second
-writer out. What a record means is its writer's matter: `vhub.records`, `supervisor.records`.
+One record is one `write`. A killed process loses nothing that was appended; a dead machine at most what `fdatasync`,
+called each second in a thread, had not reached. The first record of a file is what its writer gives as head, so that
+older files can go. `flock` keeps a second writer out. What a record means is its writer's matter: `vhub.records`,
+`supervisor.records`. Neighbours: `journal_format` (the bytes, and where a journal ends).
 
 When a file is full, `append` does not turn to the next one by itself: the head holds the writer's state, which is the
 state after the last appended record only when nothing that was decided still waits to be appended. The shell knows
@@ -15,27 +15,50 @@ from __future__ import annotations
 import fcntl
 import os
 import re
-import struct
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
-from zlib import crc32
 
 from foosim.protocol import limits
 from foosim.protocol.errors import Failed
+from foosim.protocol.journal_format import (
+    FRAMING_BYTES,
+    HEAD_BYTES,
+    SIGNATURE,
+    Head,
+    Place,
+    Whole,
+    is_damage,
+    machine_hash,
+    pack_record,
+    record_bytes,
+    whole_record,
+    whole_records,
+)
+from foosim.protocol.process import machine_start
 
-SIGNATURE: Final = b"foosim journal 1\n"
-_FRAMING: Final = struct.Struct("<II")
-_LENGTH: Final = struct.Struct("<I")
 _SERIAL: Final = re.compile(r"(\d{6,})\.journal")
 
 
 class JournalError(Failed):
     """A journal cannot be written or read: the file, and what is wrong with it."""
+
+
+class JournalDamaged(JournalError):
+    """A record is bad that was whole once: the file, the byte, and how many whole records of the file are before it.
+
+    No run goes on from such a journal.
+    """
+
+    exit_code = 3
+
+    def __init__(self, what: str, path: Path, byte: int, records: int) -> None:
+        super().__init__(what)
+        self.path, self.byte, self.records = path, byte, records
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,48 +92,75 @@ def _numbered(folder: Path, stem: str) -> list[tuple[int, Path]]:
 
 
 class Records(Iterator[bytes]):
-    """The records of one file, in order, up to the first that is torn or corrupt.
+    """The records of one file, in order, up to the end of the file or of the journal.
 
-    After the last one `left_bytes` is how many bytes of the file are no record: 0 in a whole file.
+    After the last one `left_bytes` is how many bytes of the file are no record: 0 in a whole file. Raises
+    JournalDamaged at a record that is bad though it was whole once.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.count = 0
+        """How many records were read."""
+        self.head: Head | None = None
+        """None where the file's beginning never came to the disk."""
         try:
             with path.open("rb") as file:
                 self._size = os.fstat(file.fileno()).st_size
-                start = file.read(len(SIGNATURE))
+                start = file.read(HEAD_BYTES)
         except OSError as error:
             raise JournalError(f"{path}: cannot be read, {error.strerror}") from None
-        if not SIGNATURE.startswith(start):
-            raise JournalError(f"{path}: no journal of this version, its first bytes are {start!r}, not {SIGNATURE!r}")
-        self.valid_bytes = len(SIGNATURE) if start == SIGNATURE else 0
+        if len(start) == HEAD_BYTES and start.startswith(SIGNATURE):
+            self.head = Head.unpack(start)
+            if self.head is None:
+                raise JournalDamaged(f"{path}: byte {len(SIGNATURE)}: the head of the file is damaged", path, 0, 0)
+        elif any(start) and not SIGNATURE.startswith(start[: len(SIGNATURE)]):
+            shown = start[: len(SIGNATURE)]
+            raise JournalError(f"{path}: no journal of this version, its first bytes are {shown!r}, not {SIGNATURE!r}")
+        self.valid_bytes = 0 if self.head is None else HEAD_BYTES
         """Where the next record starts."""
-        self._records = self._read() if self.valid_bytes else iter(())
+        self._records = iter(()) if self.head is None else self._read(self.head)
 
     @property
     def left_bytes(self) -> int:
         return self._size - self.valid_bytes
 
+    @property
+    def same_machine(self) -> bool:
+        """Whether the machine was not started since the journal was opened: then the disk has lost nothing."""
+        return self.head is not None and any(self.head.machine) and self.head.machine == machine_hash(machine_start())
+
     def __next__(self) -> bytes:
         return next(self._records)
 
-    def _read(self) -> Iterator[bytes]:
+    def behind(self, at: int) -> Iterator[Whole]:
+        """Yield the whole records from a byte on, wherever they stand."""
+        return iter(()) if self.head is None else whole_records(self.head, self.path.read_bytes(), at)
+
+    def damaged(self, following: int) -> JournalDamaged:
+        """Return what to raise when so many whole records say that the one where reading ended was whole."""
+        behind = f"{following} whole record{'s' if following > 1 else ''}"
+        text = f"{self.path}: byte {self.valid_bytes}: record {self.count + 1} is damaged, {behind} behind it"
+        return JournalDamaged(text, self.path, self.valid_bytes, self.count)
+
+    def _read(self, head: Head) -> Iterator[bytes]:
         """Yield whole records; a length beyond the file's end is never allocated."""
         with self.path.open("rb") as file:
             file.seek(self.valid_bytes)
-            while self.left_bytes >= _FRAMING.size:
-                framing = file.read(_FRAMING.size)
-                if len(framing) < _FRAMING.size:
-                    return
-                length, checksum = _FRAMING.unpack(framing)
-                if length > self.left_bytes - _FRAMING.size:
-                    return
-                payload = file.read(length)
-                if _checksum(payload) != checksum:
-                    return
-                self.valid_bytes += _FRAMING.size + length
-                yield payload
+            while self.left_bytes:
+                content = file.read(FRAMING_BYTES)
+                content += file.read(min(record_bytes(content), self.left_bytes - len(content)))
+                whole = whole_record(head, content, self.valid_bytes, self.valid_bytes)
+                if whole is None:
+                    break
+                self.valid_bytes += whole.stop
+                self.count += 1
+                yield content[whole.start : whole.stop]
+        if self.left_bytes:
+            bad = head.serial, self.valid_bytes
+            following = is_damage(self.same_machine, bad, self.behind(self.valid_bytes))
+            if following:
+                raise self.damaged(following)
 
 
 def read_records(path: Path) -> Records:
@@ -119,9 +169,27 @@ def read_records(path: Path) -> Records:
 
 
 def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
-    """Yield the records of all files of a journal, in order; each file but the first starts with its head again."""
-    for path in journal_files(folder, stem):
-        yield from read_records(path)
+    """Yield the records of all files of a journal, in order; each file but the first starts with its head again.
+
+    Behind a torn end comes what was written when the journal was opened again. Raises JournalDamaged.
+    """
+    opening = b""
+    torn: tuple[int, Records] | None = None
+    """The first file of that opening that has no end, and its number."""
+    for serial, path in _numbered(folder, stem):
+        records = read_records(path)
+        head = records.head
+        if head is not None and head.opening != opening:
+            opening, torn = head.opening, None
+        elif head is not None and torn is not None:
+            bad = torn[0], torn[1].valid_bytes
+            following = is_damage(records.same_machine, bad, records.behind(HEAD_BYTES))
+            if following:
+                raise torn[1].damaged(following)
+            continue
+        yield from records
+        if head is None or records.left_bytes:
+            torn = torn or (serial, records)
 
 
 def read_newest(folder: Path, stem: str) -> Iterator[bytes]:
@@ -135,9 +203,14 @@ def read_newest(folder: Path, stem: str) -> Iterator[bytes]:
             return
 
 
-def _checksum(payload: bytes) -> int:
-    """CRC of length and payload: a run of zeros, as some file systems leave after a crash, is no record."""
-    return crc32(payload, crc32(_LENGTH.pack(len(payload))))
+def read_whole(records: Iterable[bytes]) -> tuple[list[bytes], JournalDamaged | None]:
+    """Return the records up to one that is damaged, and what is to say of that; None when none is."""
+    whole: list[bytes] = []
+    try:
+        whole.extend(records)
+    except JournalDamaged as damaged:
+        return whole, damaged
+    return whole, None
 
 
 def lock_journal(folder: Path, stem: str) -> int:
@@ -188,6 +261,10 @@ class Journal:
         self._retired: list[int] = []
         self._dirty = self._folder_dirty = False
         self._file = self._size = 0
+        self._opening, self._machine = os.urandom(8), machine_hash(machine_start())
+        self._written: Place = (self._serial + 1, 0)
+        self._synced: Place = self._written
+        """Up to where the journal is written, and up to where that is known to be on the disk."""
         self._begin_file()
         self._stop = threading.Event()
         self._syncer = threading.Thread(target=self._sync_each_interval, name=f"sync-{stem}", daemon=True)
@@ -203,8 +280,8 @@ class Journal:
             most = f"a file of it has {limits.JOURNAL_BYTES_MAX} at most"
             self._error = JournalError(f"{self.path}: cannot be written, a record has {len(record)} bytes, {most}")
             raise self._error
-        framing = _FRAMING.pack(len(record), _checksum(record))
-        self._write(framing + record if self._size else SIGNATURE + framing + record)
+        start = b"" if self._size else self._head.pack()
+        self._write(start + pack_record(self._head, self._size + len(start), self._synced, record))
         self._records += 1
 
     def rotate_if_full(self, head: Callable[[], bytes], tick: int) -> bool:
@@ -292,6 +369,8 @@ class Journal:
             self._file = file
             self._folder_dirty = True
         self._size = 0
+        self._head = Head(self._opening, self._machine, self._serial)
+        self._written = self._serial, 0
 
     def _write(self, content: bytes) -> None:
         """Append by one `write`, more of them only when a disk that gets full takes a part; that part is cut off."""
@@ -306,7 +385,8 @@ class Journal:
             raise failure from None
         self._size += written
         self._bytes += written
-        self._dirty = True
+        self._dirty = True  # before the syncing thread can see how far it is
+        self._written = self._serial, self._size
 
     def _failed(self, what: str, error: OSError) -> JournalError:
         failure = JournalError(f"{self.path}: {what}, {error.strerror}")
@@ -321,6 +401,7 @@ class Journal:
 
     def _sync(self) -> None:
         """Bring to the disk what was written, and the names of new files; files that are full are let go of."""
+        written = self._written
         with self._mutex:
             retired, self._retired = self._retired, []
             dirty = retired if not self._dirty or self._file in retired else [*retired, self._file]
@@ -331,6 +412,7 @@ class Journal:
                 os.fdatasync(file)
             if folder_dirty:
                 self._sync_folder()
+            self._synced = written
         except OSError as error:
             self._failed("cannot be synced", error)
         for file in retired:

@@ -21,6 +21,7 @@ from foosim.protocol.journal import JournalError
 from foosim.protocol.notify import Notify
 from foosim.protocol.progress import EVERY_NS, ProgressFile
 from foosim.protocol.session import Publisher, Session
+from foosim.protocol.standstill import Standstill
 
 BUSY_WINDOW_NS: Final = 1_000_000_000
 NS_PER_S: Final = 1_000_000_000
@@ -140,6 +141,8 @@ class Loop:
         """Says which messages are not to be said."""
         self.took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
         """Told how long a turn took, with all that was performed: when it began, when the loop slept again."""
+        self.stood: Callable[[int, int], None] = lambda stood_ns, now_ns: None
+        """Told when the loop has not gone round when it meant to: for how long, and the time (`standstill`)."""
         self.busy = 0.0
         """Share of the last second in which the loop did not sleep."""
         self._inbox = inbox
@@ -151,6 +154,7 @@ class Loop:
         self._wake_ns = now_ns
         self._window_ns = self._turn_ns = now_ns
         self._slept_ns = 0
+        self._standstill = Standstill(now_ns)
         self._progress: ProgressFile | None = None
         self._sign_ns = NEVER_NS
 
@@ -178,11 +182,15 @@ class Loop:
         slept_ns = time.monotonic_ns()
         self.took(self._turn_ns, slept_ns)
         lacking = self.lacking()
-        timeout_s = max(0, min(self._wake_ns, self._sign_ns) - slept_ns) / NS_PER_S
+        due_ns = min(self._wake_ns, self._sign_ns)
+        timeout_s = max(0, due_ns - slept_ns) / NS_PER_S
         lacks, count = ("", 1) if lacking is None else (lacking[0].key, lacking[1])
         items = self._inbox.take(timeout_s, lacks, count)
         now_ns = self._turn_ns = time.monotonic_ns()
         self._measure(now_ns, now_ns - slept_ns)
+        stood_ns = self._standstill.look(due_ns, now_ns)
+        if stood_ns:
+            self.stood(stood_ns, now_ns)
         self.notify.goes_on(now_ns)
         channels = self._channels
         for key, name, payload in items:

@@ -156,8 +156,8 @@ class Part(Message, frozen=True):
 
 
 class Recovered(Item, frozen=True):
-    """A loss or a return that is over: `what` (node, join, supervisor, vhub) of `name`, behind frame `tick`, with
-    `epoch` the first without or with it; `outage_ns` is the supervisor's wall time without a commit."""
+    """A loss or a return that is over: `what` (node, join, supervisor, vhub, player, return) of `name`, behind frame
+    `tick`, with `epoch` the first without or with it; `outage_ns` is the supervisor's wall time without a commit."""
 
     what: Name
     name: Name
@@ -203,8 +203,8 @@ JOIN_OF: Final = "join of "
 
 
 class Heartbeat(Message, frozen=True):
-    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` a client
-    that is gone (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people.
+    """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` says why the
+    run cannot go on (the vHub's), `busy` is its load (0 to 1), `report` is JSON for people.
 
     Without a report it is the vHub's word, before late deliveries, on whom they waited for."""
 
@@ -410,10 +410,7 @@ class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
 
 
 class Sent(Item, frozen=True):
-    """One packet that a client sends; `stamp_ns` is its own clock's, recorded and never judged.
-
-    `destination` is empty when it goes to all who subscribe to the client's channel.
-    """
+    """One packet of a client: to all subscribers without a `destination`. `stamp_ns`, its own clock, is not judged."""
 
     sequence: Counter
     destination: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
@@ -423,15 +420,18 @@ class Sent(Item, frozen=True):
 
 
 Packets = Annotated[list[Sent], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
+Subscriptions = Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MAX)]
 
 
 class Join(Message, frozen=True):
-    """A client takes part: `period` is in ticks (0: free-running). It takes effect at a tick that the vHub chooses."""
+    """A client takes part: with period and offset in ticks (0: free-running), or when a packet of `arrivals` comes."""
 
     name: Name
     boot: Name
     period: Counter
-    subscriptions: Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MAX)]
+    subscriptions: Subscriptions
+    offset: Counter = 0
+    arrivals: Subscriptions = field(default_factory=list)
 
 
 class Up(Message, frozen=True):

@@ -1,6 +1,6 @@
 """How long a process goes on without its supervisor: it holds, and ends when none comes back.
 
-Pure: the caller tells who is there and what time it is. Neighbours: node/main.py and vhub/main.py ask, `Deadlines` of
+Pure: the caller tells who is there and what time it is. Neighbours: node/main.py and `vhub.core` ask, `Deadlines` of
 the deployment says how long.
 """
 
@@ -28,6 +28,11 @@ class Orphan:
     def hear(self, is_alive: bool, now_ns: int) -> None:
         """The supervisor has come or gone."""
         self._gone_ns = None if is_alive else now_ns
+
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """Our own loop stood still for so long: that does not count (`standstill`)."""
+        if self._gone_ns is not None:
+            self._gone_ns = min(now_ns, self._gone_ns + stood_ns)
 
     def is_over(self, deployment: Deployment | None, now_ns: int) -> bool:
         """Whether it has been gone for too long."""

@@ -138,6 +138,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "spreading_factor": _v(7, "[J] write yours"),
         "coding_rate": _v(1, "[S] the same: 4/5"),
         "duty_cycle": _v("1 %", "[S] the same: 868.0 to 868.6 MHz"),
+        "duty_window": _v("1 h", "[R] ETSI EN 300 220-1, observation interval: unverified"),
         "published": _v("broadcast", "ALOHA"),
         "retries": _v(0, "[J] unconfirmed"),
         "loss": _v("1 %", "[J]"),

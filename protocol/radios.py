@@ -113,6 +113,7 @@ class RadioKeys(LinkSettings):
     gateway: bool = False
     """Of LoRa: the receiver is a gateway's, which hears weaker signals than a device's."""
     duty_cycle: Annotated[float, Quantity(units.PROBABILITY, "0.001 %", "100 %")] = default("100 %")
+    """In no `duty_window`, wherever it begins, is the radio on air for more than this share of it."""
     duty_window_ns: Annotated[int, Quantity(units.TIME, "1 s", "24 h")] = default("1 h", "duty_window")
     speed_m_s: Annotated[float, Quantity(units.SPEED, "1 m/s", "299792458 m/s")] = default("299792458 m/s", "speed")
     """At which the signal travels."""

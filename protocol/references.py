@@ -2,7 +2,8 @@
 
 It reads the plain data of a file, not the models, so that these problems are found beside those of single fields, in
 one go: whatever is missing or malformed is passed over here, since the schema reports it. deployment_file.py turns
-findings into lines with places; what concerns the network is in network_references.py.
+findings into lines with places; what concerns the network is in
+network_references.py, rates and offsets are in timing_references.py.
 """
 
 import re
@@ -44,7 +45,7 @@ class Finding:
 def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found as they are asked for."""
     view = View(data)
-    between = (_names, _hosts, _robots, _nodes, _players, _hears, _on, _rates, _capture, _clients, _deadlines)
+    between = (_names, _hosts, _robots, _nodes, _players, _hears, _on, _capture, _deadlines)
     for check in (_world, *between, _lines, _shapes, _hall, _scenery):
         yield from check(view)
 
@@ -275,52 +276,12 @@ def _on(view: View) -> Iterator[Finding]:
                 yield Finding((section, name, "on"), "unknown robot", robot, quoted(nearest_name(robot, view.robots)))
 
 
-def _rates(view: View) -> Iterator[Finding]:
-    """The tick divides into its substeps; rates of sensors, lockstep and poses are whole ticks."""
-    tick_ns = view.tick_ns()
-    if tick_ns is None:
-        return
-    substeps = view.get("substeps")
-    if isinstance(substeps, int) and not isinstance(substeps, bool) and 1 <= substeps <= 64 and tick_ns % substeps:
-        valid = sorted((n for n in range(1, 65) if tick_ns % n == 0), key=lambda n: (abs(n - substeps), n))
-        what = f"does not divide the tick of {tick_ns} ns"
-        yield Finding(("substeps",), what, substeps, " and ".join(str(n) for n in sorted(valid[:2])))
-    places: list[Location] = [
-        ("robots", robot, "sensors", channel, "rate")
-        for robot in view.robots
-        for channel in view.mapping("robots", robot, "sensors")
-    ]
-    places += [("players", name, "rate") for name in view.players if view.get("players", name, "lockstep") is not False]
-    places += [("clients", name, "rate") for name in view.clients if view.get("clients", name, "lockstep") is True]
-    places += [("capture", "poses")]
-    for place in places:
-        yield from _rate(view, place, tick_ns)
-
-
-def _rate(view: View, place: Location, tick_ns: int) -> Iterator[Finding]:
-    text = view.get(*place)
-    try:
-        rate = units.parse(text, units.RATE)
-        if rate > 0:
-            units.period_ticks(rate, tick_ns)
-    except BadValue as bad:
-        if bad.problem.startswith("not a whole"):
-            yield Finding(place, bad.problem, text, bad.nearest)
-
-
 def _capture(view: View) -> Iterator[Finding]:
     """What keeps only the last lets whole files go."""
     last = view.get("capture", "last")
     if last is not None and all(view.get("capture", key) is None for key in ("split_size", "split_time")):
         what = "whole files are let go: needs split_size or split_time"
         yield Finding(("capture", "last"), what, last)
-
-
-def _clients(view: View) -> Iterator[Finding]:
-    """A client in lockstep has a rate."""
-    for name in view.clients:
-        if view.get("clients", name, "lockstep") is True and view.get("clients", name, "rate") is None:
-            yield Finding(("clients", name, "rate"), "missing key of a client in lockstep", "rate", at="missing")
 
 
 def _deadlines(view: View) -> Iterator[Finding]:

@@ -16,6 +16,8 @@ from foosim.protocol.table import Part
 from foosim.protocol.units import Quantity
 
 Rate = Annotated[Fraction, Quantity(units.RATE, "1 mHz", "10 kHz")]
+Offset = Annotated[int, Quantity(units.TIME, "0 s", "1000 s")]
+"""By how much later than a multiple of its period something happens: whole ticks, below the period."""
 LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
 AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
 VoltageNoise = Annotated[float, Quantity(units.VOLTAGE, "0 V", "10 V")]
@@ -27,9 +29,9 @@ Charge = Annotated[float, Quantity(units.PROBABILITY, "0 %", "100 %")]
 RAYS_MAX: Final = 128
 
 
-def _default(text: str) -> Any:
+def _default(text: str, alias: str | None = None) -> Any:
     """A field with a default that is written, checked and documented as in a file."""
-    return Field(default=text, validate_default=True)
+    return Field(default=text, alias=alias, validate_default=True)
 
 
 class PoseSensor(Part):
@@ -37,6 +39,7 @@ class PoseSensor(Part):
 
     kind: Literal["pose"]
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     position_noise: LengthNoise
     heading_noise: AngleNoise
 
@@ -46,6 +49,7 @@ class OdometrySensor(Part):
 
     kind: Literal["odometry"]
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     noise: LengthNoise
 
 
@@ -57,6 +61,7 @@ class ProximitySensor(Part):
 
     kind: Literal["proximity"]
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     rays: Annotated[int, Field(ge=1, le=RAYS_MAX)]
     range: Range
     noise: LengthNoise
@@ -67,6 +72,7 @@ class BatterySensor(Part):
 
     kind: Literal["battery"]
     rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = _default("0 s", "offset")
     noise: VoltageNoise
 
 

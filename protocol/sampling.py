@@ -17,15 +17,16 @@ from foosim.protocol.names import CHANNEL_ECHO
 
 
 class Sampling:
-    """The periods, in ticks, of all sensors of a deployment."""
+    """The ticks of all sensors of a deployment."""
 
     def __init__(self, deployment: Deployment) -> None:
-        rates = {sensor.rate_hz for robot in deployment.robots.values() for sensor in robot.sensors.values()}
-        self.periods = tuple(sorted(deployment.ticks(rate) for rate in rates))
+        sensors = [sensor for robot in deployment.robots.values() for sensor in robot.sensors.values()]
+        self._turns = tuple(sorted({deployment.turns(sensor) for sensor in sensors}))
+        """Period and offset, in ticks."""
 
     def is_due(self, tick: int) -> bool:
         """Whether some sensor samples at a tick."""
-        return not all(tick % period for period in self.periods)
+        return any(tick % period == offset for period, offset in self._turns)
 
     def is_silent(self, frame: Frame) -> bool:
         """Whether no robot sends anything at the frame's tick."""

@@ -32,8 +32,8 @@ T = TypeVar("T")
 class Dice:
     """Numbers of one seed, in order: a function of seed and count alone."""
 
-    def __init__(self, seed: int) -> None:
-        self._key = draw_key(seed, "swarm")
+    def __init__(self, seed: int, what: str = "swarm") -> None:
+        self._key = draw_key(seed, what)
         self._count = 0
 
     def unit(self) -> float:
@@ -314,6 +314,38 @@ def _machine(dice: Dice, names: Sequence[str]) -> Fault:
     return Fault(_tick(dice), "machine", what, lambda system: lose_hub(system, lost, back_ms * MS))
 
 
+def lose_player(dice: Dice, names: Sequence[str]) -> Fault:
+    """A player's process is killed and started again; sometimes the run has gone on without it by then."""
+    place, back_ms, left_ms = dice.unit(), dice.one_of((1, 40, 400, 2_000)), dice.one_of((0, 0, 20, 200))
+    which = f"player {place:.2f} of all ends, for {back_ms} ms"
+    what = f"{which}; the run waits {left_ms} ms at 20x" if left_ms else which
+
+    def do(system: System) -> None:
+        asked = [ask(system, "rate", pace="20x")] if left_ms else []
+        when_answered(system, asked, kill)
+
+    def kill(system: System) -> None:
+        name = sorted(system.players)[int(place * len(system.players))]
+        if name not in system.processes:
+            return
+        system.kill(name)
+        system.later(back_ms * MS, partial(revive, system, name))
+        if left_ms:
+            be_fast = partial(ask, system, "rate", pace="fast")
+            for after_ms, then in ((left_ms, partial(_give_up_waiting, system, name)), (left_ms + 300, be_fast)):
+                system.later(after_ms * MS, partial(_unless_healed, system, then))
+
+    return Fault(_tick(dice), "player", what, do)
+
+
+def _give_up_waiting(system: System, name: str) -> None:
+    """The time is over that a run in realtime waits for a player: in a swarm deadlines are as long as it lasts."""
+    session, releases = system.hub.sessions.by_name.get(name), system.hub.releases
+    if session is not None and session.away_ns >= 0 and releases is not None and releases.factor:
+        session.away_ns = system.now_of(channels.VHUB)
+        session.answered()
+
+
 FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "kill": _kill,
     "pause": _pause,
@@ -333,7 +365,9 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "machine": _machine,
 }
 KINDS: Final = list(FAULT_OF)
-CHANGES_THE_WORLD: Final = frozenset({"add", "push", "machine"})
+PLAYERS_EVERY: Final = 8
+"""One of so many seeds, the last, also has players that are lost: by dice of their own, so that others are the same."""
+CHANGES_THE_WORLD: Final = frozenset({"add", "push", "machine", "player"})
 """Kinds after which the world is another one. After all others it is the one that would have been."""
 ONCE: Final[tuple[str, ...]] = ("flip",)
 """Kinds of which one a seed is enough: if all nodes had other frames, none would be right."""

@@ -319,7 +319,7 @@ class Laws:
         hold(list(supervisor.members) == members, f"healed, only {', '.join(supervisor.members)} take part")
         strayed = {robot: owner for robot, owner in supervisor.owners.items() if owner != self._chosen[robot]}
         hold(not strayed, f"healed, {strayed} are not where they belong")
-        asked = [identity for identity in system.asked if identity not in system.answers]
+        asked = [identity for identity in system.people.asked if identity not in system.answers]
         hold(not asked, f"{asked} are not answered")
         untold = self._told.keys() - self._captured_told
         hold(not untold, f"what ticks {sorted(untold)} tell is not in the capture")

@@ -22,10 +22,11 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Answer, Epoch
 from foosim.protocol.start import Start
 from foosim.protocol.units import Pace
+from foosim.rehearsal.attendant import Attendant
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import result
-from foosim.vhub.capture_file import origin_metadata
+from foosim.vhub.capture_file import ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.records import Closing
@@ -71,12 +72,18 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     capture: Path | None = None,
     folder: Path | None = None,
     start: Start | None = None,
+    progress: Callable[[str], None] | None = None,
+    on_stuck: Callable[[dict[str, Any]], None] | None = None,
 ) -> Rehearsed:
     """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on those that it declares).
 
     `start` is a frame of another run to begin with (`vhub.branching.read_branch`). `prepare` is called with the built
     system before it runs: a test's or notebook's place to ask for things at ticks.
     `folder` is the one that the text's file is in: where the files are that it refers to (None: the present one).
+    `progress` gets a line each second of wall time, from another thread. A player that does not answer within
+    `deadlines.lockstep_fast` is interrupted, where this is called from the main thread, and the run ends in order; for
+    one that cannot be interrupted `on_stuck` gets the result, from another thread, and should end the process.
+    A player that fails ends the run in order, as in processes: the result has `failed` and the reason.
     Raises DeploymentError for a bad text, AssetError for a bad file, CaptureError when `capture` exists or cannot be
     written, BadValue for a `start` that does not fit.
     """
@@ -100,22 +107,44 @@ def rehearse(  # noqa: PLR0913  # what a rehearsal may be asked for, by keyword
     system = System(run, settings)
     if prepare is not None:
         prepare(system)
+    rehearsed.json, rehearsed.answers = _run(system, writer, capture, progress, on_stuck), system.answers
+    return rehearsed
+
+
+def _run(
+    system: System,
+    writer: CaptureWriter | None,
+    capture: Path | None,
+    progress: Callable[[str], None] | None,
+    on_stuck: Callable[[dict[str, Any]], None] | None,
+) -> dict[str, Any]:
+    """Run a system to its end and finish its capture, whatever ends it; return the result."""
     begun_ns = time.perf_counter_ns()
+
+    def told() -> dict[str, Any]:
+        wall_ns, found = time.perf_counter_ns() - begun_ns, result(system.supervisor)
+        rtf = round((found["ticks"] - found["first_tick"]) * found["tick_ns"] / wall_ns, 3)
+        return {**found, "rtf": rtf, "capture": None if capture is None else str(first_there(capture))}
+
+    def stuck(reason: str) -> None:
+        if writer is not None:
+            writer.leave()
+        if on_stuck is not None:
+            on_stuck({**told(), "reason": reason, "failed": True})
+
     try:
-        system.run()
+        with Attendant(system, progress, stuck):
+            system.run()
+        if writer is not None:
+            end = system.supervisor.end
+            writer.finish({} if end is None else ending_metadata(end))
     finally:
         system.close()
         if writer is not None:
-            writer.finish()
+            writer.leave()  # who is interrupted leaves it without an end
     if writer is not None:
         _check_room(writer, Level.OUT)
-    wall_ns = time.perf_counter_ns() - begun_ns
-    rehearsed.json = result(system.supervisor)
-    simulated = rehearsed.json["ticks"] - rehearsed.json["first_tick"]
-    rehearsed.json["rtf"] = round(simulated * rehearsed.json["tick_ns"] / wall_ns, 3)
-    rehearsed.json["capture"] = None if capture is None else str(first_there(capture))
-    rehearsed.answers = system.answers
-    return rehearsed
+    return told()
 
 
 def _check_room(writer: CaptureWriter, worst: Level) -> None:

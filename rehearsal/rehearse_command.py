@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import time
+from contextlib import redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,11 +19,13 @@ from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_ap
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.rehearsal.faults import TICKS
+from foosim.rehearsal.interrupts import Interrupts
+from foosim.rehearsal.onlooker import LINE_S
 from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.swarm import fly
+from foosim.rehearsal.swarm import Flown, fly
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.display import score_text
-from foosim.supervisor.plan import RunOptions, check_models_here, make_plan
+from foosim.supervisor.plan import Plan, RunOptions, check_models_here, make_plan
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 
@@ -52,10 +58,15 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     With --swarm a seed decides the number of nodes (3 to 5), their clocks, the weather on the bus (delay, loss,
     repeats) and 8 to 20 faults of at least three kinds in 208 ticks on the pure engine (--for: more of both): processes
     killed, ended amid a turn, paused, slow, stopped, cut off one way or both, clogged; memory and clocks that jump; old
-    messages once more; robots moved, balls added, removed and pushed, the run paused. Everything that is written, said
-    and closed is checked against the laws; then all heals, and everybody has to be back.
+    messages once more; in every eighth seed players lost; robots moved, balls added, removed and pushed, the run
+    paused. Everything that is written, said and closed is checked against the laws; then all heals, and everybody has
+    to be back.
 
-    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created.
+    A line of progress each second goes to standard error: simulated time, its speed, the score, and which process was
+    waited for the most. A Ctrl-C ends the rehearsal in order, a second one at once; the last line says how far it came
+    and where the capture is. A player that does not answer within `deadlines.lockstep_fast` ends the run.
+
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, 130 second Ctrl-C.
     """
     if swarm:
         raise typer.Exit(_swarm(file, duration, 1 if seed is None else seed, seeds, json))
@@ -73,10 +84,40 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     if not json:
         for line in (*([plan.branch.text] if plan.branch else []), *start_lines(meanings(plan.deployment), str(file))):
             typer.echo(line)
+    raise typer.Exit(_rehearse(plan, nodes, capture, json))
+
+
+def _rehearse(plan: Plan, nodes: int, capture: Path | None, json: bool) -> int:
+    """Rehearse what was asked for and show the result; return the exit code."""
+    output, file = sys.stdout, plan.options.file
+
+    def show(result: dict[str, Any]) -> int:
+        print(encode_json(result).decode() if json else _told(result), file=output, flush=True)
+        return FAILED if result["failed"] else DONE
+
+    def stuck(result: dict[str, Any]) -> None:
+        _note(result["reason"])
+        os._exit(show(result))
+
     inputs: dict[str, Any] = {"capture": capture, "start": plan.start, "folder": file.parent}
-    result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=Settings(on_say=_show), **inputs).json
-    typer.echo(encode_json(result).decode() if json else _told(result))
-    raise typer.Exit(FAILED if result["failed"] else DONE)
+    # Players print to standard error: standard output has the result and nothing else.
+    with redirect_stdout(sys.stderr), Interrupts(_note) as interrupts:
+        settings = Settings(on_say=_show)
+        looks: dict[str, Any] = {"prepare": interrupts.attend, "progress": _note, "on_stuck": stuck}
+        try:
+            result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settings, **inputs, **looks).json
+        except KeyboardInterrupt:
+            _note(interrupts.last_line(capture, is_finished=False))
+            raise
+    code = show(result)
+    if interrupts.count:
+        _note(interrupts.last_line(capture, is_finished=True))
+    return code
+
+
+def _note(line: str) -> None:
+    """Say something beside the result."""
+    typer.echo(line, err=True)
 
 
 def _show(process: str, level: str, text: str) -> None:
@@ -105,9 +146,17 @@ def _swarm(file: Path, duration: str | None, first: int, count: int, json: bool)
     if ticks < TICKS:
         raise BadValue(f"--for: with --swarm at least {TICKS} ticks are needed, for faults and healing", duration)
     longer = "" if duration is None else f" --for {duration}"
-    flown = []
+    flown: list[Flown] = []
+    told_s = time.monotonic()
     for seed in range(first, first + count):
-        flight = fly(text, str(file), seed, ticks=ticks)
+        if time.monotonic() >= told_s + LINE_S:
+            told_s = time.monotonic()
+            _note(f"{len(flown)} of {count} seeds, {sum(bool(flight.broken) for flight in flown)} broke a law")
+        try:
+            flight = fly(text, str(file), seed, ticks=ticks)
+        except KeyboardInterrupt:
+            _note(f"interrupted at seed {seed}, after {len(flown)} of {count} seeds")
+            raise
         flown.append(flight)
         if flight.broken:
             typer.echo(f"seed {seed}: {flight.broken}", err=True)

@@ -21,8 +21,9 @@ from foosim.protocol.journal import JournalError
 from foosim.rehearsal import capture_commands, play_command, report_command, whatif_command
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture
+from foosim.vhub.capture_damage import Damage, damage_of
 from foosim.vhub.capture_info import CaptureInfo, capture_info
-from foosim.vhub.capture_parts import NEXT
+from foosim.vhub.capture_parts import FAILED_RUN, NEXT
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.payload_hash import HASHED
 from foosim.vhub.rows import CaptureError
@@ -58,7 +59,7 @@ def _describe(found: CaptureInfo) -> str:
     if NEXT in found.end:
         state = f"it goes on in {found.end[NEXT]}, which is not here"
     elif found.finished:
-        state = "finished"
+        state = "whole, of a run that failed" if FAILED_RUN in found.end else "finished"
     else:
         state = f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
     lines = [
@@ -162,13 +163,23 @@ def recover(
 
     It is changed in place: cut behind the last whole chunk, completed, and ended. Bytes that are damaged and not just
     cut are only given up when the journal has what they held. `foosim-supervisor up` does this by itself with what
-    earlier ones of the same user left. Exit codes: 0 the capture has all that was recorded, 1 it could not be
-    recovered and is as it was, 3 it is a capture again, without what no journal told.
+    earlier ones of the same user left. Of a capture that has its end and is damaged it says what is damaged and which
+    ticks are whole. Exit codes: 0 the capture has all that was recorded, 1 it could not be recovered, or is damaged,
+    and is as it was, 3 it is a capture again, without what no journal told.
     """
     try:
         found = recover_capture(capture, journals)
+        damage = damage_of(capture) if found is None else None
     except (CaptureError, JournalError) as error:
-        raise Failed(str(error)) from None
+        damage = _damage_of(capture)
+        if damage is None:
+            raise Failed(str(error)) from None
+    if damage is not None:
+        if json:
+            content = {"finished_before": True, "whole": False, **msgspec.to_builtins(damage), "problem": str(damage)}
+            typer.echo(encode_json(content).decode())
+            raise typer.Exit(FAILED)
+        raise Failed(str(damage))
     if json:
         content = {
             "finished_before": found is None,
@@ -182,6 +193,14 @@ def recover(
     else:
         typer.echo(f"capture {capture} is finished already" if found is None else str(found))
     raise typer.Exit(DONE if found is None or found.is_whole else WITH_LOSS)
+
+
+def _damage_of(capture: Path) -> Damage | None:
+    """Return what is damaged in a capture that cannot be read; None where it has no end, or is none."""
+    try:
+        return damage_of(capture)
+    except CaptureError:
+        return None
 
 
 WITH_LOSS: Final = 3

@@ -18,6 +18,8 @@ from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.network import event_of
 from foosim.protocol.radios import Radio
 from foosim.protocol.units import format_ns
+from foosim.rehearsal.age_tallies import AgeAtUse, AgeTallies
+from foosim.rehearsal.report_asked import edit_text, moves
 from foosim.rehearsal.report_map import Map, MapMaker
 from foosim.rehearsal.report_settings import (
     event_text,
@@ -39,7 +41,7 @@ from foosim.vhub.capture_reader import (
 from foosim.vhub.events import Timeline
 from foosim.vhub.lint import delay_of, residual_of
 from foosim.vhub.profiles import Profiles
-from foosim.vhub.rows import PACKETS, TICK, CaptureError, PacketRow
+from foosim.vhub.rows import AGES, PACKETS, TICK, CaptureError, PacketRow
 
 BINS: Final = 60
 """At most so many spans of time."""
@@ -84,6 +86,18 @@ class LinkReport:
     delay_most_ms: float
     age_mean_ms: float | None
     age_most_ms: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class UseReport:
+    """One channel at one receiver: how old its newest packet was when the receiver acted, beside the mean delay."""
+
+    source: str
+    destination: str
+    channel: str
+    delay_mean_ms: float
+    """Of the link, over all its channels."""
+    age: AgeAtUse
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +164,7 @@ class RuleReport:
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """An event of the network, and whether it was asked for while the run went on."""
+    """An event of the network or of the world, and whether it was asked for while the run went on."""
 
     at_ns: int
     text: str
@@ -196,6 +210,7 @@ class Report:
     defaults: str
     bin_ns: int
     links: tuple[LinkReport, ...]
+    uses: tuple[UseReport, ...]
     channels: tuple[ChannelReport, ...]
     causes_over_time: dict[str, tuple[int, ...]]
     senders: tuple[SenderReport, ...]
@@ -212,11 +227,13 @@ def gather(capture: CaptureData, name: str) -> Report:
     gathered = _Gathered(capture)
     scan = Scan(capture.path)
     frames = FrameReader(scan, capture.deployment)
-    for message in scan.messages(FrameReader.TOPICS | {PACKETS, TICK}):
+    for message in scan.messages(FrameReader.TOPICS | {PACKETS, TICK, AGES}):
         if message.topic == PACKETS:
             gathered.take_packet(scan.decode(DECODERS[PACKETS], message))
         elif message.topic == TICK:
             gathered.take_tick(scan.decode(TICK_MARKS, message))
+        elif message.topic == AGES:
+            gathered.ages.take_row(scan.decode(DECODERS[AGES], message))
         else:
             frame = frames.frame(message)
             if frame is not None:
@@ -257,6 +274,7 @@ class _Gathered:
         self._rules: dict[tuple[str, str], RuleTally] = {}
         self._settings: dict[tuple[str, str], Radio] = {}
         self._map = MapMaker(deployment, self._tick_ns)
+        self.ages = AgeTallies(self._tick_ns)
 
     # --- rows --------------------------------------------------------------------------------------------------------
 
@@ -297,6 +315,10 @@ class _Gathered:
 
     def take_tick(self, row: TickMark) -> None:
         for edit in row.edits:
+            text = edit_text(edit)
+            if text:
+                edited_ns = (row.tick - 1) * self._tick_ns  # an edit belongs to the tick that led to this frame
+                self._happenings.append(Happening(edited_ns, text, is_asked=True))
             if edit.kind == "network":
                 at_ns = row.tick * self._tick_ns
                 try:
@@ -318,6 +340,7 @@ class _Gathered:
         chain = chain_at_start(capture.about)
         for number, digest in enumerate(capture.digests):
             chain = chain if number == 0 else chain_next(chain, digest.tobytes())
+        moved = [Happening(tick * self._tick_ns, text, is_asked=True) for tick, text in moves(capture.epochs)]
         bands = sorted(self._bands(), key=lambda band: (band.start_ns, band.kind, band.text))
         return Report(
             name,
@@ -338,11 +361,12 @@ class _Gathered:
             f"in flight when a partition begins: {network.defaults.in_flight_on_partition}",
             self._bin_ns,
             tuple(self._link(*ends) for ends in sorted(self._links)),
+            tuple(UseReport(*ends, self._delay_ms(*ends[:2]), age) for ends, age in self.ages.result().items()),
             tuple(self._channel_report(channel) for channel, _ in self._packets.most_common(CHANNELS_SHOWN)),
             {cause: tuple(counts) for cause, counts in sorted(self._causes.items())},
             tuple(self._sender(*key) for key in sorted(self._senders)),
             tuple(self._rule(*key) for key in sorted(self._rules)),
-            tuple(sorted(self._happenings, key=lambda happening: happening.at_ns)),
+            tuple(sorted([*self._happenings, *moved], key=lambda happening: happening.at_ns)),
             tuple(bands[:BANDS_MAX]),
             max(0, len(bands) - BANDS_MAX),
             tuple(self._marks()),
@@ -362,7 +386,6 @@ class _Gathered:
     def _link(self, source: str, destination: str) -> LinkReport:
         tally = self._links[source, destination]
         age = tally.age_ns(self._end_ns)
-        mean_ns = tally.delay_total_ns / tally.delivered if tally.delivered else 0.0
         return LinkReport(
             source,
             destination,
@@ -370,11 +393,16 @@ class _Gathered:
             tally.delivered,
             tally.dropped,
             dict(sorted(tally.causes.items())),
-            _ms(mean_ns),
+            self._delay_ms(source, destination),
             _ms(tally.delay_most_ns),
             None if age is None else _ms(age[0]),
             None if age is None else _ms(age[1]),
         )
+
+    def _delay_ms(self, source: str, destination: str) -> float:
+        """Return a link's mean delay, 0 where nothing was delivered."""
+        tally = self._links.get((source, destination))
+        return _ms(tally.delay_total_ns / tally.delivered) if tally is not None and tally.delivered else 0.0
 
     def _channel_report(self, name: str) -> ChannelReport:
         tallies = self._channels[name]

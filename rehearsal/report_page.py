@@ -57,7 +57,7 @@ def page(found: Report) -> str:
     title = escape(f"{found.name}: the network of {found.metadata.get('world', 'a run')}")
     sections = (
         *(_head(found), _network(found), _events(found), _links(found), _over_time(found), _causes(found)),
-        *(_ages(found), _senders(found), _configured(found), _places(found)),
+        *(_ages(found), _uses(found), _senders(found), _configured(found), _places(found)),
     )
     return "\n".join(
         [
@@ -138,7 +138,7 @@ def _network(found: Report) -> Iterator[str]:
 def _events(found: Report) -> Iterator[str]:
     yield "<h2>Events</h2>"
     if not (found.happenings or found.bands or found.marks):
-        yield _note("Nothing happened to the network, and no process was lost.")
+        yield _note("Nothing happened to the network, nobody changed the world, and no process was lost.")
         return
     yield lanes(WIDE, found.start_ns, found.end_ns, found.bands, found.marks, "events over time")
     if found.bands_left:
@@ -244,6 +244,29 @@ def _ages(found: Report) -> Iterator[str]:
     )  # fmt: skip
     if len(found.links) > len(shown):
         yield _note(f"And {len(found.links) - len(shown)} links with newer information.")
+
+
+def _uses(found: Report) -> Iterator[str]:
+    yield "<h2>Age at use</h2>"
+    if not found.uses:
+        yield _note("The capture does not tell it: nobody who hears a channel has acted.")
+        return
+    yield _note(
+        "What a controller feels: how old the newest packet of a channel was each time that its receiver acted. It is "
+        "the link's delay, and the time that the packet waited for the receiver's turn. The oldest stand first."
+    )
+    shown = sorted(found.uses, key=lambda use: -use.age.p99_ms)[:LINKS_SHOWN]
+    yield _table(
+        ("from", "to", "channel", "uses", "mean delay ms", "median age ms", "99 %", "greatest"),
+        [
+            (use.source, use.destination, use.channel, use.age.uses, f"{use.delay_mean_ms:.3f}",
+             *(f"{ms:.1f}" for ms in (use.age.p50_ms, use.age.p99_ms, use.age.most_ms)))
+            for use in shown
+        ],
+        3,
+    )  # fmt: skip
+    if len(found.uses) > len(shown):
+        yield _note(f"And {len(found.uses) - len(shown)} channels that are newer.")
 
 
 def _staleness(link: LinkReport) -> tuple[bool, float, str, str]:

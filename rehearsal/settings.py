@@ -15,6 +15,7 @@ from foosim.node.core import NodeCore
 from foosim.node.engines.interface import EngineFactory
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch
+from foosim.protocol.standstill import Standstill
 from foosim.rehearsal.bus import CALM, Message, Observer, Weather
 from foosim.rehearsal.clock import Clock
 from foosim.supervisor.core import SupervisorCore
@@ -39,6 +40,37 @@ class Process:
     took: Callable[[int, int], None] = lambda begun_ns, ended_ns: None
     """Told how long its turns took, as a shell tells."""
     clock: Clock = field(default_factory=Clock)
+    due_ns: int = 0
+    """When its loop means to look again at the latest, by its own clock."""
+    standstill: Standstill = field(default_factory=lambda: Standstill(0))
+    stood: Callable[[int, int], None] = lambda stood_ns, now_ns: None
+    """Told for how long its loop stood still, as a shell tells."""
+
+    def begin(self, virtual_ns: int) -> None:
+        """Its loop begins to go round."""
+        self.due_ns = self.clock.at(virtual_ns)
+        self.standstill = Standstill(self.due_ns)
+
+    def look(self, virtual_ns: int) -> int:
+        """Its loop goes round, which may have stood still: return the time on its clock."""
+        now_ns = self.clock.at(virtual_ns)
+        stood_ns = self.standstill.look(self.due_ns, now_ns)
+        if stood_ns:
+            self.stood(stood_ns, now_ns)
+        return now_ns
+
+
+@dataclass
+class AtWork:
+    """Whose turn it is: for whoever looks on from another thread."""
+
+    name: str = ""
+    tick: int = -1
+    """The tick that a player acts at; -1 while it is at none."""
+    acts: bool = False
+    """Whether it is a player's own code."""
+    turns: int = 0
+    """How many there have been; while it is the same number, it is the same turn."""
 
 
 @dataclass
@@ -73,5 +105,7 @@ class Settings:
     """
     on_supervisor_loss: Callable[[Sequence[bytes]], None] | None = None
     """Told of the supervisor's journal that is left when its machine is lost."""
+    closing: Callable[[HubCore, int], bool] = lambda hub, passed_ns: True
+    """Whether the vHub has closed its capture, and in its `recording` how far it is, so long after the run's end."""
     on_say: Callable[[str, str, str], None] | None = None
     on_journal: Callable[[str, bytes], None] | None = None

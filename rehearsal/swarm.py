@@ -32,10 +32,12 @@ from foosim.rehearsal.faults import (
     KINDS,
     MS,
     ONCE,
+    PLAYERS_EVERY,
     TICKS,
     Dice,
     Fault,
     ask,
+    lose_player,
     revive,
     when_answered,
 )
@@ -72,6 +74,7 @@ PATIENT: Final[tuple[str, ...]] = (
     "deadlines.lockstep_fast=24 h",
     "deadlines.lockstep_realtime=24 h",
     "deadlines.client_back=24 h",
+    "deadlines.start=24 h",
 )
 """A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
 RESTART_NS: Final = 500 * MS
@@ -119,6 +122,10 @@ def plan_of(seed: int, ticks: int = TICKS) -> Plan:
     once = [kind for place, kind in enumerate(chosen) if kind not in ONCE or kind not in chosen[:place]]
     late = max(0, ticks - TICKS)
     faults = [_later(FAULT_OF[kind](dice, names), dice.between(0, late) if late else 0) for kind in once]
+    if seed % PLAYERS_EVERY == PLAYERS_EVERY - 1:
+        of_players = Dice(seed, "players")
+        lost = [lose_player(of_players, names) for _ in range(of_players.between(1, 3) * times)]
+        faults += [_later(fault, of_players.between(0, late) if late else 0) for fault in lost]
     faults.sort(key=lambda fault: fault.tick)
     here = (*names, channels.SUPERVISOR, channels.VHUB, PROBER)
     clocks = tuple((name, Clock(dice.between(0, 2 * HOUR_NS), dice.between(-1000, 1000))) for name in here)
@@ -150,11 +157,12 @@ class Prober:
             return
         if not self._joined:
             self._joined = True
-            rate_hz = core.deployment.clients[PROBER].rate_hz
-            assert rate_hz is not None
             deployment = core.deployment
+            spec = deployment.clients[PROBER]
+            assert spec.rate_hz is not None
             self._robots = sorted(deployment.robots)[:3] if deployment.is_hall else list(self.OF_TABLE)
-            core.join(core.deployment.ticks(rate_hz), [(robot, CHANNEL_ECHO) for robot in self._robots])
+            heard = [(robot, CHANNEL_ECHO) for robot in self._robots]
+            core.join(deployment.ticks(spec.rate_hz), heard, spec.offset_ns // deployment.tick_ns)
         if core.branch != self._branch:
             self._branch, last = core.branch, core.branch_ns // core.deployment.tick_ns
             self._back = {payload: tick for payload, tick in self._back.items() if tick <= last}
@@ -280,18 +288,20 @@ class Flight:
         self._healed_ns = self._last_commit_ns = system.bus.now_ns
         system.healed = True
         system.bus.heal()
-        system.give_up("rate")  # or one that was lost before comes after this one
+        system.people.give_up("rate")  # or one that was lost before comes after this one
         ask(system, "rate", pace=HEALED_PACE)
         for name, process in list(system.processes.items()):
             process.slow_ns = 0
             system.resume(name)
-        stops = [identity for identity, verb in system.asked.items() if verb == "stop"]
+        stops = [identity for identity, verb in system.people.asked.items() if verb == "stop"]
         when_answered(system, stops, self._start_all)
 
     def _start_all(self, system: System) -> None:
         for number in range(1, self.plan.nodes + 1):
             ask(system, "start", node=f"n{number}")
             revive(system, f"n{number}")
+        for name in sorted(system.players):
+            revive(system, name)
 
 
 @lru_cache(maxsize=4 * WORLDS)

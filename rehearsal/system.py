@@ -14,29 +14,27 @@ from typing import Any, Final
 
 from mypy_extensions import mypyc_attr
 
-from foosim.client.core import ClientCore
-from foosim.client.player import PlayerLoop, load_player
 from foosim.node.solver import Solver
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import Bus, Message, Traced
+from foosim.rehearsal.clients import Clients
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.hub_journal import Ending, HubJournal
-from foosim.rehearsal.settings import Process, Settings
+from foosim.rehearsal.people import OPERATOR, People
+from foosim.rehearsal.settings import AtWork, Process, Settings
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
+from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
 
-OPERATOR: Final = "operator"
 NEVER_NS: Final = limits.COUNTER_MAX
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
@@ -53,16 +51,16 @@ class System:
         self.bus = Bus(rehearsal.weather)
         self.processes: dict[str, Process] = {}
         self.solvers: dict[str, Solver] = {}
-        self.players: dict[str, PlayerLoop] = {}
-        self.answers: dict[str, Answer] = {}
+        self.people = People(self.bus, self.later)
+        self.answers = self.people.answers
+        self.clients = Clients(self)
+        self.players = self.clients.players
+        self.at_work = AtWork()
         self.healed = False
         """Whether a test has said that nothing new is to happen."""
         self.flipped: set[str] = set()
         """Nodes whose memory a test has changed."""
-        self.asked: dict[str, str] = {}
-        """The verb of what was requested and not given up, by id."""
         self._traces_receive = rehearsal.observer is not None and "receive" in rehearsal.observes
-        self._requests = 0
         self._at_tick: dict[int, list[Callable[[], object]]] = {}
         self._next: list[Callable[[], object]] = []
         self._timers: list[tuple[int, int, Callable[[], object]]] = []
@@ -90,35 +88,39 @@ class System:
         self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
-        self._enter_clients()
-        self.bus.subscribe(OPERATOR, channels.OPERATOR_READS)
+        self.clients.enter_all()
         self._hub_back_ns = HUB_BACK_NS
 
-    def _enter(
+    def enter(
         self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
     ) -> None:
+        """Let a process in, which takes part from now on."""
         self.bus.subscribe(name, reads)
         process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))
         process.clock = self._clock(name)
         process.wake_ns = self._soonest_ns = self.bus.now_ns
+        process.begin(self.bus.now_ns)
 
     def _clock(self, name: str) -> Clock:
         return self._clocks.setdefault(name, Clock())
 
-    def _now_of(self, name: str) -> int:
+    def now_of(self, name: str) -> int:
         """Return what a process's clock shows now."""
         return self._clock(name).at(self.bus.now_ns)
 
     def _enter_supervisor(self) -> None:
         core = self.supervisor
         core.on_commit = self._frames.append
-        self._enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
-        self.processes[channels.SUPERVISOR].took = core.watch.took
+        self.enter(channels.SUPERVISOR, core, core.advance, channels.SUPERVISOR_READS)
+        process = self.processes[channels.SUPERVISOR]
+        process.took = core.watch.took
+        process.stood = lambda stood_ns, now_ns: core.watch.rest(core, stood_ns, now_ns)
+        self._hub_hears(True)
 
     def _enter_hub(self, fingerprint: bytes) -> None:
         """Let a vHub in, which goes on from the journal of the one before."""
         self._boots += 1
-        start = f"boot-{self._boots}", fingerprint, self._now_of(channels.VHUB)
+        start = f"boot-{self._boots}", fingerprint, self.now_of(channels.VHUB)
         hub = self.hub = self.settings.hub(*start, machine=self.hub_journal.machine)
 
         def turn(now_ns: int) -> None:
@@ -127,24 +129,14 @@ class System:
                 hub.begin(self.hub_journal.past(hub, build.run), now_ns)
             hub.advance(now_ns)
             if hub.member.refusal and self.settings.restart_ns and self.hub is hub:
-                self._next.append(lambda: self._hub_again(hub))
+                self.soon(lambda: self._hub_again(hub))
 
-        self._enter(channels.VHUB, hub, turn, channels.VHUB_READS)
-        self.processes[channels.VHUB].took = hub.waits.took
-
-    def _enter_clients(self) -> None:
-        for name, player in sorted(self.supervisor.deployment.players.items()):
-            assert player.lockstep, "a rehearsal has lockstep players only"
-            core = ClientCore(name, "boot", self._now_of(name))
-            loop = self.players[name] = PlayerLoop(core, load_player)
-            self._enter(name, core, loop.step, channels.CLIENT_READS)
-        for name, client in sorted(self.settings.clients.items()):
-            core = ClientCore(name, "boot", self._now_of(name))
-            self._enter(name, core, client(core), channels.CLIENT_READS)
+        self.enter(channels.VHUB, hub, turn, channels.VHUB_READS)
+        self.processes[channels.VHUB].took, self.processes[channels.VHUB].stood = hub.waits.took, hub.door.rest
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
-        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self._now_of(name))
+        core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.now_of(name))
         # The processes of a rehearsal are one: the small run of one node is that of all.
         solver = self.solvers[name] = Solver(core, self.settings.factory, self._simulation)
 
@@ -156,9 +148,9 @@ class System:
                 solver.solve(core.work)
                 core.advance(now_ns)
             if core.member.refusal and self.settings.restart_ns and self.solvers.get(name) is solver:
-                self._next.append(lambda: self._start_again(name, solver))
+                self.soon(lambda: self._start_again(name, solver))
 
-        self._enter(name, core, turn, channels.NODE_READS)
+        self.enter(name, core, turn, channels.NODE_READS)
 
     # --- running -----------------------------------------------------------------------------------------------------
 
@@ -202,7 +194,7 @@ class System:
         process = self.processes.get(message[2])
         if process is None:
             if message[2] == OPERATOR:
-                self._answered(message[5])
+                self.people.answered(message[5])
         elif process.inbox or process.busy_until_ns > self.bus.now_ns:
             process.inbox.append(message)
             self._behind[process.name] = process
@@ -220,9 +212,10 @@ class System:
     def _hand(self, process: Process, message: Message) -> None:
         """Let a process take one message and do what follows from it."""
         _, _, _, channel, name, payload = message
+        self._begin_turn(process)
         if self._traces_receive:
             self._trace(self.bus.now_ns, process, "receive", channel.name, payload, name)
-        now_ns = process.clock.at(self.bus.now_ns)
+        now_ns = process.look(self.bus.now_ns)
         process.core.receive(channel, name, payload, now_ns)
         process.turn(now_ns)
         if (
@@ -238,10 +231,12 @@ class System:
         now_ns = self.bus.now_ns
         for process in list(self.processes.values()):
             if max(process.wake_ns, process.busy_until_ns) <= now_ns:
-                self._wake(process)
+                self.wake(process)
 
-    def _wake(self, process: Process) -> None:
-        now_ns = process.clock.at(self.bus.now_ns)
+    def wake(self, process: Process) -> None:
+        """Let a process do what is due by time."""
+        self._begin_turn(process)
+        now_ns = process.look(self.bus.now_ns)
         process.core.wake(now_ns)
         process.turn(now_ns)
         self._perform(process)
@@ -249,7 +244,13 @@ class System:
         self._plan_wake(process)
         assert process.wake_ns > self.bus.now_ns, f"{process.name} has a deadline that waking did not move"
 
-    def _turn(self, process: Process) -> None:
+    def _begin_turn(self, process: Process) -> None:
+        self.at_work.name = process.name
+        self.at_work.turns += 1
+
+    def take_turn(self, process: Process) -> None:
+        """Let a process do what follows from what has happened to it."""
+        self._begin_turn(process)
         process.turn(process.clock.at(self.bus.now_ns))
         self._perform(process)
         self._plan_wake(process)
@@ -269,6 +270,7 @@ class System:
         wake_ns = self._core_deadline_ns(process)
         if process.core is self.supervisor:
             wake_ns = min(wake_ns, process.wake_ns)
+        process.due_ns = process.clock.at(wake_ns)
         process.wake_ns = max(wake_ns, process.busy_until_ns)
         self._soonest_ns = min(self._soonest_ns, process.wake_ns)
 
@@ -280,7 +282,7 @@ class System:
         left = self._dying.pop(process.name, None)
         if left is not None:
             del actions[left:]
-            self._leave(process.name)
+            self.leave(process.name)
         leaves_ns = self.bus.now_ns
         if process.slow_ns and any(type(action) is Publish for action in actions):
             leaves_ns += process.slow_ns
@@ -301,14 +303,32 @@ class System:
         if process.core is self.supervisor and self._frames:
             self._tell_commits(was_cut=left is not None)
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
-            farewell = self.hub.farewell()
-            self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, leaves_ns)
-            self._leave(process.name)
+            self._close(process, leaves_ns)
 
-    def _leave(self, name: str) -> None:
+    def _close(self, process: Process, begun_ns: int) -> None:
+        """The vHub closes its capture, shows how far it is, and says farewell."""
+        hub = self.hub
+
+        def turn(now_ns: int) -> None:
+            if self.settings.closing(hub, self.bus.now_ns - begun_ns) and channels.VHUB in self.processes:
+                said, at_ns = hub.farewell(), max(begun_ns, self.bus.now_ns)
+                self.bus.put(process.name, said.channel, said.name, said.payload, at_ns)
+                self.leave(process.name)
+
+        process.core, process.turn = ClosingCore(hub), turn
+        turn(begun_ns)
+
+    def leave(self, name: str) -> None:
         """A process has ended: what is on its way to it is lost."""
         self.processes.pop(name)
         self._behind.pop(name, None)
+        if name == channels.SUPERVISOR:
+            self._hub_hears(False)
+
+    def _hub_hears(self, is_alive: bool) -> None:
+        """The vHub sees the supervisor come or go."""
+        if channels.VHUB in self.processes:
+            self.hub.orphan.hear(is_alive, self.now_of(channels.VHUB))
 
     def _keep(self, now_ns: int, process: Process, action: Any) -> None:
         """Hand what is written or said to those who asked for it."""
@@ -360,6 +380,10 @@ class System:
         """Call `action` when frame `tick` is committed."""
         self._at_tick.setdefault(tick, []).append(action)
 
+    def soon(self, action: Callable[[], object]) -> None:
+        """Call `action` between two turns; a signal handler may say so."""
+        self._next.append(action)
+
     def later(self, after_ns: int, action: Callable[[], object]) -> None:
         """Call `action` when some virtual time has passed."""
         self._boots += 1
@@ -368,15 +392,16 @@ class System:
     def _go_off(self) -> None:
         due_ns, _, action = heappop(self._timers)
         self.bus.now_ns = max(self.bus.now_ns, due_ns)
-        self._next.append(action)
+        self.soon(action)
 
     def kill(self, name: str) -> None:
-        """End a node or the supervisor at once: what is on its way to it is lost; a node is seen to go."""
-        self._leave(name)
-        if name == channels.SUPERVISOR:
-            return
-        self.solvers.pop(name).close()
-        self._supervisor_sees_gone(name)
+        """End a node, a player or the supervisor at once: what is on its way to it is lost; it is seen to go."""
+        self.leave(name)
+        if name in self.players:
+            self.clients.gone(name)
+        elif name in self.solvers:
+            self.solvers.pop(name).close()
+            self._supervisor_sees_gone(name)
 
     def end_amid(self, name: str, actions: int) -> None:
         """End the supervisor amid its next turn, when it has performed so many of its actions."""
@@ -387,24 +412,26 @@ class System:
         return name in self._dying
 
     def start(self, name: str) -> None:
-        """Start a node or the supervisor again, with a new boot; the supervisor goes on from its journal."""
+        """Start a node, a player or the supervisor again, with a new boot; the supervisor goes on from its journal."""
         assert name not in self.processes, f"{name} is running"
         if name == channels.SUPERVISOR:
             self._boots += 1
             history = fold(self.supervisor.deployment, self.journal)
             boot = f"boot-{self._boots}"
-            now_ns = self._now_of(name)
+            now_ns = self.now_of(name)
             self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)
             self._enter_supervisor()
+        elif name in self.players:
+            self.clients.start(name)
         else:
             self._enter_node(name, library_fingerprint())
-        self._wake(self.processes[name])
+        self.wake(self.processes[name])
 
     def _start_again(self, name: str, refused: Solver) -> None:
         """A process that is refused ends; its launcher starts another one after a while."""
         if self.solvers.get(name) is not refused:
             return
-        self._leave(name)
+        self.leave(name)
         self.solvers.pop(name).close()
         self._enter_node(name, library_fingerprint())
         self.pause(name, self.settings.restart_ns)
@@ -426,17 +453,15 @@ class System:
 
     def _supervisor_sees_gone(self, name: str) -> None:
         if channels.SUPERVISOR in self.processes:
-            self.supervisor.process_gone(name, self._now_of(channels.SUPERVISOR))
-            self._turn(self.processes[channels.SUPERVISOR])
+            self.supervisor.process_gone(name, self.now_of(channels.SUPERVISOR))
+            self.take_turn(self.processes[channels.SUPERVISOR])
 
     def _leave_hub(self) -> None:
         self.hub_journal.ending = None
-        self._leave(channels.VHUB)
+        self.leave(channels.VHUB)
         self.hub.actions.clear()
         self.later(self._hub_back_ns, self._start_hub)
-        for client in self._clients():
-            client.core.hub_gone(client.clock.at(self.bus.now_ns))
-            self._turn(client)
+        self.clients.hub_gone()
 
     def _hub_again(self, refused: HubCore) -> None:
         """A vHub that is refused ends, was never present to the supervisor, and is started again after a while."""
@@ -446,13 +471,8 @@ class System:
 
     def _start_hub(self) -> None:
         self._enter_hub(library_fingerprint())
-        self._wake(self.processes[channels.VHUB])
-        for client in self._clients():
-            client.core.hub_here(client.clock.at(self.bus.now_ns))
-            self._wake(client)
-
-    def _clients(self) -> list[Process]:
-        return [process for process in self.processes.values() if isinstance(process.core, ClientCore)]
+        self.wake(self.processes[channels.VHUB])
+        self.clients.hub_here()
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""
@@ -470,29 +490,10 @@ class System:
         self._clock(name).offset_ns += by_ns
         process = self.processes.get(name)
         if process is not None:
+            due_ns = process.due_ns
             self._plan_wake(process)
+            process.due_ns = due_ns
 
     def request(self, verb: str, *, again_ns: int = 0, **arguments: Any) -> str:
         """Ask the supervisor for something, every `again_ns` until it answers (0: once); return the request's id."""
-        self._requests += 1
-        identity = f"request-{self._requests}"
-        self.asked[identity] = verb
-        payload = encode(Request(OPERATOR, identity, verb, encode_json(arguments)))
-        self._ask(identity, payload, again_ns)
-        return identity
-
-    def give_up(self, verb: str) -> None:
-        """Ask no more for what is not answered yet."""
-        for identity in [known for known, what in self.asked.items() if what == verb and known not in self.answers]:
-            self.asked.pop(identity)
-
-    def _ask(self, identity: str, payload: bytes, again_ns: int) -> None:
-        if identity in self.answers or identity not in self.asked:
-            return
-        self.bus.put(OPERATOR, channels.REQUEST, OPERATOR, payload, self.bus.now_ns)
-        if again_ns:
-            self.later(again_ns, lambda: self._ask(identity, payload, again_ns))
-
-    def _answered(self, payload: bytes) -> None:
-        answer = decode(Answer, payload)
-        self.answers[answer.id] = answer
+        return self.people.request(verb, again_ns, arguments)

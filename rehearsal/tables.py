@@ -70,6 +70,8 @@ _UNITS: Final[Mapping[str, str]] = {
     "cdbm": "0.01 dBm",
     "slide": "m",
     "spin": "rad",
+    "left": "m/s",
+    "right": "m/s",
     "tick": "tick",
     "period": "ticks",
 }

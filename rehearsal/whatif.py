@@ -21,6 +21,7 @@ import numpy as np
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import Sent
+from foosim.rehearsal.age_tallies import AgeAtUse, AgeTallies
 from foosim.rehearsal.whatif_reading import Frames, Offers, caveats, frames_for, world_of
 from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.memory import Joining
@@ -60,6 +61,17 @@ class LinkChange:
 
 
 @dataclass(frozen=True, slots=True)
+class AgeChange:
+    """How old a channel is when its receiver acts, as captured and then."""
+
+    source: str
+    destination: str
+    channel: str
+    before: AgeAtUse
+    after: AgeAtUse
+
+
+@dataclass(frozen=True, slots=True)
 class PacketChange:
     """One packet with another fate, or another time."""
 
@@ -96,6 +108,8 @@ class WhatIf:
     """How many were sent before the capture begins, and are not judged again."""
     caveats: tuple[str, ...] = ()
     """Why fates may not be the captured ones even without another network."""
+    ages: tuple[AgeChange, ...] = ()
+    """Ages at use by channel. Who acts at arrival is asked when packets arrive then, and sends what it sent."""
 
 
 @dataclass(slots=True)
@@ -149,10 +163,20 @@ def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatI
     compared = _Compared(capture)
     deployment = deployment or capture.deployment
     frames = frames_for(capture, on_radio=Profiles(deployment, deployment.network).on_radio)
-    offers = Offers(capture, frames, compared.keep)
-    for flight in _judged(capture, deployment, offers, frames):
+    before, after = AgeTallies(deployment.tick_ns), AgeTallies(deployment.tick_ns)
+    offers = Offers(capture, frames, compared.keep, before.take_row)
+    for flight in _judged(capture, deployment, offers, frames, after):
         compared.take(flight)
-    return replace(compared.result(), earlier=offers.earlier, caveats=caveats(capture))
+    told = offers.earlier, caveats(capture), _age_changes(before, after)
+    return replace(compared.result(), earlier=told[0], caveats=told[1], ages=told[2])
+
+
+def _age_changes(before: AgeTallies, after: AgeTallies) -> tuple[AgeChange, ...]:
+    old, new = before.result(), after.result()
+    return tuple(
+        AgeChange(*channel, old.get(channel, AgeAtUse()), new.get(channel, AgeAtUse()))
+        for channel in sorted({*old, *new})
+    )
 
 
 class _Compared:
@@ -234,22 +258,30 @@ def _verdict(row: PacketRow) -> tuple[str, str, int, int, bytes]:
     return row.fate, row.cause, row.due_ns, row.arrival_tick, row.payload
 
 
-def _judged(capture: CaptureData, deployment: Deployment, offers: Offers, frames: Frames) -> Iterator[Flight]:
-    """Close the ticks of a capture again; yield the packets as their fates become final, the rest at the end."""
+def _judged(
+    capture: CaptureData, deployment: Deployment, offers: Offers, frames: Frames, ages: AgeTallies
+) -> Iterator[Flight]:
+    """Close the ticks of a capture again; yield the packets as their fates become final, the rest at the end. `ages`
+    are told the ages at use."""
     state = HubState(deployment, offers.first)
     with world_of(capture, frames) as frame_of:
         for offered in offers.ticks():
             frame = frame_of(offered)
+            owing = [row.client for row in offered.came if row.event == "leaves_owing"]
             for row in offered.came:
                 _come_and_go(state, row)
             edits = [edit_of(edit) for edit in offered.edits]
             fates: list[Flight] = []
             state.close_world(frame, [offered.robots[key] for key in sorted(offered.robots)], fates, edits)
+            for name in owing:
+                state.leave(name)
             admitted: dict[str, list[Sent]] = {}
             for (source, _), sent in sorted(offered.clients.items()):
                 admitted.setdefault(source, []).append(sent)
             state.close_clients(frame, admitted, fates)
+            ages.take(state.aged)
             yield from fates
+    ages.take(state.ages.untold(state.closed))
     for flight in state.in_flight():
         flight.cause = IN_FLIGHT
         yield flight
@@ -258,6 +290,7 @@ def _judged(capture: CaptureData, deployment: Deployment, offers: Offers, frames
 def _come_and_go(state: HubState, row: ClientRow) -> None:
     if row.event == "leaves":
         state.leave(row.client)
-    else:
-        heard = [(heard.source, heard.channel) for heard in row.subscriptions]
-        state.join(Joining(row.client, row.period, heard), row.tick)
+    elif row.event == "joins":
+        both = row.subscriptions, row.arrivals
+        heard, calling = ([(item.source, item.channel) for item in items] for items in both)
+        state.join(Joining(row.client, row.period, heard, row.offset, calling), row.tick)

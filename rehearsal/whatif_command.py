@@ -43,7 +43,8 @@ def whatif(
     """Judge a capture's packets again, over another network.
 
     Robots and clients send what they sent: what another network would have made them send is not known. Per link: what
-    is delivered, its delay, and the age of information. Without another network every fate is the captured one.
+    is delivered, its delay, and the age of information; per channel how old it is when its receiver acts. Without
+    another network every fate is the captured one.
     """
     with reading():
         opened = open_capture(capture)
@@ -114,8 +115,27 @@ def _show_links(found: WhatIf) -> None:
     Console(width=None if Console().is_terminal else 160, highlight=False).print(table)
     if len(found.links) > LINKS_SHOWN:
         typer.echo(f"and {len(found.links) - LINKS_SHOWN} links that changed less: --json has all")
+    _show_ages(found)
     for title, causes in (("dropped by", found.causes), ("then by", found.new_causes)):
         typer.echo(f"{title} " + (", ".join(f"{count} {cause}" for cause, count in causes.items()) or "nothing"))
+
+
+def _show_ages(found: WhatIf) -> None:
+    """Show how old channels are when their receivers act: what a controller feels of the network."""
+    if not found.ages:
+        return
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for name in ("from", "to", "channel", "uses", "then", "age at use ms", "then", "p99 ms", "then"):
+        table.add_column(name, justify="left" if name in ("from", "to", "channel") else "right", no_wrap=True)
+    shown = sorted(found.ages, key=lambda age: -abs(age.after.p99_ms - age.before.p99_ms))[:LINKS_SHOWN]
+    for age in sorted(shown, key=lambda age: (age.source, age.destination, age.channel)):
+        sides = age.before, age.after
+        uses = (str(side.uses) for side in sides)
+        times = (f"{ms:.1f}" for ms in (*(side.p50_ms for side in sides), *(side.p99_ms for side in sides)))
+        table.add_row(age.source, age.destination, age.channel, *uses, *times)
+    Console(width=None if Console().is_terminal else 160, highlight=False).print(table)
+    if len(found.ages) > LINKS_SHOWN:
+        typer.echo(f"and {len(found.ages) - LINKS_SHOWN} channels whose age changed less: --json has all")
 
 
 def _weight(link: LinkChange) -> tuple[float, str, str]:

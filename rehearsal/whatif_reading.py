@@ -22,7 +22,18 @@ from foosim.rehearsal.verify import start_of
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick
 from foosim.vhub.capture_split import CUT_REASON, CUT_TICK
 from foosim.vhub.payload_hash import check_payloads
-from foosim.vhub.rows import CLIENTS, PACKETS, TICK, CaptureError, ClientRow, EditRow, PacketRow, TickRow
+from foosim.vhub.rows import (
+    AGES,
+    CLIENTS,
+    PACKETS,
+    TICK,
+    AgeRow,
+    CaptureError,
+    ClientRow,
+    EditRow,
+    PacketRow,
+    TickRow,
+)
 from foosim.vhub.state import OUTBOX_SHIFT
 
 Frames = Literal["first", "captured", "computed"]
@@ -73,11 +84,18 @@ def judged_ticks(capture: CaptureData) -> list[int]:
 
 
 class Offers:
-    """One pass over a capture. `take` is given each row of a packet before the tick is yielded at which it was sent."""
+    """One pass over a capture. `take` is given each row of a packet before the tick is yielded at which it was sent,
+    `take_age` each row of ages at use."""
 
-    def __init__(self, capture: CaptureData, frames: Frames, take: Callable[[PacketRow], None]) -> None:
+    def __init__(
+        self,
+        capture: CaptureData,
+        frames: Frames,
+        take: Callable[[PacketRow], None],
+        take_age: Callable[[AgeRow], None] = lambda row: None,
+    ) -> None:
         self._capture = capture
-        self._take = take
+        self._take, self._take_age = take, take_age
         self._tick_ns = capture.deployment.tick_ns
         self._robots = frozenset(capture.deployment.robots)
         ticks = judged_ticks(capture)
@@ -89,7 +107,7 @@ class Offers:
         self._offered: dict[int, Offered] = {}
         self._waiting: deque[int] = deque()
         """Ticks of which all is read but packets, perhaps, whose fates became final later."""
-        self._topics = frozenset({PACKETS, CLIENTS, TICK, *(FrameReader.TOPICS if frames == "captured" else ())})
+        self._topics = frozenset({PACKETS, CLIENTS, TICK, AGES, *(FrameReader.TOPICS if frames == "captured" else ())})
         self._ticks = DECODERS[TICK] if frames == "computed" else TICK_MARKS
 
     def ticks(self) -> Iterator[Offered]:
@@ -111,6 +129,8 @@ class Offers:
                 self._take_packet(scan.decode(packets, message))
             elif topic == TICK:
                 self._take_tick(scan.decode(self._ticks, message))
+            elif topic == AGES:
+                self._take_age(scan.decode(DECODERS[AGES], message))
             elif topic == CLIENTS:
                 client = scan.decode(DECODERS[CLIENTS], message)
                 self._at(max(client.tick, self.first)).came.append(client)  # or before a cut begins

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.supervisor.account import Recovered
+from foosim.supervisor.departures import Departures
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -25,6 +26,7 @@ class Absence:
 
     def __init__(self, core: SupervisorCore) -> None:
         self.is_away = False
+        self.players = Departures(core)
         self._core = core
         self._since_ns = 0
         self._reason = ""
@@ -79,19 +81,24 @@ class Absence:
 
     def committed(self, before_ns: int, now_ns: int) -> None:
         """A frame is committed, the one before it was at `before_ns`."""
+        self.players.committed(before_ns, now_ns)
         if self.is_away:  # what was on its way when it went, or the first that it made possible
             self._gap_ns = max(self._gap_ns, now_ns - before_ns)
         elif self._entry is not None:
             self._entry.outage_ns, self._entry = max(self._gap_ns, now_ns - before_ns), None
 
+    def rest(self, stood_ns: int) -> None:
+        """The supervisor stood still for so long: that is no time in which the vHub could be heard."""
+        self._since_ns += stood_ns
+
     def is_over(self, now_ns: int) -> bool:
         """Whether the vHub was away for longer than a run waits; then the run is over, which is said."""
         core = self._core
-        if not self.is_away or now_ns < self._since_ns + core.deployment.deadlines.vhub_back_ns:
+        wait_ns = core.beginning.patience_ns(core.frame.tick, core.deployment.deadlines.vhub_back_ns)
+        if not self.is_away or now_ns < self._since_ns + wait_ns:
             return False
-        wait_s = core.deployment.deadlines.vhub_back_ns / 1e9
         self._note()
-        core.finish(f"lost vhub: {self._reason}; it did not come back within {wait_s:g} s", failed=True)
+        core.finish(f"lost vhub: {self._reason}; it did not come back within {wait_ns / 1e9:g} s", failed=True)
         return True
 
     def _note(self) -> None:

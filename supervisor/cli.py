@@ -6,14 +6,15 @@ Each subcommand is a thin shell over a typed function: `up.Up`, `main.serve`, `c
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.messages import Answer
 from foosim.protocol.probe import ProgressOption
 from foosim.supervisor import control
@@ -22,12 +23,14 @@ from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
 from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
+from foosim.supervisor.new_capture import check_capture, default_capture
+from foosim.supervisor.outcome import Outcome, detached_outcome, ended_outcome, refused_result
 from foosim.supervisor.pki_hosts import files_for, send_files
-from foosim.supervisor.plan import RunOptions, check_certificates, check_models_here, make_plan, plan_again
+from foosim.supervisor.plan import Plan, RunOptions, check_certificates, check_models_here, make_plan, plan_again
 from foosim.supervisor.remote import Remote, unit_name
-from foosim.supervisor.run_folder import create_run, open_run, run_exists
+from foosim.supervisor.run_folder import RunFolder, create_run, open_run, run_exists
 from foosim.supervisor.units import units_of
-from foosim.supervisor.up import Killed, Up, check_capture, default_capture
+from foosim.supervisor.up import Killed, Up
 
 app = new_app()
 
@@ -100,39 +103,71 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
 
     --resume RUN goes on with a run whose launcher died, from its last committed frame, with the options that it had.
     """
-    if no_capture and capture is not None:
-        raise BadValue("--capture and --no-capture exclude each other", str(capture))
-    folder = None if resumed is None else open_run(resumed)
-    if folder is not None:
-        if file is not None:
-            raise BadValue("--resume takes FILE and its options from the run", str(file))
-        plan, path = plan_again(folder)
-    elif file is None:
-        raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
-    else:
-        plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
-        check_models_here(plan)
-        found = capture or default_capture(plan.deployment.world)
-        path = None if no_capture else check_capture(found, is_split=plan.deployment.capture.is_split)
-    warnings = check_certificates(plan)
     display = Display(sys.stderr if json else sys.stdout)
-    for warning in warnings:
-        display.say(warning)
-    recover_leftovers(display.say, but=resumed)
-    if detached:
-        name = detach(plan, path, run).name
-        display.say(f"run {name} is up; foosim-supervisor status --run {name} shows it, down --run {name} ends it")
-        return
+    begun: Up | Outcome | None = None
     try:
-        outcome = Up(plan, path, display, run, folder).run()
+        if resumed is not None:
+            begins = pace, duration, seed, sets, engine, listen, branch, run, capture
+            if file is not None or insecure or balance or no_capture or detached or any(map(bool, begins)):
+                raise BadValue("--resume takes FILE and its options from the run", resumed)
+            begun = _go_on(open_run(resumed), display)
+        elif file is None:
+            raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
+        elif no_capture and capture is not None:
+            raise BadValue("--capture and --no-capture exclude each other", str(capture))
+        else:
+            options = _options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance)
+            begun = _begin(options, capture, not no_capture, run, detached, display)
+        outcome = begun.run() if isinstance(begun, Up) else begun
     except Killed as killed:
         print(killed, file=sys.stderr)
+        _print_result(killed.result, json)
         raise typer.Exit(INTERRUPTED) from None
+    except (Refused, MemoryError) as error:
+        reason = "too little memory" if isinstance(error, MemoryError) else str(error)
+        result = begun.unended(reason) if isinstance(begun, Up) else refused_result(resumed, run, reason)
+        _print_result(result, json)
+        raise
     for line in outcome.lines:
         display.say(line)
-    if json and outcome.result is not None:
-        print(encode_json(outcome.result).decode())
+    _print_result(outcome.result, json)
     raise typer.Exit(FAILED if outcome.failed else DONE)
+
+
+def _print_result(result: Mapping[str, Any], json: bool) -> None:
+    if json:
+        print(encode_json(result).decode())
+
+
+def _begin(
+    options: RunOptions, capture: Path | None, captures: bool, run: str | None, detached: bool, display: Display
+) -> Up | Outcome:
+    """Return a run of a deployment to be run, or leave it running; without a `capture` it is where captures go by
+    default, where any is wanted (`captures`)."""
+    plan = make_plan(options)
+    check_models_here(plan)
+    found = capture or default_capture(plan.deployment.world)
+    path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
+    _prepare(plan, display, None)
+    if detached:
+        return detached_outcome(detach(plan, path, run), plan.deployment, path)
+    return Up(plan, path, display, run)
+
+
+def _go_on(folder: RunFolder, display: Display) -> Up | Outcome:
+    """Return a run that is to go on; of one that has ended return how."""
+    if folder.result() is not None:
+        recover_leftovers(display.say)
+        return ended_outcome(folder)
+    plan, path = plan_again(folder)
+    _prepare(plan, display, folder.name)
+    return Up(plan, path, display, None, folder)
+
+
+def _prepare(plan: Plan, display: Display, resumed: str | None) -> None:
+    for warning in check_certificates(plan):
+        display.say(warning)
+    recover_leftovers(display.say, but=resumed)
 
 
 @app.command("run")

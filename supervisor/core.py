@@ -1,9 +1,7 @@
 """The core of the supervisor: takes messages and the time, releases orders, assembles and commits frames.
 
 It computes nothing of the world: it knows who computes what (epochs), what changes the world (orders), and puts the
-nodes' parts together. It journals, then speaks. A committed tick never changes. Neighbours: `roster` (who takes part),
-`pacing` (when orders are released), `requests` (what people ask), `watch` (who is waited for), `records` (journal),
-`take_over` (the start of a supervisor that goes on with a run).
+nodes' parts together. It journals, then speaks. A committed tick never changes.
 """
 
 from __future__ import annotations
@@ -48,7 +46,9 @@ from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account, Recovered
 from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.balance import Balancer
+from foosim.supervisor.beginning import Beginning
 from foosim.supervisor.branches import Branches
+from foosim.supervisor.closing import Closing
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
@@ -59,12 +59,8 @@ from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.status import SupervisorStatistics
 from foosim.supervisor.take_over import TakeOver
-from foosim.supervisor.watch import Watch
+from foosim.supervisor.watch import Watch, losses
 
-FAREWELL_NS: Final = 10_000_000_000
-"""How long an ended run waits for the vHub to close its capture."""
-GONE_NS: Final = 500_000_000
-"""How long what a process said last may take after the news that it is gone: the two come by different ways."""
 PREPARE_NS: Final = 200_000_000
 """How often a layout that nodes have not built yet is asked for again."""
 
@@ -92,13 +88,12 @@ class SupervisorCore:
         self.roster = Roster(self.deployment, fingerprint)
         self.pacer = Pacer(self.deployment.tick_ns, settings.pace)
         self.watch = Watch(self.deployment, self.roster, now_ns)
-        self.requests = Requests(self)
         self.recovery, self.absence, self.branches = Recovery(self), Absence(self), Branches(self)
         self.balancer = Balancer(self.deployment.owners()) if settings.balance else None
-        self.handshake = Handshake(self)
-        self.frame: Frame = first_frame(self.deployment, settings.start)
-        self.chain = first_chain(settings.origin)
+        self.requests, self.handshake, self.closing = Requests(self), Handshake(self), Closing(self)
+        self.frame, self.chain = first_frame(self.deployment, settings.start), first_chain(settings.origin)
         self.first_tick = self.frame.tick
+        self.beginning = Beginning(self.deployment, self.first_tick)
         self.epoch, self.is_open = 0, False
         """Whether an epoch of this supervisor has begun."""
         self.owners = self.deployment.owners()
@@ -168,7 +163,7 @@ class SupervisorCore:
         if self.end is None and not self.absence.is_over(now_ns):
             lost = self.watch.lost(self, now_ns)
             if lost and self.epoch == 0:
-                self.finish(_losses(lost), failed=True)
+                self.finish(losses(lost), failed=True)
             elif lost:
                 self._lose(lost, now_ns)
             if self.take_over is not None:
@@ -180,11 +175,8 @@ class SupervisorCore:
             if now_ns >= self._prepare_ns:
                 self.requests.prepare()
                 self._prepare_ns = now_ns + PREPARE_NS
-        elif self.end is not None and not self.finished:
-            hub = self.roster.by_name.get(channels.VHUB)
-            self.finished = hub is None or hub.farewell or now_ns > self.watch.ended_ns + FAREWELL_NS
-            if hub is not None and hub.gone_ns and now_ns > hub.gone_ns + GONE_NS:
-                self.finished = True
+        elif not (self.finished or (self.take_over is not None and self.take_over.waits_for_hub(now_ns))):
+            self.finished = self.closing.is_over(now_ns)
 
     @property
     def lacking(self) -> tuple[Channel, int]:
@@ -215,7 +207,8 @@ class SupervisorCore:
         if process is None:
             return
         process.gone_ns = now_ns
-        if not process.farewell and not process.lost and self.end is None:
+        is_certain = not self.watch.doubts(process, now_ns)
+        if is_certain and not process.farewell and not process.lost and self.end is None:
             self._lose({name: "its connection closed"}, now_ns)
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
@@ -224,7 +217,7 @@ class SupervisorCore:
         if channels.VHUB in others:
             self.absence.lose(others.pop(channels.VHUB), now_ns)
         if others:
-            self.finish(_losses(others), failed=True)
+            self.finish(losses(others), failed=True)
         for name in sorted(lost.keys() & self.deployment.nodes.keys()):
             if self.end is None:
                 self.recovery.lose(name, lost[name], now_ns)
@@ -235,8 +228,12 @@ class SupervisorCore:
         self.arrivals.parts.clear()
 
     def finish(self, reason: str, failed: bool) -> None:
-        """End the run in order at the last committed tick; say it once."""
-        if self.end is not None:
+        """End the run in order at the last committed tick; say it once. One that was only resumed is abandoned."""
+        if self.end is not None or self.finished:
+            return
+        if failed and self.beginning.abandons(self.frame.tick, reason):
+            self.finished = True
+            self.say("error", f"the run does not go on from tick {self.frame.tick}: {reason}")
             return
         self.end = End(self.frame.tick, reason, failed)
         self.watch.ended_ns = self.watch.now_ns
@@ -493,8 +490,3 @@ class SupervisorCore:
             self._say_orders(want.tick, want.tick + 1)
         elif want.kind == channels.COMMIT.name and want.tick in self.commits:
             self.actions.append(Publish(channels.COMMIT, want.sender, self.commits[want.tick]))
-
-
-def _losses(lost: Mapping[str, str]) -> str:
-    """Return who is lost and why as a reason to end."""
-    return "lost " + "; ".join(f"{name}: {why}" for name, why in lost.items())

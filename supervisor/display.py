@@ -15,6 +15,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from foosim.protocol.disk import megabytes
+from foosim.vhub.room_watch import CLOSING
+
 LINKS_SHOWN_MAX: Final = 20
 ENTITIES_SHOWN_MAX: Final = 6
 
@@ -79,6 +82,8 @@ def recovery_text(entry: dict[str, Any]) -> str:
         "join": f"node {name} takes part",
         "supervisor": "the supervisor was started again",
         "vhub": f"lost the vHub ({entry['reason']})",
+        "player": f"lost {name} ({entry['reason']})",
+        "return": f"{name} takes part again",
     }
     what = texts[entry["what"]]
     after = "" if entry["outage_ms"] is None else f", went on after {entry['outage_ms']:.1f} ms"
@@ -92,6 +97,15 @@ def recording_text(status: dict[str, Any]) -> str:
         return ""
     refused = f" ({recording['refused']} rows are not in it)" if recording["refused"] else ""
     return f"capture {recording['state']}: {recording['problem']}{refused}"
+
+
+def closing_text(status: dict[str, Any]) -> str:
+    """`closing the capture: 81,200 rows are left, 12.4 MB are written`; empty when nothing is closed."""
+    recording = status["recording"]
+    if recording["state"] != CLOSING:
+        return ""
+    left = recording["offered"] - recording["written"] - recording["refused"]
+    return f"closing the capture: {left:,} rows are left, {megabytes(recording['bytes'])} are written"
 
 
 def plain_line(status: dict[str, Any]) -> str:
@@ -185,18 +199,25 @@ def _links(status: dict[str, Any], links_max: int) -> Table:
     table = Table(title="links", title_justify="left", box=None, pad_edge=False)
     table.add_column("from")
     table.add_column("to")
-    for column in ("offered", "delivered", "dropped", "mean delay"):
+    for column in ("offered", "delivered", "dropped", "mean delay", "age at use, p99"):
         table.add_column(column, justify="right")
     links = status["links"]
     shown = sorted(links, key=lambda link: (-link[2], link[:2]))[:links_max]
-    for source, destination, offered, delivered, dropped, delay_ns, *_ in sorted(shown):
-        table.add_row(source, destination, str(offered), str(delivered), str(dropped), f"{delay_ns / 1e6:.2f} ms")
+    for source, destination, offered, delivered, dropped, delay_ns, _, _, _, ages in sorted(shown):
+        delay = f"{delay_ns / 1e6:.2f} ms"
+        table.add_row(source, destination, str(offered), str(delivered), str(dropped), delay, _age_text(ages))
     packets = status["packets"]
     hidden = max(len(links), status.get("links_in_all", 0)) - len(shown)
     more = f"and {hidden} more" if hidden > 0 else ""
     total = (str(packets["offered"]), str(packets["delivered"]), str(packets["dropped"]))
     table.add_row("all", more, *total, f"{packets['in_flight']} in flight", style="bold")
     return table
+
+
+def _age_text(ages: list[list[Any]]) -> str:
+    """Return how old what goes by a link is when its receiver acts: of the one channel, or the oldest of several."""
+    _, _, p50_ns, p99_ns = max(ages, key=lambda age: (age[3], age[2]), default=("", 0, -1, -1))
+    return "" if p99_ns < 0 else f"{p50_ns / 1e6:.1f}, {p99_ns / 1e6:.1f} ms"
 
 
 def render_text(status: dict[str, Any], width: int = 120) -> str:
@@ -243,6 +264,14 @@ class Display:
             self._live.update(fitted(status, self._console), refresh=True)
         else:
             self.say(plain_line(status))
+
+    def show_closing(self, status: dict[str, Any]) -> None:
+        """Show how far a run that has ended is with its capture."""
+        text = closing_text(status)
+        if self._live is not None:
+            self._live.update(Group(fitted(status, self._console), Text(text)), refresh=True)
+        elif text:
+            self.say(text)
 
     def say(self, line: str) -> None:
         """Show one line that stays."""

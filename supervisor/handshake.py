@@ -14,6 +14,7 @@ from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.codec import decode_json, encode
 from foosim.protocol.fetching import piece_of
 from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Recall, Refusal
+from foosim.supervisor.absence import SAID_NS
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -28,12 +29,18 @@ class Handshake:
     def hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
         """Answer who asks to take part: with what to build, or with a refusal."""
         core = self._core
+        if core.roster.has_silent_namesake(hello, now_ns):
+            return  # the one before it may have ended; it says hello again
         reason = core.roster.reason_against(hello)
         if reason:
             self.refuse(hello.role, hello.name, hello.boot, reason)
             return
-        if self._has_ended():
+        closes = core.take_over is not None and hello.role == "vhub"  # its capture, where the run has ended
+        if not closes and self._has_ended():
             return
+        known = core.roster.by_name.get(hello.name)
+        if known is not None and known.in_doubt and known.boot != hello.boot:
+            core.process_gone(hello.name, now_ns)  # there is no doubt left
         core.roster.take(hello, now_ns)
         run, pace, added = core.settings, str(core.pacer.pace), core.added_to(core.frame.layout)
         deployment = run.deployment_name, run.deployment_text
@@ -94,10 +101,13 @@ class Handshake:
         process = core.roster.by_name.get(heartbeat.sender)
         if process is None:
             if heartbeat.sender in core.roster.expected:
+                core.beginning.found_living = True
                 core.actions.append(Publish(channels.RECALL, channels.SUPERVISOR, encode(Recall(core.boot))))
             core.count_repeat()
             return
         process.heard_ns = now_ns
+        if process.in_doubt and now_ns > process.gone_ns + SAID_NS:
+            process.in_doubt, process.gone_ns = False, 0
         if process.lost and process.name != channels.VHUB:
             core.recovery.hear(process, now_ns)
         if not heartbeat.report:
@@ -106,6 +116,7 @@ class Handshake:
         process.heartbeat = heartbeat
         report = decode_json(heartbeat.report)
         process.report = report if isinstance(report, dict) else {}
+        core.absence.players.hear(process)
         if process.lost and process.name == channels.VHUB:
             core.absence.hear(now_ns)
         if core.end is not None:
@@ -115,7 +126,7 @@ class Handshake:
             if heartbeat.sender == channels.VHUB:
                 core.actions.append(Publish(channels.TEMPO, channels.SUPERVISOR, core.tempo()))
         if heartbeat.lost and heartbeat.sender == channels.VHUB and core.end is None:
-            core.finish(f"lost {heartbeat.lost}", failed=True)
+            core.finish(heartbeat.lost, failed=True)
 
     def farewell(self, farewell: Farewell, payload: bytes, now_ns: int) -> None:
         """The vHub's last word: its capture is closed."""

@@ -9,6 +9,7 @@ Neighbours: `up`, `remote` (the command lines of ssh), `guard` (the other end).
 
 from __future__ import annotations
 
+import errno
 import os
 import shlex
 import signal
@@ -21,6 +22,8 @@ from typing import Final
 
 from foosim.protocol.errors import Failed
 from foosim.supervisor.children import GRACE_S, child_environment, script
+from foosim.supervisor.ending import Ending
+from foosim.supervisor.memory import oom_kills
 from foosim.supervisor.remote import Remote
 
 POLL_S: Final = 0.02
@@ -40,11 +43,24 @@ class Child:
     """The machine that it runs on when that is another one: `process` is the ssh that holds it."""
     begin: int = 0
     """Where its log begins, behind what those before it said."""
+    oom_kills: int = 0
+    """How many processes the kernel had killed for want of memory when it was started."""
+    killed: str = ""
+    """Why the launcher killed it; empty when it did not."""
 
     @property
     def exit_code(self) -> int | None:
         """Its exit code, -N when signal N ended it, None while it lives."""
         return self.process.poll()
+
+    @property
+    def how(self) -> Ending:
+        """How it ended; it has."""
+        code = self.exit_code
+        assert code is not None, f"{self.name} lives"
+        name = signal.Signals(-code).name if code < 0 else ""
+        ran_out = code == -signal.SIGKILL and self.remote is None and oom_kills() > self.oom_kills
+        return Ending(code, name, self._tail(LINES), self.killed, ran_out, self.remote is not None)
 
     @property
     def ending(self) -> str:
@@ -54,7 +70,12 @@ class Child:
             return "is alive"
         if self.remote is not None and code > 0:
             return f"ended: {self.remote.why(code, self._tail(LINES))}"
-        return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        return self.how.text
+
+    def kill(self, why: str) -> None:
+        """Kill it, of which people are told why."""
+        self.killed = why
+        self.process.kill()
 
     @property
     def is_away(self) -> bool:
@@ -103,17 +124,23 @@ class Launcher:
         remote = self.remotes.get(name)
         if remote is not None:
             return self._start_there(name, command, log, remote)
-        with log.open("ab") as file:
-            process = subprocess.Popen(
-                (script(command[0]), *command[1:]),
-                stdin=subprocess.DEVNULL,
-                stdout=file,
-                stderr=subprocess.STDOUT,
-                env=child_environment(self._end),
-                pass_fds=(self._end,),
-                process_group=0,
-            )
-        child = self.children[name] = Child(name, tuple(command), log, process)
+        kills = oom_kills()
+        try:
+            with log.open("ab") as file:
+                begin = file.tell()
+                process = subprocess.Popen(
+                    (script(command[0]), *command[1:]),
+                    stdin=subprocess.DEVNULL,
+                    stdout=file,
+                    stderr=subprocess.STDOUT,
+                    env=child_environment(self._end),
+                    pass_fds=(self._end,),
+                    process_group=0,
+                )
+        except OSError as error:
+            why = "too little memory" if error.errno == errno.ENOMEM else error.strerror
+            raise Failed(f"{name} cannot be started: {why}") from None
+        child = self.children[name] = Child(name, tuple(command), log, process, None, begin, kills)
         return child
 
     def _start_there(self, name: str, command: Sequence[str], log: Path, remote: Remote) -> Child:

@@ -43,11 +43,11 @@ def recover_leftovers(say: Callable[[str], None], but: str | None = None) -> Non
 
 def captured_at(folder: RunFolder) -> Path | None:
     """Return where the capture of a run is, as its vHub's journal says; None without a journal or a capture."""
-    try:
-        for file in journal_files(folder.journals, VHUB):
+    for file in journal_files(folder.journals, VHUB):
+        try:
             head = decode_any(HubRecord, next(read_records(file), b""))
-            if isinstance(head, HeadRecord) and head.capture:
-                return Path(head.capture)
-    except (JournalError, Malformed):
-        return None
+        except (JournalError, Malformed):
+            continue  # another file may tell
+        if isinstance(head, HeadRecord) and head.capture:
+            return Path(head.capture)
     return None

@@ -20,7 +20,7 @@ def links_shown(status: dict[str, Any], before: dict[str, Any] | None = None) ->
         since_tick = before["ticks"]
     seconds = (status["ticks"] - since_tick) * status["tick_ns"] / 1e9
     shown = []
-    for source, destination, offered, delivered, dropped, delay_ns, rule, queue_ns, causes in status["links"]:
+    for source, destination, offered, delivered, dropped, delay_ns, rule, queue_ns, causes, ages in status["links"]:
         new = max(0, offered - known.get((source, destination, rule), 0))
         shown.append(
             {
@@ -34,6 +34,10 @@ def links_shown(status: dict[str, Any], before: dict[str, Any] | None = None) ->
                 "causes": causes,
                 "delay_ns": delay_ns,
                 "queue_ns": queue_ns,
+                "ages_at_use": [
+                    {"channel": channel, "uses": uses, "p50_ns": p50_ns, "p99_ns": p99_ns}
+                    for channel, uses, p50_ns, p99_ns in ages
+                ],
             }
         )
     return sorted(shown, key=lambda link: (-link["offered_per_s"], -link["offered"], link["from"], link["to"]))

@@ -19,18 +19,19 @@ from foosim.protocol.actions import Say
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.certificates import check_host, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
-from foosim.protocol.command import DONE, FAILED
-from foosim.protocol.errors import Refused
+from foosim.protocol.command import DONE, FAILED, REFUSED
+from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, JournalError, journal_files, read_newest, remove_journal
+from foosim.protocol.journal import Journal, JournalError, journal_files, remove_journal
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.notify import Notify
 from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.journal_check import supervisor_records
 from foosim.supervisor.journal_room import JournalRoom
 from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.records import History, fold
@@ -83,6 +84,7 @@ class SupervisorProcess:
         self._loop.on_unwritten = self._on_unwritten
         self._room = JournalRoom(folder.journals, plan.deployment.capture.reserve_bytes)
         self._loop.took = self.core.watch.took
+        self._loop.stood = lambda stood_ns, now_ns: self.core.watch.rest(self.core, stood_ns, now_ns)
         self._loop.lacking = lambda: self.core.lacking
         self._loop.on_alive = self._on_alive
         wire.read(channels.SUPERVISOR_READS, channels.SUPERVISOR_WAITS)
@@ -90,15 +92,18 @@ class SupervisorProcess:
         wire.declare_alive()
 
     def run(self) -> int:
-        """Serve the run until it has ended; write how, and return the exit code."""
+        """Serve the run until it has ended; write how, and return the exit code. Of one that was resumed and does not
+        go on, nothing is written, so that it can be resumed again."""
         info = self._info
         self._folder.write_info(info)
         self.core.say("info", f"run {info.run} listens at {info.simulation}; its folder is {self._folder.path}")
         self._loop.run(lambda: self.core.finished)
         self._loop.perform()
+        if self.core.beginning.abandoned:
+            return REFUSED
         self._folder.write_result(result(self.core))
         end = self.core.end
-        return FAILED if end is None or end.failed else DONE
+        return FAILED if end is None or end.failed or self.core.closing.cut_off else DONE
 
     def stop(self) -> None:
         """Have the run end in order, as the command `down` does; a signal handler may call this."""
@@ -175,9 +180,12 @@ def _history(plan: Plan, folder: RunFolder) -> History | None:
     """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
     if folder.result() is not None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
-    if not journal_files(folder.journals, SUPERVISOR):
-        return None
-    history = fold(plan.deployment, read_newest(folder.journals, SUPERVISOR))
+    if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
+        return None  # the one before may have ended when it had only made the file
+    try:
+        history = fold(plan.deployment, supervisor_records(folder, plan.options))
+    except (JournalError, Malformed) as error:
+        raise Refused(f"run {folder.name} cannot go on: {error}") from None
     if history.run.deployment != plan.text:
         raise Refused(f"run {folder.name} was started with another deployment than {plan.options.file} is now")
     return history

@@ -68,7 +68,12 @@ def link_line(link: dict[str, Any]) -> str:
         f"{link['from']} to {link['to']} ({link['rule']}): {link['offered_per_s']:.1f}/s, offered {link['offered']}, "
         f"delivered {link['delivered']}, dropped {link['dropped']}{causes}, mean delay "
         f"{time_text(link['delay_ns'])}, queue {time_text(link['queue_ns'])}"
-    )
+    ) + "".join(f", age at use of {text}" for text in map(age_text, link["ages_at_use"]))
+
+
+def age_text(age: dict[str, Any]) -> str:
+    """Return how old a channel is when its receiver acts: `ball 6 ms, p99 8 ms`."""
+    return f"{age['channel']} {time_text(age['p50_ns'])}, p99 {time_text(age['p99_ns'])}"
 
 
 def link_table(links: Sequence[dict[str, Any]], title: str) -> Table:
@@ -76,7 +81,7 @@ def link_table(links: Sequence[dict[str, Any]], title: str) -> Table:
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for column in ("from", "to", "rule"):
         table.add_column(column)
-    for column in ("offered/s", "offered", "delivered", "dropped", "mean delay", "queue"):
+    for column in ("offered/s", "offered", "delivered", "dropped", "mean delay", "queue", "age at use"):
         table.add_column(column, justify="right")
     table.add_column("causes")
     for link in links:
@@ -90,6 +95,7 @@ def link_table(links: Sequence[dict[str, Any]], title: str) -> Table:
             str(link["dropped"]),
             time_text(link["delay_ns"]),
             time_text(link["queue_ns"]),
+            "; ".join(map(age_text, link["ages_at_use"])),
             ", ".join(f"{cause} {count}" for cause, count in link["causes"].items()),
         )
     return table

@@ -20,11 +20,12 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment, read_de
 from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.hall_start import start_findings
 from foosim.protocol.hosts import places
-from foosim.protocol.journal import journal_files
 from foosim.protocol.messages import Origin
 from foosim.protocol.start import Start
 from foosim.protocol.units import Pace, parse_ns, parse_pace
-from foosim.supervisor.run_folder import RESULT_FILE, Launch, RunFolder
+from foosim.supervisor.journal_check import check_journals
+from foosim.supervisor.resumable import check_resumable
+from foosim.supervisor.run_folder import Launch, RunFolder
 from foosim.vhub.branching import Branch, read_branch
 from foosim.vhub.link_models import check_link_models
 
@@ -201,11 +202,13 @@ def options_of(launch: Launch) -> RunOptions:
 
 def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
     """Return the plan and the capture of a run whose launcher is gone. Raises Refused when it cannot go on."""
-    launch = folder.launch()
-    if folder.result() is not None:
-        raise Refused(f"run {folder.name} has ended: {folder.path / RESULT_FILE} says how")
-    if launch is None or not journal_files(folder.journals, SUPERVISOR):
-        raise Refused(f"run {folder.name} has no journal to go on from in {folder.journals}")
     if folder.is_live() or not folder.is_left():
         raise Refused(f"run {folder.name} is alive: its processes are started again by themselves")
-    return make_plan(options_of(launch)), Path(launch.capture) if launch.capture else None
+    launch = folder.launch()
+    if launch is None:
+        raise Refused(f"run {folder.name} has no launcher that was lost: what was started by hand is so again")
+    capture = Path(launch.capture) if launch.capture else None
+    plan = make_plan(options_of(launch))
+    check_resumable(folder, plan.options.file, capture, has_hub_here=VHUB not in places(plan.deployment))
+    check_journals(folder, plan.options)
+    return plan, capture

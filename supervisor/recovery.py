@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from foosim.protocol.actions import Journal
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Edit, Freeze, Thaw
+from foosim.supervisor.absence import SAID_NS
 from foosim.supervisor.account import Recovered, close_outages
 from foosim.supervisor.records import RecoveredRecord
 from foosim.supervisor.roster import Process
@@ -106,6 +107,8 @@ class Recovery:
         Then it goes on in the next one, if it had built the world and its arithmetic was compared.
         """
         core = self._core
+        if not core.is_open and now_ns > process.gone_ns + SAID_NS:
+            process.lost = False  # its connection was cut; it says that it is ready until it is told of an epoch
         runs = core.is_open and core.end is None
         if runs and not core.members and process.ready and process.name not in core.roster.stopped:
             process.lost = False

@@ -369,6 +369,11 @@ class Requests:
         return self._accept(request, core.frame.tick, text)
 
     def _down(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        """End the run; by a loss that only its launcher knows of, `lost`, at once."""
+        lost = arguments.get("lost")
+        if isinstance(lost, str) and lost:
+            self._core.finish(f"lost {lost}", failed=True)
+            return self._accept(request, self._core.frame.tick, f"the run ends at tick {self._core.frame.tick}")
         tick = self._core.stop()
         return self._accept(request, tick, f"the run ends at tick {tick}")
 

@@ -50,9 +50,17 @@ class Restarts:
         known.due_s = now_s + wait_s
         return wait_s
 
+    def give_up(self, name: str) -> None:
+        """This process is not to be started again: it would end in the same way."""
+        self._by_name.setdefault(name, _Restarts()).failed = True
+
     def forget(self, name: str) -> None:
         """Somebody wants this process: what ended before does not count any more."""
         self._by_name.pop(name, None)
+
+    def has_ended(self, name: str) -> bool:
+        """Whether this process has ended before."""
+        return name in self._by_name
 
     def is_known(self, name: str) -> bool:
         """Whether the end of this process has been told and is not over: it waits, or is given up."""

@@ -16,6 +16,8 @@ from foosim.protocol.errors import show
 from foosim.protocol.messages import Heartbeat, Hello, Ready
 from foosim.protocol.names import nearest_name
 
+SILENT_NS: Final = 3 * limits.HEARTBEAT_NS
+"""A process that lives is not silent for so long, unless its machine or its loop stands."""
 ROLES: Final[tuple[str, ...]] = ("node", "vhub")
 
 
@@ -35,6 +37,8 @@ class Process:
     report: dict[str, Any] = field(default_factory=dict)
     farewell: bool = False
     gone_ns: int = 0
+    in_doubt: bool = False
+    """Its connection has ended, perhaps only because the supervisor stood still."""
     lost: bool = False
     """The run goes on without it; it may come back by the handshake."""
 
@@ -83,7 +87,7 @@ class Roster:
         if hello.name in self.stopped:
             return f"{hello.name} is stopped; `foosim-supervisor start {hello.name}` lets it take part again"
         known = self.by_name.get(hello.name)
-        if known is not None and known.boot != hello.boot and not known.lost:
+        if known is not None and known.boot != hello.boot and not known.lost and not known.in_doubt:
             return f"a {known.role} {hello.name} is already here"
         if hello.fingerprint != self._fingerprint and not self.deployment.mixed_cpu:
             return (
@@ -91,6 +95,12 @@ class Roster:
                 "its results would differ (the deployment may say mixed_cpu: true)"
             )
         return ""
+
+    def has_silent_namesake(self, hello: Hello, now_ns: int) -> bool:
+        """Whether another process of this name takes part and was not heard of for some heartbeats: it may be gone."""
+        known = self.by_name.get(hello.name)
+        is_other = known is not None and known.boot != hello.boot and not known.lost
+        return known is not None and is_other and now_ns - known.heard_ns > SILENT_NS
 
     def take(self, hello: Hello, now_ns: int) -> Process:
         """Note a process whose hello was accepted; one that was lost begins anew."""

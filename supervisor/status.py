@@ -34,7 +34,9 @@ class SupervisorStatistics:
 
 DISRUPTIONS_SHOWN: Final = 16
 """Events of the network that a status has, the last that were asked for."""
-NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0}
+NOT_RECORDED = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
+UNFINISHED: Final = "unfinished"
+"""State of a recording of which nobody has said that it is closed: its file has no end, or was closed later."""
 NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refused": 0}
 
 
@@ -43,6 +45,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
     frame = core.frame
     hub = core.roster.by_name.get(VHUB)
     report = {} if hub is None else hub.report
+    cut_off = core.closing.cut_off
     wall_ns = core.committed_ns - core.started_ns
     origin = core.settings.origin
     return {
@@ -57,7 +60,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         "lateness_ms": report.get("lateness_ms"),
         "digest": {"frame": frame.digest.hex(), "chain": core.chain.hex()},
         "packets": report.get("packets", NO_PACKETS),
-        "recording": report.get("recording") or NOT_RECORDED,
+        "recording": _recording(core),
         "from": None if origin is None else {"capture": origin.source, "tick": origin.tick},
         "nodes": {
             name: {
@@ -71,9 +74,9 @@ def result(core: SupervisorCore) -> dict[str, Any]:
         "moves": core.account.moves,
         "handovers": core.account.handovers,
         "score": _score(frame),
-        "capture": (report.get("capture") or None) if hub is not None and hub.farewell else None,
-        "reason": core.end.reason if core.end is not None else None,
-        "failed": core.end.failed if core.end is not None else False,
+        "capture": report.get("capture") or None,
+        "reason": "; ".join(part for part in (core.end.reason, cut_off) if part) if core.end is not None else None,
+        "failed": core.end is not None and (core.end.failed or bool(cut_off)),
     }
 
 
@@ -85,9 +88,9 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
     waiting_for = ", ".join(core.watch.waiting_for(core))
     return {
         **result(core),
-        "capture": report.get("capture") or None,
         "epoch": core.epoch,
         "state": _state(core),
+        "begun": not core.beginning.lasts(core.frame.tick),
         "pace": str(pacer.pace),
         "released": core.released,
         "late": {"lag_ms": pacer.last_lag_ns / 1e6, "waited_for": core.watch.late, "tick": core.watch.late_tick},
@@ -108,6 +111,14 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "refusals": report.get("refusals", {}),
         "clients": report.get("clients", []),
     }
+
+
+def _recording(core: SupervisorCore) -> dict[str, Any]:
+    """Return how the capture does, as the vHub told last; in a run that is over that is final once it said farewell."""
+    hub = core.roster.by_name.get(VHUB)
+    told = NOT_RECORDED if hub is None else hub.report.get("recording") or NOT_RECORDED
+    is_open = core.finished and hub is not None and not hub.farewell and told["state"] in ("on", "low", "closing")
+    return {**told, "state": UNFINISHED} if is_open else told
 
 
 def _score(frame: Frame) -> dict[str, int] | None:

@@ -32,8 +32,9 @@ class TakeOver:
         deadlines = core.deployment.deadlines
         self._core = core
         self._standing: Standing | None = None
-        self._nodes_ns = now_ns + deadlines.heartbeat_ns + REJOIN_NS
-        self._hub_ns = now_ns + deadlines.orphan_ns
+        self._living_ns = now_ns + deadlines.heartbeat_ns + REJOIN_NS
+        self._start_ns = now_ns + deadlines.start_ns
+        self._hub_ns = now_ns + max(deadlines.orphan_ns, deadlines.start_ns)
         self._roster = [] if history.epoch is None else list(history.epoch.roster)
         self._owners = history.owners
         """Who owns what by the last request, also if no epoch has begun with it."""
@@ -41,6 +42,7 @@ class TakeOver:
             history.started_ns += now_ns - history.committed_ns
             history.committed_ns = now_ns
         stand_on(core, history)
+        core.beginning.go_on(core.frame.tick)
         core.say("warning", f"started again: the journal ends at tick {core.frame.tick}, epoch {core.epoch}")
 
     def standing(self, standing: Standing, now_ns: int) -> bool:
@@ -49,6 +51,11 @@ class TakeOver:
         core = self._core
         if self._standing is not None and self._standing.boot == standing.boot:
             return False
+        if core.end is not None:
+            self._standing = standing
+            core.watch.ended_ns = now_ns
+            core.branches.proceed(standing)
+            return True
         if core.branches.is_behind(standing):
             core.branches.begin(standing, now_ns)
         elif core.branches.is_further(standing):
@@ -57,7 +64,18 @@ class TakeOver:
         core.epoch = max(core.epoch, standing.epoch)
         core.prepare(core.frame.layout)
         self._standing = standing
+        core.beginning.go_on(core.frame.tick)
         return True
+
+    def rest(self, stood_ns: int) -> None:
+        """The supervisor stood still for so long: nobody could come back to it."""
+        self._living_ns += stood_ns
+        self._start_ns += stood_ns
+        self._hub_ns += stood_ns
+
+    def waits_for_hub(self, now_ns: int) -> bool:
+        """Whether a run that has ended, perhaps before this start, waits for the vHub to close its capture."""
+        return self._standing is None and now_ns <= self._hub_ns
 
     def lose_hub(self) -> None:
         """The vHub is gone again: the next one tells where it stands."""
@@ -66,16 +84,18 @@ class TakeOver:
     def wake(self, now_ns: int) -> None:
         """Begin the epoch when everybody is here, or when those who are not have had their time."""
         core = self._core
-        if core.end is not None:
+        if core.end is not None or core.finished:
             return
         if self._standing is None:
             if now_ns > self._hub_ns:
-                core.finish(f"lost {channels.VHUB}: it has not come back to the supervisor", failed=True)
+                wait_s = max(core.deployment.deadlines.orphan_ns, core.deployment.deadlines.start_ns) / 1e9
+                core.finish(f"lost {channels.VHUB}: it has not come to the supervisor within {wait_s:g} s", failed=True)
             return
         layout, known = core.frame.layout.digest, core.roster.by_name
         expected = [name for name in self._roster if name not in core.roster.stopped]
         here = [name for name in expected if name in known and layout in known[name].ready and not known[name].lost]
-        if len(here) == len(expected) or now_ns >= self._nodes_ns:
+        waits_until_ns = self._living_ns if core.beginning.found_living else self._start_ns
+        if len(here) == len(expected) or now_ns >= waits_until_ns:
             self._open(here, [name for name in expected if name not in here], now_ns)
 
     def _open(self, here: list[str], missing: list[str], now_ns: int) -> None:
@@ -94,6 +114,8 @@ class TakeOver:
         core.owners = dict(self._owners)
         core.members = tuple(here)
         core.recovery.begin(here, missing, now_ns)
+        if core.finished:
+            return
         core.say_last_commit(now_ns)
         assert self._standing is not None
         core.branches.proceed(self._standing)

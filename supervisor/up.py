@@ -8,15 +8,13 @@ looks at them, asks the supervisor for the status that it shows, and hands on a 
 from __future__ import annotations
 
 import signal
-import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from foosim.protocol import wall
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.certificates import operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
@@ -25,18 +23,18 @@ from foosim.protocol.errors import Failed, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.session import ConnectError
 from foosim.supervisor.control import Control, NoAnswer
-from foosim.supervisor.display import Display, recording_text, recovery_text
+from foosim.supervisor.display import Display, recovery_text
 from foosim.supervisor.hosts import check_hosts, fetch_capture
 from foosim.supervisor.launcher import Child, Launcher, command_line
+from foosim.supervisor.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
+from foosim.supervisor.outcome import Outcome, capture_lines, plan_facts, result_without_supervisor, with_capture
 from foosim.supervisor.plan import Plan, launch_of
 from foosim.supervisor.remote import CAPTURE
 from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
-from foosim.vhub.capture_parts import first_there, has_end, parts_at
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
-from foosim.vhub.rows import CaptureError
 
 POLL_S: Final = 0.02
 """How often a run that starts is looked at."""
@@ -48,58 +46,20 @@ LEAVE_S: Final = 1.0
 """How long the others may take to end when the supervisor has: it waited for the vHub's capture."""
 AWAY_S: Final = 10.0
 """The same for those on other machines, where an end takes a moment to be known."""
-STALLED_S: Final = 1.0
-"""How long a node that is lost may take to come back by itself before its process is killed."""
-CUT_OFF_S: Final = 10.0
-"""The same for a node on another machine: it may only be cut off, and holds on until it is not."""
-STALLED_TRIES: Final = 5
-"""How many questions a supervisor may leave unanswered for a second each before its process is killed."""
 LOST_S: Final = 3.0
 """How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
-STATUS_S: Final = 1.0
 ENDED: Final = ("ended", "failed")
 """States of a run that only waits for its vHub to close the capture."""
 
 T = TypeVar("T")
 
 
-class CaptureExists(Refused):
-    """A capture is never overwritten."""
-
-
 class Killed(Exception):
     """A second Ctrl-C: everything was killed. The text says so, and where the unfinished capture is."""
 
-
-def default_capture(world: str) -> Path:
-    """Return where a run is captured when nobody says where."""
-    stem = f"{world}-{wall.now_stamp()}"
-    names = (stem if number == 1 else f"{stem}-{number}" for number in range(1, 1000))
-    return next(path for path in (Path("captures") / f"{name}.mcap" for name in names) if not parts_at(path))
-
-
-def check_capture(path: Path, *, is_split: bool = False) -> Path:
-    """Return the path when nothing is there yet and its folder, made where missing, takes files; raises Refused.
-
-    Nor may there be, for one that is split, what is called as the files that it goes on in.
-    """
-    try:
-        for found in parts_at(path).values() if is_split or path.exists() else ():
-            raise CaptureExists(f"{found} exists, and a capture is never overwritten")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
-            return path
-    except OSError as error:
-        raise Refused(f"{path}: cannot be created, {error.strerror}") from None
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """How a run ended: the JSON of its result (None when its supervisor was lost), and what people should know."""
-
-    result: dict[str, Any] | None
-    failed: bool
-    lines: tuple[str, ...]
+    def __init__(self, text: str, result: Mapping[str, Any]) -> None:
+        super().__init__(text)
+        self.result = result
 
 
 class Up:
@@ -133,15 +93,18 @@ class Up:
         self._lost: Child | None = None
         self._lost_s = 0.0
         self._has_begun = self._has_ended = False
+        self._is_resumed = resumed is not None
         self._restarts = Restarts()
-        self._stalled: dict[str, tuple[int, float]] = {}
-        """Processes that are lost though their processes live: which process, since when."""
+        self._own_time = OwnTime(time.monotonic())
+        self._supervisor_watch = SupervisorWatch(plan.deployment.deadlines)
+        self._stalled_watch = StalledWatch(plan.deployment.deadlines)
+        self._control: Control | None = None
+        self._status: dict[str, Any] = {}
+        """The last that the supervisor has told."""
         self._stopped: set[str] = set()
         """Nodes that somebody stopped."""
         self._starts: dict[str, int] = {}
         """How often somebody asked for a node to be started, as far as it was done."""
-        self._unanswered = 0
-        """Questions to the supervisor since its last answer."""
         self._told = 0
         """How many of the run's recoveries were shown."""
 
@@ -151,6 +114,8 @@ class Up:
             try:
                 if self._start():
                     self._watch()
+                if self._can_resume:
+                    self._launcher.kill()  # who is told to end would end the capture
                 leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
                 self._launcher.wait(leave_s if self.folder.result() is not None else END_S)
             finally:
@@ -158,6 +123,12 @@ class Up:
                 self._launcher.close()
             self._bring_home()
         return self._outcome()
+
+    @property
+    def _can_resume(self) -> bool:
+        """Whether nothing has ended the run, though its supervisor is gone, or has not begun to go on with it."""
+        is_gone = self._launcher.children[SUPERVISOR].exit_code is not None
+        return self.folder.result() is None and (is_gone or (self._is_resumed and not self._has_begun))
 
     # --- starting ----------------------------------------------------------------------------------------------------
 
@@ -219,7 +190,12 @@ class Up:
             self._not_home = str(failed)
 
     def _launch(self, name: str, command: list[str]) -> None:
-        self._launcher.start(name, command, self.folder.log(name))
+        self._start_child(name, command, self.folder.log(name))
+
+    def _start_child(self, name: str, command: Sequence[str], log: Path) -> None:
+        self._launcher.start(name, command, log)
+        if name == SUPERVISOR:
+            self._supervisor_watch.started(self._own_time.at(time.monotonic()))
 
     def _own_info(self) -> RunInfo | None:
         """Return what the run file says, once it is that of the supervisor that is our child."""
@@ -243,7 +219,6 @@ class Up:
 
     def _watch(self) -> None:
         """Show the run until its supervisor has ended."""
-        control: Control | None = None
         next_s = time.monotonic()
         exposure = Exposure(self.plan.address, time.monotonic_ns())
         with ExitStack() as stack:
@@ -253,14 +228,14 @@ class Up:
                     self.display.say(reminder)
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self.display.every_s
-                    control = control or self._connect(stack)
-                    if control is not None:
-                        self._show(control)
+                    self._control = self._control or self._connect(stack)
+                    if self._control is not None:
+                        self._show(self._control)
                 time.sleep(WATCH_S)
 
     def _connect(self, stack: ExitStack) -> Control | None:
         """Connect to the supervisor; None when it has ended before: the run was short, or somebody killed it."""
-        info, supervisor = self.folder.info(), self._launcher.children[SUPERVISOR]
+        info, supervisor = self._own_info(), self._launcher.children[SUPERVISOR]
         if info is None:
             return None
         try:
@@ -274,22 +249,25 @@ class Up:
     def _show(self, control: Control) -> None:
         supervisor = self._launcher.children[SUPERVISOR]
         try:
-            status = control.status(STATUS_S, lambda: supervisor.exit_code is not None)
+            status = self._status = control.status(QUESTION_S, lambda: supervisor.exit_code is not None)
         except NoAnswer:
-            self._end_stalled_supervisor(supervisor)
+            self._supervisor_watch.unanswered()
             return
-        self._unanswered = 0
-        now_s = time.monotonic()
+        self._supervisor_watch.answered()
+        now_s = self._own_time.at(time.monotonic())
         self._tell_recoveries(status["recoveries"])
         if not self._has_ended:
             self.display.show(status, now_s)
-        self._has_begun = self._has_begun or status["state"] != "starting"
+        else:  # the supervisor waits as long as there is progress, and so do we
+            self.display.show_closing(status)
+            self._ending_s = now_s if self._ending_s else 0.0
+        self._has_begun = self._has_begun or status["begun"]
         self._has_ended = status["state"] in ENDED
         self._stopped = {name for name, process in status["processes"].items() if process["stopped"]}
         self._start_wanted(status["starts"])
-        if self._has_begun and not self._has_ended and not self._ending_s:
+        if not self._has_ended and not self._ending_s:
             self._restart_ended(now_s, knows=True)
-        self._end_stalled(status["processes"], now_s)
+        self._end_stalled(status)
 
     def _start_wanted(self, starts: dict[str, int]) -> None:
         """Start the nodes that somebody asked for since: one that was stopped, waits for its turn, or was given up."""
@@ -299,7 +277,7 @@ class Up:
                 continue
             self._restarts.forget(name)
             if child.exit_code is not None:
-                self._launcher.start(name, child.command, child.log)
+                self._start_child(name, child.command, child.log)
         self._starts = starts
 
     def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
@@ -308,32 +286,33 @@ class Up:
             self.display.say(recovery_text(recoveries[self._told]))
             self._told += 1
 
-    def _end_stalled(self, processes: dict[str, dict[str, Any]], now_s: float) -> None:
-        """Kill a node's process that hangs: the run goes on without it, and a new one can take part."""
-        lost = [child for name, child in self._launcher.children.items() if processes.get(name, {}).get("lost")]
-        self._stalled = {child.name: self._stalled.get(child.name, (child.process.pid, now_s)) for child in lost}
-        for child in lost:
-            pid, since_s = self._stalled[child.name]
-            same = pid == child.process.pid  # and not one that was started since, and has not said hello yet
-            patience_s = STALLED_S if child.remote is None else CUT_OFF_S
-            if same and child.exit_code is None and now_s >= since_s + patience_s:
-                self.display.say(f"{child.name} does not answer any more: it is killed")
-                child.process.kill()
+    def _end_stalled(self, status: dict[str, Any]) -> None:
+        """Kill a process that hangs: the run goes on without it, and a new one can take part."""
+        alive = {child.name: child for child in self._launcher.alive()}
+        pids = {name: child.process.pid for name, child in alive.items()}
+        away = {name for name, child in alive.items() if child.remote is not None}
+        killed = self._stalled_watch.look(status, pids, away, self._own_time.at(time.monotonic()))
+        for name, why in killed.items():
+            self._kill(alive[name], why)
 
     def _end_stalled_supervisor(self, supervisor: Child) -> None:
         """Kill a supervisor that hangs: a new one goes on with the run."""
-        if supervisor.exit_code is not None or self._has_ended or self._ending_s:
-            return
-        self._unanswered += 1
-        if self._unanswered >= STALLED_TRIES:
-            self._unanswered = 0
-            self.display.say("the supervisor does not answer any more: it is killed")
-            supervisor.process.kill()
+        if not self._supervisor_watch.is_found and self._own_info() is not None:
+            self._supervisor_watch.found()
+        why = self._supervisor_watch.why_killed(self._own_time.at(time.monotonic()))
+        if why and not self._has_ended and not self._ending_s:
+            self._kill(supervisor, why)
+
+    def _kill(self, child: Child, why: str) -> None:
+        if not child.killed:
+            self.display.say(f"{child.name} does not answer any more: it is killed ({why})")
+            child.kill(why)
 
     def _supervisor_comes_back(self, supervisor: Child, now_s: float) -> bool:
         """Start a supervisor again that ended before the run did; False when the run is over, or it is given up."""
-        over = self._ending_s or self._has_ended or self.folder.info() is None or self.folder.result() is not None
-        if over or supervisor.exit_code in (DONE, REFUSED):
+        over = self._ending_s or self._has_ended or self.folder.result() is not None
+        began = self.folder.info() is not None or supervisor.how.is_by_signal
+        if over or not began or supervisor.exit_code in (DONE, REFUSED):
             return False
         if not self._restarts.is_known(SUPERVISOR):
             self._restart_later(supervisor, now_s)
@@ -341,38 +320,59 @@ class Up:
         return SUPERVISOR not in self._restarts.failed
 
     def _restart_ended(self, now_s: float, knows: bool = False) -> None:
-        """Start nodes and the vHub again that ended while the run goes on; who ends again and again is given up.
+        """Start processes again that ended while the run goes on; who ends again and again, or is refused, is given up.
 
-        `knows`: a status has just told which nodes are stopped.
+        `knows`: a status has just told which nodes are stopped, and whether the run has begun.
         """
-        for child in self._launcher.ended():
-            name = child.name
-            if not self._comes_back(name) or name in self._stopped or child.exit_code == DONE:
-                continue
-            if self._restarts.is_known(name):
+        may_judge = self._has_begun or knows or self._control is None
+        for child in self._launcher.ended() if may_judge else ():
+            if child.name in self._stopped or child.exit_code == DONE or self._restarts.is_known(child.name):
                 continue
             if child.exit_code == REFUSED and not knows:
                 continue  # it may have been stopped since the last status
-            self._restart_later(child, now_s)
+            if self._comes_back(child):
+                self._restart_later(child, now_s)
         self._start_due(now_s)
 
     def _restart_later(self, child: Child, now_s: float) -> None:
         at_once = child.name in (SUPERVISOR, VHUB)
-        wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
+        wait_s = None
+        if child.exit_code == REFUSED:
+            self._restarts.give_up(child.name)
+        else:
+            wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
         after = f"starts again in {wait_s:g} s" if wait_s else "starts again"
         if wait_s is None:
-            after = "is given up" if at_once else f"is given up; foosim-supervisor start {child.name} tries it again"
+            is_node = child.name in self.plan.deployment.nodes
+            after = f"is given up; foosim-supervisor start {child.name} tries it again" if is_node else "is given up"
         self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
 
     def _start_due(self, now_s: float) -> None:
         for name in self._restarts.due(now_s):
             child = self._launcher.children[name]
             command = self._vhub_again() if name == VHUB else child.command
-            self._launcher.start(name, command, child.log)
+            self._start_child(name, command, child.log)
 
-    def _comes_back(self, name: str) -> bool:
-        """Whether the run waits for this process when it ends, and another one takes its place."""
-        return name == VHUB or name in self.plan.deployment.nodes
+    def _comes_back(self, child: Child) -> bool:
+        """Whether the run waits for this process, which has ended, and another one takes its place.
+
+        Before the first tick that is one that something else has ended: who ends by himself then says what is wrong.
+        """
+        if child.name == VHUB and (child.exit_code == REFUSED or VHUB in self._restarts.failed):
+            return False
+        if self._has_begun:
+            return child.name == VHUB or child.name in self.plan.deployment.nodes or self._plays_again(child)
+        is_orphan = child.exit_code == FAILED and self._restarts.has_ended(SUPERVISOR)
+        may_come = child.how.is_by_signal or child.is_away or is_orphan
+        return may_come and child.name not in self._restarts.failed
+
+    def _plays_again(self, child: Child) -> bool:
+        """Whether these are players whom something else has ended: one that ends by itself has failed."""
+        deployment = self.plan.deployment
+        players = deployment.player_processes().get(child.name, ())
+        may_restart = bool(players) and all(deployment.players[player].restart for player in players)
+        is_lost = child.how.is_by_signal or child.is_away
+        return may_restart and is_lost and child.name not in self._restarts.failed
 
     def _vhub_again(self) -> list[str]:
         """Return how the vHub is started again: where clients know it to be."""
@@ -384,25 +384,30 @@ class Up:
         """Look after the children and the Ctrl-C; False when the supervisor has ended."""
         if self._interrupts > 1:
             self._launcher.kill()
-            raise Killed("\n".join(["killed", *self._capture_lines()]))
+            raise Killed("\n".join(["killed", *self._capture_lines()]), self.unended("killed by a second Ctrl-C"))
         supervisor = self._launcher.children[SUPERVISOR]
-        now_s = time.monotonic()
+        now_s = self._own_time.at(time.monotonic())
         if supervisor.exit_code is not None:
             if self._supervisor_comes_back(supervisor, now_s):
+                self._restart_ended(now_s)
                 return True
             if supervisor.exit_code == FAILED:  # it may have noticed a loss, and ended, since we looked last
                 self._look_for_lost(now_s)
             return False
+        self._end_stalled_supervisor(supervisor)
         if self._interrupts and not self._ending_s:
             self.display.say("ending the run; a second Ctrl-C kills it")
             self._ending_s = now_s
-        if self._has_begun and not self._has_ended and not self._ending_s:
-            if self._lost is not None and not self._ends_run(self._lost):
+        if not self._has_ended and not self._ending_s:
+            lost = self._lost
+            if lost is not None and (self._launcher.children[lost.name] is not lost or not self._ends_run(lost)):
                 self._lost = None  # it ended before we saw that the run had begun
             self._restart_ended(now_s)
         if self._lost is None:
             self._look_for_lost(now_s)
-        elif not self._ending_s and now_s > self._lost_s + LOST_S:
+        elif not self._ending_s and (now_s > self._lost_s + LOST_S or self._lost.exit_code == REFUSED):
+            if self._can_resume:
+                return False
             self._ending_s = now_s
         if self._ending_s and not self._is_told:
             self._tell(supervisor)
@@ -410,7 +415,7 @@ class Up:
 
     def _ends_run(self, child: Child) -> bool:
         """Whether the run cannot go on without this child, which has ended."""
-        return child.exit_code != 0 and not (self._has_begun and self._comes_back(child.name))
+        return child.exit_code != DONE and not self._comes_back(child)
 
     def _look_for_lost(self, now_s: float) -> None:
         """Note the first child that ended as none should; one that was killed before those that ended because of it."""
@@ -421,23 +426,42 @@ class Up:
 
     def _tell(self, supervisor: Child) -> None:
         """Have the supervisor end the run, as `down` does; before it has a run file, the signal would just kill it."""
-        if self.folder.info() is not None:
-            self._is_told = True
-            supervisor.process.send_signal(signal.SIGTERM)
+        if self.folder.info() is None:
+            return
+        self._is_told = True
+        if self._lost is not None and self._control is not None:
+            with suppress(Refused):
+                self._control.ask("down", QUESTION_S, lost=f"{self._lost.name}: it {self._lost.ending}")
+                return
+        supervisor.process.send_signal(signal.SIGTERM)
 
     def _outcome(self) -> Outcome:
-        result = self.folder.result()
-        if result is None and self._lost is None:
+        """Say how it ended. Where the supervisor does not, nothing has ended it: it can be resumed."""
+        ended = self.folder.result()
+        if self._lost is None and ended is None:
             self._lost = self._launcher.children[SUPERVISOR]
-        if result is not None and self._lost is not None and not result["failed"]:
-            reason = f"lost {self._lost.name}: it {self._lost.ending}"  # the supervisor never knew it
-            result = {**result, "reason": reason, "failed": True}
-        if result is not None and VHUB in self._launcher.remotes and self.capture is not None:
-            result = {**result, "capture": str(first_there(self.capture)) if parts_at(self.capture) else None}
-        reason = "the run did not end in order" if result is None else f"the run has ended: {result['reason']}"
-        recoveries = [] if result is None else result["recoveries"][self._told :]
-        lines = [*map(recovery_text, recoveries), reason, *self._lost_lines(), *self._capture_lines()]
-        return Outcome(result, result is None or bool(result["failed"]), tuple(lines))
+        reason = "" if self._lost is None else f"lost {self._lost.name}: it {self._lost.ending}"
+        if self._lost is self._launcher.children[SUPERVISOR] and self._lost.exit_code == REFUSED:
+            reason = self._lost.how.last_words
+        if ended is None:
+            result = self.unended(reason)
+            may_resume = self._is_resumed or self._has_begun
+            then = f"; foosim-supervisor up --resume {self.folder.name} goes on with it" if may_resume else ""
+            line = f"the run did not end in order{then}"
+        else:
+            result = {**ended, "reason": reason, "failed": True} if reason and not ended["failed"] else ended
+            line = f"the run has ended: {result['reason']}"
+            result = with_capture(result, self.capture)
+        if ended is not None and result != ended:
+            with suppress(OSError):
+                self.folder.write_result(result)
+        lines = [*map(recovery_text, result["recoveries"][self._told :]), line]
+        return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(), *self._capture_lines()))
+
+    def unended(self, reason: str) -> dict[str, Any]:
+        """Return the result of a run that nobody has ended."""
+        known = {"run": self.folder.name, **plan_facts(self.plan.deployment), **self._status}
+        return with_capture(result_without_supervisor(known, reason), self.capture)
 
     def _lost_lines(self) -> list[str]:
         """Say which child ended before the run did, and show the end of its log."""
@@ -448,17 +472,9 @@ class Up:
 
     def _capture_lines(self) -> list[str]:
         """Say where the capture is, and whether it has its end: who was killed, or failed, did not finish it."""
-        files = {} if self.capture is None else parts_at(self.capture)
-        if not files:
-            return [self._not_home] if self._not_home else []
-        result = self.folder.result()
-        wrong = "" if result is None else recording_text(result)
-        count = f", {len(files)} files" if len(files) > 1 else ""
-        there, is_finished = [*files.values()], False
-        with suppress(CaptureError):
-            is_finished = has_end(there[-1])
-        lines = [f"capture {there[0]}{count}" if is_finished else f"capture {there[0]}{count} (unfinished)"]
-        return [*lines, wrong] if wrong else lines
+        journals = None if VHUB in self._launcher.remotes else self.folder.journals
+        lines = capture_lines(self.capture, self.folder.result(), journals)
+        return lines or ([self._not_home] if self._not_home else [])
 
     @contextmanager
     def _signals(self) -> Iterator[None]:

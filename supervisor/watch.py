@@ -9,17 +9,23 @@ waited for.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from foosim.protocol import limits
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
-from foosim.supervisor.roster import Roster
+from foosim.protocol.standstill import TOLD_NS, told
+from foosim.supervisor.roster import Process, Roster
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
 
+DOUBT_NS: Final = 1_000_000_000
+"""For how long behind a standstill of the supervisor connections end that it has itself kept silent on."""
+CUT_SEEN_NS: Final = 1_500_000_000
+"""By then the connection of a process that is cut off has closed: a lease, and what it takes to notice its end."""
 LATE_EVERY_NS: Final = 1_000_000_000
 """How often late ticks are logged at most."""
 
@@ -37,6 +43,8 @@ class Watch:
         self.late_tick = -1
         self._busy_ns = 0
         self._begun_ns = self._progress_ns = now_ns
+        self._doubt_ns = 0
+        """Until when the end of a connection may come of the supervisor's own standstill."""
         self._named = ""
         self._lag_ns = 0
         self._late_ticks = 0
@@ -58,6 +66,29 @@ class Watch:
     def begun(self, now_ns: int) -> None:
         """An epoch begins."""
         self._begun_ns = self._progress_ns = now_ns
+
+    def rest(self, core: SupervisorCore, stood_ns: int, now_ns: int) -> None:
+        """The supervisor's own loop stood still for so long: no deadline of another one runs then (`standstill`)."""
+        for process in self.roster.by_name.values():
+            process.heard_ns = min(now_ns, process.heard_ns + stood_ns)
+        self._begun_ns = min(now_ns, self._begun_ns + stood_ns)
+        self._progress_ns = min(now_ns, self._progress_ns + stood_ns)
+        self.ended_ns = min(now_ns, self.ended_ns + stood_ns)
+        core.absence.rest(stood_ns)
+        core.closing.rest(stood_ns, now_ns)
+        if core.take_over is not None:
+            core.take_over.rest(stood_ns)
+        if stood_ns >= TOLD_NS:
+            self._doubt_ns = now_ns + DOUBT_NS
+            core.say("warning", told(stood_ns))
+
+    def doubts(self, process: Process, now_ns: int) -> bool:
+        """Whether a connection that has ended says nothing of its process, which is lost when it stays silent.
+
+        One that ends a second time, or whose successor is here, is beyond doubt.
+        """
+        process.in_doubt = now_ns < self._doubt_ns and not process.in_doubt
+        return process.in_doubt
 
     def set_back(self, tick: int, now_ns: int) -> None:
         """The run goes on from an earlier tick: nothing has come for those behind it."""
@@ -143,15 +174,27 @@ class Watch:
         hub = self.roster.by_name.get(VHUB)
         return [] if hub is None or hub.heartbeat is None else _names(hub.heartbeat.waiting_for)
 
+    def _has_sensed(self, name: str) -> bool:
+        """Whether a node that the vHub waits for has said what its robots measure: it is at that tick, or further.
+
+        Then perhaps the vHub does not hear it, which shows when its connection closes.
+        """
+        node, hub = self.roster.by_name.get(name), self.roster.by_name.get(VHUB)
+        if node is None or node.role != "node" or node.heartbeat is None or hub is None or hub.heartbeat is None:
+            return False
+        return hub.heartbeat.waiting_for.startswith(SAMPLES_OF) and node.heartbeat.tick >= hub.heartbeat.tick
+
     def lost(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
         """Return who is lost, and why."""
         self.now_ns = now_ns
         deadlines = self.deployment.deadlines
         if core.epoch == 0:
             return self._late_to_start(core, now_ns)
-        silent = self.roster.silent(now_ns, deadlines.heartbeat_ns)
+        tick = core.frame.tick
+        heartbeat_ns = core.beginning.patience_ns(tick, deadlines.heartbeat_ns)
+        silent = self.roster.silent(now_ns, heartbeat_ns)
         if silent:
-            return dict.fromkeys(silent, f"no heartbeat for {deadlines.heartbeat_ns / 1e9:g} s")
+            return dict.fromkeys(silent, f"no heartbeat for {heartbeat_ns / 1e9:g} s")
         if core.take_over is not None:
             return {}  # nobody is waited for yet
         if core.absence.is_away:
@@ -163,11 +206,14 @@ class Watch:
             return {}
         waited = ", ".join(names)
         overdue_ns = now_ns - self._progress_ns
-        if overdue_ns > deadlines.tick_lost_ns:
-            return dict.fromkeys(names, f"tick {core.frame.tick} is overdue by {overdue_ns / 1e9:.1f} s")
+        lost_ns = core.beginning.patience_ns(tick, deadlines.tick_lost_ns)
+        if names and all(map(self._has_sensed, names)):
+            lost_ns = max(lost_ns, CUT_SEEN_NS)
+        if overdue_ns > lost_ns:
+            return dict.fromkeys(names, f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s")
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
-            core.say("warning", f"tick {core.frame.tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
+            core.say("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
         return {}
 
     def _late_to_start(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
@@ -178,6 +224,11 @@ class Watch:
         if not missing or now_ns - self._begun_ns <= self.deployment.deadlines.start_ns:
             return {}
         return dict.fromkeys(missing, f"not ready within {self.deployment.deadlines.start_ns / 1e9:g} s")
+
+
+def losses(lost: Mapping[str, str]) -> str:
+    """Return who is lost and why as a reason to end."""
+    return "lost " + "; ".join(f"{name}: {why}" for name, why in lost.items())
 
 
 def _names(waiting_for: str) -> list[str]:

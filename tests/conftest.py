@@ -18,22 +18,36 @@ from xdist.scheduler import LoadScopeScheduling
 
 from foosim.protocol.deployment_file import apply_sets
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree, write_yaml
+from tests.meter import Burden, Meter
 
 settings.register_profile(
-    "foosim", derandomize=True, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
+    "foosim",
+    derandomize=True,
+    deadline=None,
+    print_blob=True,
+    max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile("search", settings.get_profile("foosim"), derandomize=False, max_examples=2000)
 settings.load_profile("foosim")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """What `make fuzz` and `make stats` choose; by default the share of them that `make test` has."""
+    """What `make fuzz`, `make stats` and `make slow` choose; by default the share of them that `make test` has."""
     parser.addoption("--links-seed", type=int, default=1, help="of the networks and packets of tests/links")
     parser.addoption("--links-full", action="store_true", help="tests/links at full size, one failure in a million")
     parser.addoption("--links-table", default="", help="the file that the figures of tests/links are written into")
     parser.addoption("--fuzz-payloads", type=int, default=100, help="payloads for each target of the fuzz tests")
     parser.addoption("--fuzz-seed", type=int, default=17, help="what the payloads are drawn from")
     parser.addoption("--fuzz-block", type=int, default=-1, help="bring the payloads of this block alone")
+    parser.addoption("--slow-start", type=float, default=0.0, help="seconds that each process's start takes longer")
+    parser.addoption("--load", type=int, default=0, help="processes beside the tests that keep as many cores busy")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """What tests cost is measured; `make slow` makes the machine a slow one."""
+    config.pluginmanager.register(Meter(), "meter")
+    config.pluginmanager.register(Burden(config), "burden")
 
 
 def pytest_report_header(config: pytest.Config) -> str:
@@ -70,23 +84,23 @@ def fleet_text() -> Callable[..., str]:
     return text
 
 
-TOGETHER = ("tests/wire/", "tests/test_wheel.py")
+TOGETHER = ("tests/replay/", "tests/vhub/", "tests/wire/")
 
 
-class WireTogether(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
-    """Spreads tests one by one, but gives tests/wire to one worker: its runs would starve one another of cores.
+class Together(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
+    """Gives each file to one worker, so that what its tests share is computed once.
 
-    So it does with the tests of the wheel, which is built once.
+    So it does with folders whose files share runs, and with tests/wire: its runs would starve one another of cores.
     """
 
     def _split_scope(self, nodeid: str) -> str:
-        return next((place for place in TOGETHER if nodeid.startswith(place)), nodeid)
+        return next((place for place in TOGETHER if nodeid.startswith(place)), nodeid.partition("::")[0])
 
 
 @pytest.hookimpl(optionalhook=True)  # optional, so that pytest also runs with `-p no:xdist`
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> WireTogether:
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Together:
     """The order in which workers get their tests. (xdist 3.8's own groups have no effect with pytest 9.2.)"""
-    return WireTogether(config, log)
+    return Together(config, log)
 
 
 @pytest.fixture

@@ -24,13 +24,14 @@ from foosim.client.payloads import Command, decode_payload
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree
 from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import System
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.vhub.capture_reader import open_capture
 
 ROOT: Final = Path(__file__).parents[1]
 PAGES: Final = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
-OTHER_OPTIONS: Final = {"--help", "--version", "--strict", "--hypothesis-profile", "--only"}
+OTHER_OPTIONS: Final = {"--help", "--version", "--strict", "--hypothesis-profile", "--only", "--slow-start", "--load"}
 """Options that belong to no command of ours, or to all."""
 
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -65,9 +66,15 @@ def typed_lines(page: Path) -> list[list[str]]:
     return [line[next(index for index, word in enumerate(line) if word.startswith("foosim-")) :] for line in words]
 
 
+@cache
+def commands() -> dict[str, Any]:
+    """Every command that can be typed, with what typer knows of it."""
+    return dict(reference().commands())
+
+
 def command_of(words: list[str]) -> tuple[Any, list[str]]:
     """What typer knows of the command that is typed, and its arguments."""
-    known = dict(reference().commands())
+    known = commands()
     for used in (2, 1):
         if " ".join(words[:used]) in known:
             return known[" ".join(words[:used])], words[used:]
@@ -75,6 +82,12 @@ def command_of(words: list[str]) -> tuple[Any, list[str]]:
 
 
 # --- the tutorials ---------------------------------------------------------------------------------------------------
+
+
+def add_a_ball(system: System) -> None:
+    """What a reader reads may have had something added to it, for a while."""
+    system.at_tick(1000, lambda: system.request("add", position=[0.0, 0.3, 0.05], velocity=[0.0, 0.0, 0.0]))
+    system.at_tick(1200, lambda: system.request("remove", name="ball2"))
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +105,8 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         patch.chdir(folder)
         patch.syspath_prepend(str(folder))
         plan = make_plan(RunOptions(asked["file"], "fast", asked["duration"], None, (*asked["sets"], "engine=pure")))
-        result = rehearse(plan.text, str(asked["file"]), plan.ticks, asked["nodes"], capture=asked["capture"]).json
+        given = plan.text, str(asked["file"]), plan.ticks, asked["nodes"]
+        result = rehearse(*given, prepare=add_a_ball, capture=asked["capture"]).json
         assert not result["failed"] and result["ticks"] == 2500
         yield folder
     sys.modules.pop("follower", None)
@@ -107,6 +121,7 @@ def test_the_readmes_player_plays(house: Path) -> None:
     commands = [decode_payload("position", payload) for payload in sent.payload]
     assert {command.spin for command in commands if isinstance(command, Command)} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
+    assert len(capture.frame_blocks) == 3, "something was added, and removed again"
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/capture.md", "docs/writing_a_player.md"])
@@ -128,7 +143,7 @@ def test_a_players_declaration_is_valid() -> None:
         ((name, declared),) = content["players"].items()
         changed = apply_sets(table, "table.yaml", [f"players.{name}={json.dumps(declared)}"])
         classes.append(load_deployment(changed, "table.yaml").players[name].class_)
-    assert classes == ["follower:Follower", "scouting:Scout"]
+    assert classes == ["follower:Follower", "scouting:Scout", "follower:Follower"]
 
 
 # --- what is named exists --------------------------------------------------------------------------------------------
@@ -138,6 +153,30 @@ def test_a_players_declaration_is_valid() -> None:
 def test_generated_parts_are_current(page: Path) -> None:
     text = page.read_text()
     assert reference().regenerated(text) == text, "write it anew: python docs/reference.py"
+
+
+NO_DEADLINES = {
+    "POLL_S",
+    "WATCH_S",
+    "LATE_EVERY_NS",
+    "AGAIN_S",
+    "QUERY_S",
+    "SWITCH_S",
+    "FORGET_EVERY_NS",
+    "LOOK_EVERY_NS",
+}
+"""How often something is done or said again, and what is no wait for another process."""
+
+
+def test_every_constant_that_waits_for_somebody_is_in_the_table_of_deadlines() -> None:
+    told = set(reference().CONSTANTS)
+    files = {module: (ROOT / f"{module.replace('.', '/')}.py").read_text() for module, _ in told}
+    found = {
+        (m, name)
+        for m, text in files.items()
+        for name in re.findall(r"^([A-Z_]+_(?:NS|MS|US|S)(?:_MAX)?)\b", text, re.M)
+    }
+    assert {(module, name) for module, name in found - told if name not in NO_DEADLINES} == set()
 
 
 def test_every_part_that_can_be_generated_stands_in_a_page() -> None:
@@ -154,12 +193,12 @@ def test_command_lines_parse(page: Path) -> None:
 
 @pages
 def test_commands_and_options_exist(page: Path) -> None:
-    options = {option for _, command in reference().commands() for one in command.params for option in one.opts}
+    options = {option for command in commands().values() for one in command.params for option in one.opts}
     named = spans(page)
     for span in named:
         assert not set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", span)) - options - OTHER_OPTIONS, span
     inline = [span.split() for span in named if re.match(r"foosim-[a-z]+( [a-z]+)?( |$)", span)]
-    groups = {name.split()[0] for name, _ in reference().commands()}
+    groups = {name.split()[0] for name in commands()}
     for words in inline:
         assert words[0] in groups, words
         if len(words) > 1:

@@ -59,10 +59,12 @@ SHELLS = {
     "protocol/session.py",
     "protocol/tls_probe.py",
     "protocol/wall.py",
+    "rehearsal/attendant.py",
     "rehearsal/capture_arguments.py",
     "rehearsal/capture_commands.py",
     "rehearsal/diff.py",
     "rehearsal/export.py",
+    "rehearsal/interrupts.py",
     "rehearsal/play.py",
     "rehearsal/play_command.py",
     "rehearsal/play_place.py",
@@ -89,17 +91,23 @@ SHELLS = {
     "supervisor/reach.py",
     "supervisor/journal_room.py",
     "supervisor/launcher.py",
+    "supervisor/journal_check.py",
     "supervisor/leftovers.py",
     "supervisor/main.py",
+    "supervisor/memory.py",
     "supervisor/net_command.py",
+    "supervisor/new_capture.py",
+    "supervisor/outcome.py",
     "supervisor/pki.py",
     "supervisor/pki_command.py",
     "supervisor/pki_hosts.py",
     "supervisor/plan.py",
+    "supervisor/resumable.py",
     "supervisor/run_folder.py",
     "supervisor/up.py",
     "vhub/branching.py",
     "vhub/capture_cut.py",
+    "vhub/capture_damage.py",
     "vhub/capture_file.py",
     "vhub/capture_info.py",
     "vhub/capture_left.py",
@@ -109,6 +117,7 @@ SHELLS = {
     "vhub/capture_split.py",
     "vhub/capture_standing.py",
     "vhub/capture_writer.py",
+    "vhub/earlier_crc.py",
     "vhub/main.py",
     "vhub/room_watch.py",
 }
@@ -136,8 +145,13 @@ def name_of(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def imports_of(path: Path) -> Iterator[tuple[int, str]]:
+@cache
+def imports_of(path: Path) -> tuple[tuple[int, str], ...]:
     """Line and full dotted name of every import in a file, at any depth of nesting."""
+    return tuple(_imports_of(path))
+
+
+def _imports_of(path: Path) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)

@@ -3,25 +3,35 @@
 A transmission is registered when it is judged, with the times at which it is on air. It adds its power to the packets
 that overlap with it at their receivers, those that were sent before it and are still on air too; each packet's sum is
 of whole numbers, so no order matters. A station that sends hears nothing meanwhile. Stations that hear one another
-take turns, so they overlap only where they do not.
-Neighbours: `memory` (what is on air, in the hub's state), `stages.medium` registers, `stages.channel` judges.
+take turns, so they overlap only where they do not. A turn of 802.11 that has not begun is put off by stations that come
+in between; what it spoils, and what spoils it, is found when it has begun.
+Neighbours: `memory` (what is on air, in the hub's state), `turns` (who sends first), `stages.medium` registers,
+`stages.channel` judges, `stages.delay` is told of packets that come later.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Final
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Final
 
-from foosim.vhub.memory import AirState, Transmission
+from foosim.vhub.memory import AirState, RadioState, Transmission
 from foosim.vhub.packet import Flight
 from foosim.vhub.propagation import Propagation
 from foosim.vhub.radio.errors import LORA_FACTORS
 from foosim.vhub.radio.noise import NEGLIGIBLE_CDB, units_of
+from foosim.vhub.turns import Contest, Turn
+
+if TYPE_CHECKING:
+    from foosim.vhub.stages.delay import Delay
 
 DEAF: Final = 2**62
 """In units of 1e-21 W: the interference of a station with itself. That of others stays below: it is cut there, since
 sums of cut numbers do not depend on their order either, and a state has 64 bits for them."""
 NOTHING_CDBM: Final = -(10**6)
+NEVER_NS: Final = 2**62
+Key = tuple[str, int, int]
+"""Source, sequence and copy of a packet: of a broadcast one for all its receivers."""
 
 
 class _Heard:
@@ -50,21 +60,31 @@ class _Heard:
 class Air:
     """One air in one world: its state, and the packets that are on it, each with how its radio's signals spread."""
 
-    def __init__(self, state: AirState) -> None:
+    def __init__(self, state: AirState, senders: Mapping[tuple[str, str], RadioState]) -> None:
+        """`senders` has the radios of all endpoints, by endpoint and radio."""
         self.state = state
+        self._senders = senders
         self._heard: list[_Heard] = []
         self._advanced_ns = -1
+        self._open: dict[Key, Turn] = {}
+        """What has not begun, as far as it is known."""
+        self._next_ns = NEVER_NS
+        """Nothing of it begins before."""
+        for known in state.on_air:
+            if known.turn_ns >= 0:
+                self._add_open(known)
 
     def restore(self, flight: Flight, of: Propagation) -> None:
         """Take a packet in flight of a state that was written down."""
-        if flight.air_end_ns > flight.sent_ns and not flight.is_settled:
+        if flight.air_end_ns > flight.sent_ns and not flight.is_settled and self._turn_of(flight) is None:
             self._group(flight, of).flights.append(flight)
 
     def advance(self, now_ns: int) -> None:
-        """Forget what is over."""
+        """Forget what is over; what has begun stays as it is."""
         if now_ns == self._advanced_ns:
             return
         self._advanced_ns = now_ns
+        self.settle(now_ns)
         self.state.on_air[:] = [known for known in self.state.on_air if known.until_ns > now_ns]
         self._heard = [heard for heard in self._heard if heard.end_ns > now_ns]
 
@@ -87,10 +107,93 @@ class Air:
             start_ns = max(start_ns, until_ns)
         return start_ns, 1 + len(heard)
 
+    def contest(self, source: str, ready_ns: int, of: Propagation) -> Contest:
+        """Return what a station of 802.11 meets that is ready to send.
+
+        Who has something queued or on air then contends; and, where packets of the station itself wait before this
+        one, who has about as many waiting by now: stations get as many turns as others in the long run.
+        """
+        place, now_ns, free_ns, waiting = of.place(source), self._advanced_ns, ready_ns, 1
+        hears: dict[str, bool] = {}
+        contending: set[str] = set()
+        turns: list[Turn] = []
+        for known in self.state.on_air:
+            other, until_ns, is_open = known.source, known.until_ns, known.turn_ns >= 0
+            if other == source:
+                waiting += known.end_ns > now_ns
+                continue
+            if until_ns <= ready_ns and not is_open:
+                continue
+            if other not in hears:
+                hears[other] = of.hears(of.place_at(other, known.position), place, known.power_cdbm)
+            if not hears[other]:
+                continue
+            if until_ns > ready_ns:
+                contending.add(other)
+            if is_open:
+                turns.append(self._open[other, known.sequence, known.copy])
+            elif until_ns > free_ns:
+                free_ns = until_ns
+        if waiting > 1:
+            contending |= self._with_as_many(waiting, hears)
+        return Contest(ready_ns, 1 + len(contending), free_ns, turns, [turn.known.source for turn in turns])
+
+    def _with_as_many(self, waiting: int, hears: Mapping[str, bool]) -> set[str]:
+        """Return who is heard and has at least three quarters as many packets waiting or on air."""
+        counts = Counter(known.source for known in self.state.on_air)
+        return {other for other, is_heard in hears.items() if is_heard and 4 * counts[other] >= 3 * waiting}
+
+    def take_turn(self, contest: Contest, turn_ns: int, busy_ns: int, slot_ns: int) -> None:
+        """Put off what comes behind a turn that takes so long."""
+        contest.put_off(turn_ns, busy_ns, slot_ns, self._open)
+
+    def plan(self, flight: Flight, of: Propagation, delay: Delay) -> None:
+        """Take a packet that is on its way; where its turn has not begun, what puts that off makes the packet late."""
+        turn = self._turn_of(flight)
+        if turn is not None:
+            turn.packets.append((flight, of, delay))
+
+    def settle(self, until_ns: int) -> None:
+        """Nobody comes before a time any more: turns up to it have begun, and spoil others and are spoilt."""
+        if self._next_ns > until_ns:
+            return
+        self._next_ns = NEVER_NS
+        begun = []
+        for turn in self._open.values():
+            turn_ns = turn.known.turn_ns
+            if turn_ns <= until_ns:
+                begun.append(turn)
+            elif turn_ns < self._next_ns:
+                self._next_ns = turn_ns
+        for turn in begun:
+            known = turn.known
+            del self._open[known.source, known.sequence, known.copy]
+            known.turn_ns, known.radio, known.hears = -1, "", []
+            self._spoil_others(known)
+            for flight, of, _ in turn.packets:
+                if not flight.cause and not flight.is_settled:
+                    self.listen(flight, of)
+
     def register(self, known: Transmission) -> None:
-        """Take a transmission: it spoils what is on air beside it. One without a duration is over at once."""
+        """Take a transmission. One without a duration is over at once."""
         if known.until_ns > self._advanced_ns:
             self.state.on_air.append(known)
+        if known.turn_ns < 0:
+            self._spoil_others(known)
+        else:
+            self._add_open(known)
+
+    def _turn_of(self, flight: Flight) -> Turn | None:
+        """Return a packet's turn if it has not begun."""
+        return self._open.get((flight.source, flight.sequence, flight.copy))
+
+    def _add_open(self, known: Transmission) -> None:
+        """Take a transmission that has not begun."""
+        self._open[known.source, known.sequence, known.copy] = Turn(known, self._senders[known.source, known.radio])
+        self._next_ns = min(self._next_ns, known.turn_ns)
+
+    def _spoil_others(self, known: Transmission) -> None:
+        """Have a transmission spoil what is on air beside it."""
         for heard in self._heard:
             if heard.overlaps(known):
                 heard.beside.append(known)
@@ -99,7 +202,9 @@ class Air:
                         _spoil(flight, known, heard.of)
 
     def listen(self, flight: Flight, of: Propagation) -> None:
-        """Take a packet on air, which those who are on air beside it spoil."""
+        """Take a packet on air, which those who are on air beside it spoil; where its turn has not begun, not yet."""
+        if self._turn_of(flight) is not None:
+            return
         heard = self._group(flight, of)
         for known in heard.beside:
             _spoil(flight, known, of)
@@ -108,7 +213,7 @@ class Air:
     def _group(self, flight: Flight, of: Propagation) -> _Heard:
         """Return the transmission that a packet belongs to: the newest one, where others have heard that."""
         if not self._heard or not self._heard[-1].has(flight, of):
-            self._heard.append(_Heard(flight, of, self.state.on_air))
+            self._heard.append(_Heard(flight, of, [known for known in self.state.on_air if known.turn_ns < 0]))
         return self._heard[-1]
 
 

@@ -7,6 +7,8 @@ all frames up to it: with the inputs of the captured run it has the digests of t
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +19,7 @@ from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import AddedEntity, Outbox
 from foosim.protocol.start import Start, start_with
 from foosim.protocol.units import format_ns, parse_ns
-from foosim.vhub.capture_reader import Scan, chain_at_start, deployment_of, layout_of
+from foosim.vhub.capture_reader import FRAME_MARKS, Scan, chain_at_start, deployment_of, layout_of
 from foosim.vhub.rows import FRAME, LAYOUT, TICK, CaptureError, FrameRow, LayoutRow, TickRow
 
 
@@ -120,6 +122,26 @@ def _find(path: Path, at_ns: int | None) -> _Found:
         first = "none" if found is None else f"up to {tick * tick_ns / 1e9:g} s"
         raise BadValue(f"--from: no frame of {path} at that time, it has frames {first}", _seconds(at_ns))
     return found
+
+
+def branch_command(arguments: Sequence[str], capture: Path | None) -> str:
+    """Return in words how a new run begins with the last captured frame; `arguments` are those of the run before."""
+    if capture is None:
+        return "The run has no capture to begin a new one with"
+    try:
+        last_ns = _last_frame_ns(capture)
+    except Refused as error:
+        return f"No new run can begin with its capture: {error}"
+    if last_ns is None:
+        return f"No new run can begin with its capture: {capture} has no frame"
+    command = ["foosim-supervisor", "up", *arguments, "--from", f"{capture}@{format_ns(last_ns).replace(' ', '')}"]
+    return f"A new run begins with the last captured frame: {shlex.join(command)}"
+
+
+def _last_frame_ns(path: Path) -> int | None:
+    scan = Scan(path)
+    tick = max((scan.decode(FRAME_MARKS, message).tick for message in scan.messages(frozenset({FRAME}))), default=None)
+    return None if tick is None else int(tick) * deployment_of(scan.about).tick_ns
 
 
 def _seconds(at_ns: int | None) -> str | None:

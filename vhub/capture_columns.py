@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
+from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body, forward_kinematics
 from foosim.vhub.rows import CaptureError, FrameRow, PacketRow
 
@@ -129,6 +130,74 @@ class Frames:
         """Return one field of an entity over time: (n,), or (n, count) for a field of several numbers."""
         start = self.layout[entity].offsets[field]
         return self.values[:, start] if count == 1 else self.values[:, start : start + count]
+
+
+@dataclass(frozen=True, slots=True)
+class AllFrames:
+    """All captured frames of a run, in their order, `blocks` of one layout each."""
+
+    name: str
+    """That of the capture."""
+    blocks: tuple[Frames, ...]
+
+    def __len__(self) -> int:
+        return sum(map(len, self.blocks))
+
+    @property
+    def ticks(self) -> Integers:
+        """Their ticks, (n,)."""
+        return np.concatenate([np.empty(0, dtype=np.int64), *(block.ticks for block in self.blocks)])
+
+    @property
+    def layout(self) -> Layout:
+        """The one layout of a run to which nothing was added; else raises CaptureError."""
+        return self._one_block().layout
+
+    @property
+    def values(self) -> Numbers:
+        """All numbers of the frames, (n, layout.size), of a run to which nothing was added; else CaptureError."""
+        return self._one_block().values
+
+    def frame(self, index: int) -> Frame:
+        """Return one of them as a frame, from which a world can go on; raises IndexError."""
+        left = index + len(self) if index < 0 else index
+        for block in self.blocks:
+            if 0 <= left < len(block):
+                return block.frame(left)
+            left -= len(block)
+        raise IndexError(f"frame {index} of {len(self)}")
+
+    def column(self, entity: str, field: str, count: int = 1) -> Numbers:
+        """Return one field of an entity over time: (n,), or (n, count) for a field of several numbers.
+
+        Where the entity was not there the numbers are NaN. Raises CaptureError for an entity or a field that no frame
+        has.
+        """
+        known = [block.layout[entity].offsets if entity in block.layout else {} for block in self.blocks]
+        if not any(field in offsets for offsets in known):
+            raise self._unknown(entity, field)
+        shape = () if count == 1 else (count,)
+        return np.concatenate(
+            [
+                block.column(entity, field, count) if field in offsets else np.full((len(block), *shape), np.nan)
+                for block, offsets in zip(self.blocks, known, strict=True)
+            ]
+        )
+
+    def _one_block(self) -> Frames:
+        if len(self.blocks) != 1:
+            ticks = ", ".join(str(block.ticks[0]) for block in self.blocks if len(block))
+            raise CaptureError(f"{self.name}: frames of {len(self.blocks)} layouts (from {ticks}): frame_blocks")
+        return self.blocks[0]
+
+    def _unknown(self, entity: str, field: str) -> CaptureError:
+        names = {known.name: known.offsets for block in self.blocks for known in block.layout.entities}
+        what, of = (field, sorted(names[entity])) if entity in names else (entity, sorted(names))
+        nearest = nearest_name(what, of)
+        hint = f", nearest is {nearest}" if nearest else ""
+        if entity in names:
+            return CaptureError(f"{self.name}: {entity} has no field {field!r}{hint}; it has {', '.join(of)}")
+        return CaptureError(f"{self.name}: no frame has an entity {entity!r}{hint}")
 
 
 def frames_of(layout: Layout, rows: Sequence[FrameRow]) -> Frames:

@@ -22,6 +22,7 @@ from foosim.vhub.capture_parts import END_METADATA, METADATA, Joined
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
 from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_REASON, CUT_TICK, OWN
 from foosim.vhub.in_force import InForce
+from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK, CaptureError
@@ -100,6 +101,8 @@ def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_St
     for message in scan.messages():
         if message.topic != FRAME:
             held.take(scan, message)
+            if to_ns is not None and start.tick >= 0 and held.tick * tick_ns > to_ns:
+                break  # what is behind may be damaged: it is not needed
         elif start.tick < 0 or (from_ns is not None and held.tick * tick_ns <= from_ns):
             start = replace(held, in_force=held.in_force.copy())
     if start.tick < 0:
@@ -140,6 +143,9 @@ class _Copy:
 
     def _describe(self, content: records.Metadata) -> None:
         if content.name == END_METADATA:
+            return
+        if content.name == CHECKS:
+            self._mcap.add_checks()
             return
         metadata = content.metadata
         if content.name == METADATA:

@@ -24,10 +24,11 @@ from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Room, megabytes, room_on_disk
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Epoch, Origin
+from foosim.protocol.messages import End, Epoch, Origin
 from foosim.vhub.capture_left import Journalled, Left, Progress, look, run_of
 from foosim.vhub.capture_parts import (
     END_METADATA,
+    FAILED_RUN,
     METADATA,
     NEXT,
     ORIGIN,
@@ -38,8 +39,10 @@ from foosim.vhub.capture_parts import (
     parts_at,
 )
 from foosim.vhub.capture_split import OWN, Split
+from foosim.vhub.earlier_crc import EarlierCrc
 from foosim.vhub.in_force import HOLDING
 from foosim.vhub.link_models import model_versions
+from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import Book, Message
 from foosim.vhub.mcap_scan import Scanned, read_messages
 from foosim.vhub.mcap_writer import McapWriter
@@ -89,6 +92,11 @@ def origin_metadata(origin: Origin | None) -> dict[str, str]:
         return {}
     digest, chain = origin.digest.hex(), origin.chain.hex()
     return {ORIGIN: origin.source, ORIGIN_TICK: str(origin.tick), ORIGIN_DIGEST: digest, ORIGIN_CHAIN: chain}
+
+
+def ending_metadata(end: End) -> dict[str, str]:
+    """Return what a capture says of how its run ended."""
+    return {"reason": end.reason, **({FAILED_RUN: "true"} if end.failed else {})}
 
 
 def declare_topics(mcap: McapWriter) -> dict[str, int]:
@@ -317,10 +325,11 @@ class CaptureFile:
             raise CaptureError(f"{path}: cannot be created, {error.strerror}") from None
 
     def _writer(self, file: int, book: Book | None = None) -> McapWriter:
-        return McapWriter(lambda content: write_all(file, content), PROFILE, book)
+        earlier = None if book is None else EarlierCrc(file, book.offset)
+        return McapWriter(lambda content: write_all(file, content), PROFILE, book, earlier)
 
     def _describe(self, mcap: McapWriter, own: Mapping[str, str]) -> dict[str, int]:
-        """Write what a run depended on beside its inputs, and what is this file's `own`; the versions last.
+        """Write what a run depended on beside its inputs, and what is this file's `own`; its digests last.
 
         Return the channels of its topics.
         """
@@ -341,6 +350,7 @@ class CaptureFile:
         for path, file in deployment.asset_files.items():
             mcap.add_attachment(ASSETS + path, "application/octet-stream", file)
         mcap.add_attachment(VERSIONS, "application/json", self._versions)
+        mcap.add_checks()
         return channels
 
     @cached_property
@@ -432,7 +442,7 @@ class CaptureFile:
         if (run_of(left) or run) != run:
             raise CaptureError(f"{left.path}: is that of run {run_of(left)}, not of run {run}")
         if left.found.book.chunks and not _is_described(left.found):
-            raise CaptureError(f"{left.path}: no capture of foosim, it lacks {VERSIONS}")
+            raise CaptureError(f"{left.path}: no capture of foosim, it lacks {CHECKS}")
         if left.problem and journal_tick > self.done.tick + 1:
             raise CaptureError(f"{left.problem}, no journal has tick {self.done.tick + 1}")
 
@@ -457,7 +467,7 @@ class CaptureFile:
 
 
 def _is_described(found: Scanned) -> bool:
-    return VERSIONS in {attachment.name for attachment in found.book.attachments}
+    return CHECKS in found.metadata
 
 
 def sync_folder(folder: Path) -> None:

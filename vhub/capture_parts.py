@@ -15,17 +15,21 @@ from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, Final
+from zlib import crc32
 
 from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
+from foosim.vhub.mcap_checks import CHECKS, compare, read_metadata
 from foosim.vhub.mcap_file import MAGIC, RECORD, Content, McapFile, Message, chunk_records
 from foosim.vhub.rows import CaptureError
 
 FOOTER: Final = struct.Struct("<BQQQI8s")
 """The last record of an MCAP file, and the magic bytes behind it."""
+_BEHIND_FOOTER: Final = 4 + len(MAGIC)
+"""Its checksum, which is of what stands before it, and those bytes."""
 METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 PART, AFTER, LAST = "part", "part_after", "last"
@@ -35,6 +39,8 @@ ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_di
 """Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
 NEXT: Final = "goes_on_in"
 """The file behind one: an entry of the metadata `foosim.end`."""
+FAILED_RUN: Final = "failed"
+"""An entry there where the run failed."""
 
 
 def part_path(path: Path, number: int) -> Path:
@@ -140,11 +146,13 @@ def end_of(path: Path) -> dict[str, str] | None:
             tail = stream.read(FOOTER.size)
             if len(tail) < FOOTER.size or not tail.endswith(MAGIC):
                 return None
-            opcode, _, summary, _, _, _ = FOOTER.unpack(tail)
-            if opcode != Opcode.FOOTER or summary > footer:
+            opcode, _, start, _, told, _ = FOOTER.unpack(tail)
+            if opcode != Opcode.FOOTER or start > footer:
                 raise ValueError("it does not end with a footer")
-            stream.seek(summary)
-            return _end_in(stream, stream.read(footer - summary) if summary else b"", size)
+            stream.seek(start)
+            summary = stream.read(footer - start) if start else b""
+            compare("all of it", crc32(tail[: -_BEHIND_FOOTER], crc32(summary)), told)
+            return _end_in(stream, summary, size)
     except OSError as error:
         raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
     except (EndOfFile, struct.error, ValueError) as error:
@@ -167,8 +175,7 @@ def _end_in(stream: BinaryIO, summary: bytes, size: int) -> dict[str, str]:
                 raise ValueError(f"metadata of {index.length} bytes at byte {index.offset}")
             stream.seek(index.offset + RECORD.size)
             content = stream.read(index.length - RECORD.size)
-            metadata: dict[str, str] = records.Metadata.read(ReadDataStream(BytesIO(content))).metadata
-            return metadata
+            return read_metadata(content).metadata
     return {}
 
 
@@ -191,6 +198,11 @@ class Joined:
     @property
     def profile(self) -> str:
         return "" if self._first is None else self._first.profile
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether the first file has the digests of what stands before its messages, and they are right."""
+        return self._first is not None and self._first.is_checked
 
     @property
     def library(self) -> str:
@@ -228,6 +240,8 @@ class Joined:
                 file.chunk_starts = self.chunk_starts
                 self._first = self._first or file
                 yield from file.contents()
+                if is_behind and file.chunk_starts and not file.is_checked:
+                    raise CaptureError(f"{path}: it lacks its metadata {CHECKS!r}")
         except OSError as error:
             raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
         self.finished, self.unfinished_bytes = file.finished, file.unfinished_bytes

@@ -32,7 +32,7 @@ from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
 from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import first_chain
-from foosim.vhub.capture_columns import Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
+from foosim.vhub.capture_columns import AllFrames, Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
     ASSETS,
     DEPLOYMENT,
@@ -51,6 +51,7 @@ from foosim.vhub.capture_parts import (
     has_end,
 )
 from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
+from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import (
     CLIENTS,
@@ -154,12 +155,12 @@ class Scan:
         for content in file.contents():
             if isinstance(content, Message):
                 if not checked:
-                    self._check(file.profile)
+                    self._check(file)
                     checked = True
                 yield content
             else:
                 self._take(content)
-        self._check(file.profile)
+        self._check(file)
         self.about.library = file.library
         self.about.finished = file.finished and NEXT not in self.about.end
         self.about.unfinished_bytes = file.unfinished_bytes
@@ -177,15 +178,17 @@ class Scan:
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise CaptureError(f"{self._path}: {message.topic} at {message.log_ns} ns: {error}") from None
 
-    def _check(self, profile: str) -> None:
+    def _check(self, file: Joined) -> None:
         """Refuse what is no capture, or one of another version, before its rows are looked at."""
-        if profile != PROFILE or not self.about.metadata:
-            raise CaptureError(f"{self._path}: no capture of foosim, its profile is {profile!r}, not {PROFILE!r}")
+        if file.profile != PROFILE or not self.about.metadata:
+            raise CaptureError(f"{self._path}: no capture of foosim, its profile is {file.profile!r}, not {PROFILE!r}")
         version = self.about.metadata.get("format", "")
         if version != str(FORMAT):
             raise CaptureError(f"{self._path}: format {version!r} of a capture, this reads {FORMAT}")
         if not self.about.deployment_text or "deployment" not in self.about.metadata:
             raise CaptureError(f"{self._path}: the capture has no deployment")
+        if not file.is_checked:
+            raise CaptureError(f"{self._path}: the capture lacks its metadata {CHECKS!r}")
 
     def _take(self, content: records.Metadata | records.Attachment) -> None:
         about = self.about
@@ -260,12 +263,9 @@ class CaptureData:
         return next(self.each_frame(), None)
 
     @property
-    def frames(self) -> Frames:
-        """The captured frames of a run whose layout never changed; `frame_blocks` has those of any run."""
-        if len(self.frame_blocks) != 1:
-            ticks = ", ".join(str(block.ticks[0]) for block in self.frame_blocks if len(block))
-            raise CaptureError(f"{self.path}: frames of {len(self.frame_blocks)} layouts (from {ticks}): frame_blocks")
-        return self.frame_blocks[0]
+    def frames(self) -> AllFrames:
+        """All captured frames, whatever was added and removed in between."""
+        return AllFrames(str(self.path), self.frame_blocks)
 
     @cached_property
     def packets(self) -> Packets:

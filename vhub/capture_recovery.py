@@ -117,7 +117,8 @@ class _Completion:
                 raise Malformed(f"it is not that of run {run}")
             self.first_tick = HubState.restore(deployment, head.state).closed + 1
         except (Malformed, JournalError, msgspec.DecodeError, KeyError, ValueError, TypeError) as error:
-            self.problem = f"its journal cannot be used: {error}" if self._head else "there is no journal of it"
+            is_there = self._head or isinstance(error, JournalError)
+            self.problem = f"its journal cannot be used: {error}" if is_there else "there is no journal of it"
 
     def write(self, file: CaptureFile) -> None:
         """Write what the file lacks, and what was in flight at the end."""
@@ -141,7 +142,7 @@ class _Completion:
         flights = state.in_flight()
         for flight in flights:
             flight.cause = IN_FLIGHT
-        file.write(Closing(closing.frame, closing.digest, [], [], fates=flights))
+        file.write(Closing(closing.frame, closing.digest, [], [], fates=flights, ages=state.ages.untold(state.closed)))
 
     def _told_of(self, file: CaptureFile) -> Iterator[bytes]:
         """Yield the records, and write the epochs among them that the file lacks."""

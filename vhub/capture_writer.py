@@ -107,6 +107,10 @@ class CaptureWriter:
         self._file = CaptureFile(path, described, journal)
         self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
         """How far the file was that is gone on with."""
+        self.has_ended = False
+        """Whether nothing is written any more."""
+        self.on_end: Callable[[], None] = lambda: None
+        """Called then, in the thread that wrote."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
         self._syncer = _Syncer(self._file)
         self._thread.start()
@@ -123,11 +127,22 @@ class CaptureWriter:
 
     def finish(self, metadata: Mapping[str, str] | None = None) -> None:
         """Write what waits, the last frame and the summary; a second call does nothing. `metadata`: how it ended."""
+        self.begin_finish(metadata)
+        self._end()
+        self._raise_error()
+
+    def begin_finish(self, metadata: Mapping[str, str] | None = None) -> None:
+        """Begin what `finish` does, and return at once."""
         with self._changed:
             if not self._is_over:
                 self._ending = {} if metadata is None else dict(metadata)
-        self._end()
-        self._raise_error()
+            self._is_over = True
+            self._changed.notify_all()
+
+    @property
+    def is_closing(self) -> bool:
+        """Whether nothing comes any more, and what came is still being written."""
+        return self._is_over and not self.has_ended
 
     def leave(self) -> None:
         """Write what waits and let go of the file without an end: whoever has its journal can go on with it.
@@ -191,6 +206,8 @@ class CaptureWriter:
         finally:
             self._syncer.end()
             self._file.close()
+            self.has_ended = True
+            self.on_end()
 
     def _write_all(self) -> None:
         interval_ns = self._flush_ns * 3 // 4  # sooner than asked, by what gathering and a batch take

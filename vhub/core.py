@@ -17,6 +17,7 @@ from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.asset_messages import Piece
 from foosim.protocol.channels import Channel
+from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
@@ -45,10 +46,10 @@ from foosim.protocol.messages import (
     Up,
     Want,
 )
+from foosim.protocol.orphan import Orphan
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain
-from foosim.protocol.units import parse_pace
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
 from foosim.vhub.footing import Footing
@@ -84,7 +85,7 @@ class HubCore:
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
-        self.door, self.footing = Door(self), Footing(self, machine)
+        self.door, self.footing, self.orphan = Door(self), Footing(self, machine), Orphan()
         self.deployment: Deployment | None = None
         self.state: HubState | None = None
         self.releases: Releases | None = None
@@ -96,7 +97,7 @@ class HubCore:
         self.speak: Callable[[int], int] = lambda now_ns: now_ns
         """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
-        self.epoch = self._epoch_tick = 0
+        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self.repeated = 0
         self._epoch_payload = b""
         self._owners: dict[str, str] = {}
         self.waits = Waits()
@@ -105,9 +106,9 @@ class HubCore:
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
-        self._waited: list[str] = []  # clients whose Dones that tick lacks
+        self.waited: list[str] = []
+        """Clients whose Dones that tick lacks."""
         self._patience = Patience(now_ns)
-        self._end_ns = self._malformed = self.repeated = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Commit: self._on_commit,
             Samples: self._on_samples,
@@ -116,13 +117,14 @@ class HubCore:
             Recall: self._on_recall,
             Build: self._on_build,
             Piece: self._on_build,
-            Tempo: self._on_tempo,
+            Tempo: self.door.tempo,
             End: self._on_end,
             Proceed: self.footing.proceed,
             ClientHello: self.door.hello,
             Join: self.door.join,
             Up: self.door.up,
             Done: self.door.done,
+            Failure: self.door.failure,
         }
 
     # --- what the shell calls --------------------------------------------------------------------------------------
@@ -157,11 +159,7 @@ class HubCore:
 
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, asking again, releases, deadlines, the end."""
-        self.member.wake(now_ns, self._heartbeat)
-        if self._waited and self.releases is not None:
-            self.sessions.repeat(self._waited, now_ns)
-            for late in self.sessions.overdue(self._waited, self.releases.paused, now_ns):
-                self.lose(late.name, f"no Done of tick {late.go_tick} within its deadline")
+        self.member.wake(now_ns, self.heartbeat)
         self.door.wake(now_ns)
         if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
@@ -178,8 +176,8 @@ class HubCore:
             deadline = min(deadline, self._patience.at_ns, limits.COUNTER_MAX if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
             deadline = min(deadline, self.releases.deadline_ns)
-        if self._waited:
-            deadline = min(deadline, self.sessions.again_ns(self._waited))
+        if self.waited:
+            deadline = min(deadline, self.sessions.again_ns(self.waited))
         late_ns = self.sessions.late_ns
         return deadline if late_ns is None else min(deadline, late_ns)
 
@@ -196,8 +194,8 @@ class HubCore:
         Where deliveries are final nobody waits for a closing: those ticks are closed together."""
         if self.state is None:
             return channels.COMMIT, 1
-        if self.epoch == 0 or self._waited:
-            return channels.UP, max(1, len(self._waited))
+        if self.epoch == 0 or self.waited:
+            return channels.UP, max(1, len(self.waited))
         if self._world is None and self.state.closed + 1 in self.commits:
             return channels.SAMPLES, 1
         return channels.COMMIT, max(1, self.state.final - self.commits.next_tick)
@@ -213,7 +211,7 @@ class HubCore:
             missing = self.sessions.missing(self.state.deployment, self.state)
             return JOIN_OF + ", ".join(missing) if missing else "epoch"
         if self._world is not None:
-            return DONE_OF + ", ".join(self._waited) if self._waited else ""
+            return DONE_OF + ", ".join(self.waited) if self.waited else ""
         tick = self.state.closed + 1
         committed = self.commits.get(tick)
         if committed is None:
@@ -228,7 +226,7 @@ class HubCore:
 
     def waits_for(self, client: str) -> bool:
         """Whether a tick waits for this client's Done."""
-        return client in self._waited
+        return client in self.waited
 
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
@@ -256,17 +254,18 @@ class HubCore:
         for name in due:
             self.door.go(name, tick, released.pop(name, []), now_ns)
         self._world = _World(frame, closing, raw, released)
-        self._waited = [name for name in due if name in self.sessions.by_name]
+        self.waited = [name for name in due if name in self.sessions.by_name]
         return True
 
     def _close_clients(self, now_ns: int) -> bool:
         """Phase two, when all Dones are there: judge what clients sent, write, speak; what robots get comes first."""
-        if self._waited:
+        if self.waited:
             return False
         world, state, releases = self._world, self.state, self.releases
         assert world is not None and state is not None and releases is not None
         tick = world.frame.tick
         self._tell_of_waits(now_ns)
+        self.door.leave_owing(state, world.closing)
         admitted = self.sessions.take_sent() if state.hears_clients else {}
         samples = self._samples.pop(tick, [])
         deliveries = state.close_robots(world.frame, admitted)
@@ -275,6 +274,7 @@ class HubCore:
             state.members[name].downlink += 1
         record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
         self.actions.append(Journal(record))
+        self.door.tell()
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         if not state.was_final:
             self._sent[tick + 1] = payload
@@ -292,6 +292,7 @@ class HubCore:
         for flight in world.closing.fates:
             if not flight.cause and flight.destination not in state.members:
                 flight.released_wall_ns = now_ns
+        world.closing.ages = state.aged
         self._keeping.add(world.closing)
         self.actions += self._keeping.take(releases.waiting_tick)
         self._world = None
@@ -439,17 +440,6 @@ class HubCore:
         if want.kind == channels.DELIVERIES.name and want.tick in self._sent and not self.footing.waits:
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, self._sent[want.tick]))
 
-    def take_done(self, client: str) -> None:
-        """A tick waits for this client no more."""
-        self._waited.remove(client)
-        self.waits.client = client
-
-    def _on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
-        """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
-        pace = parse_pace(tempo.pace)
-        if self.releases is not None:
-            self.releases.set_tempo(0.0 if pace.kind == "fast" else float(pace.factor), tempo.paused)
-
     # --- time --------------------------------------------------------------------------------------------------------
 
     def _ask_again(self, now_ns: int) -> None:
@@ -464,12 +454,21 @@ class HubCore:
 
     def lose(self, name: str, why: str) -> None:
         """What the run cannot do without is lost: a client, the capture, room for the journal."""
-        if not self.lost:
-            self.lost = f"{name}: {why}"
-            self.actions.append(Say("error", f"lost {self.lost}"))
-            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self._heartbeat())))
+        self.give_up(f"lost {name}: {why}")
 
-    def _heartbeat(self) -> Heartbeat:
+    def give_up(self, reason: str) -> None:
+        """The run cannot go on: the supervisor ends it for the first reason that it hears."""
+        if not self.lost:
+            self.lost = reason
+            self.actions.append(Say("error", reason))
+            self.say_heartbeat()
+
+    def say_heartbeat(self) -> None:
+        """Say at once what the next heartbeat would."""
+        self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self.heartbeat())))
+
+    def heartbeat(self) -> Heartbeat:
+        """Return what it says of itself."""
         tick = 0 if self.state is None else self.state.closed + 1
         return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, report(self))
 

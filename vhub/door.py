@@ -1,7 +1,8 @@
 """What clients say to the vHub: hello, join, packets, Done; and that they are gone.
 
 A client that is gone may come back: one that the run waits for within `deadlines.client_back`, any other at any time as
-one that joins. After a restart of the vHub all that it knew are away, and come back in the same way.
+one that joins. Before the first tick, and after a restart of the vHub, when all that it knew are away, they have
+`deadlines.start`: their processes may have to be started.
 Neighbours: `core` closes the ticks, `sessions` has the clients.
 """
 
@@ -10,15 +11,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from foosim.protocol import limits
-from foosim.protocol.actions import Journal
+from foosim.protocol.actions import Journal, Say
+from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import ClientHello, Done, Go, Join, Up
+from foosim.protocol.messages import ClientHello, Done, Go, Join, Tempo, Up
+from foosim.protocol.standstill import TOLD_NS, told
+from foosim.protocol.units import parse_pace
+from foosim.vhub.absences import Absences
+from foosim.vhub.members import Member, may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
-from foosim.vhub.records import InputsRecord
-from foosim.vhub.sessions import Session, may_lockstep
-from foosim.vhub.state import Member
+from foosim.vhub.records import Closing, InputsRecord
+from foosim.vhub.sessions import Session
+from foosim.vhub.state import HubState
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore
@@ -32,6 +38,10 @@ class Door:
         self.written: InputsRecord | None = None
         """Who joins and leaves at the tick that is closed next, where that is written already."""
         self._leaves: list[str] = []
+        self._owing: list[str] = []
+        """Who leaves at the tick that waits for their Dones."""
+        self.absences = Absences()
+        self._looked_ns = 0
 
     def go_on(self, written: InputsRecord | None, now_ns: int) -> None:
         """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick."""
@@ -41,7 +51,7 @@ class Door:
         here = {name for name, member in core.state.members.items() if member.active}
         if written is not None:
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        core.sessions.expect(here, now_ns + core.deployment.deadlines.client_back_ns)
+        core.sessions.expect(here, self._start_ns, now_ns)  # theirs may have ended as well, and be started again
 
     def _known(self, name: str) -> Member | Joining | None:
         """Return what is known of a client, the latest first: as it joins, or as the state has it."""
@@ -67,6 +77,12 @@ class Door:
         self._leaves = []
         if joins or leaves:
             core.actions.append(Journal(encode(InputsRecord(tick, joins, leaves))))
+            for name in leaves:
+                self.absences.leave(name, tick)
+            for joining in joins:
+                if joining.period and joining.name in members and not members[joining.name].active:
+                    self.absences.come_back(joining.name, tick)
+            self.tell()
         return joins, leaves
 
     def go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
@@ -81,8 +97,8 @@ class Door:
         for flight in flights:
             flight.released_wall_ns = now_ns
         core.sessions.say_go(session, Go(member.downlink, tick, member.sequence, received(flights), core.state.branch))
-        deadlines = core.deployment.deadlines
-        allowed_ns = deadlines.lockstep_realtime_ns if core.releases.factor else deadlines.lockstep_fast_ns
+        session.deadline = "lockstep_realtime" if core.releases.factor else "lockstep_fast"
+        allowed_ns: int = getattr(core.deployment.deadlines, f"{session.deadline}_ns")
         session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * core.deployment.tick_ns))
 
     # --- messages ----------------------------------------------------------------------------------------------------
@@ -93,6 +109,12 @@ class Door:
         if core.footing.waits:
             return
         if core.state is not None and core.deployment is not None and core.member.build is not None:
+            session, known = core.sessions.by_name.get(hello.name), core.state.members.get(hello.name)
+            if session is not None and session.is_late(hello):
+                core.repeated += 1
+                return
+            if session is not None and not session.boot and not hello.returns and known is not None and known.active:
+                self._miss(hello.name, "", "its process was lost while the vHub was away")
             core.sessions.hello(hello, core.member.build, core.deployment, core.state, self._said(hello.name))
 
     def join(self, join: Join, payload: bytes, now_ns: int) -> None:
@@ -101,9 +123,15 @@ class Door:
         session = self._session(join)
         if session is None or core.state is None:
             return
+        if session.is_gone:  # said before it went
+            core.repeated += 1
+            return
         if join.period and not may_lockstep(core.state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
+        _check_timing(join)
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
+        self.absences.end(join.name, join.boot)
+        self.tell()
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
             core.repeated += 1
@@ -138,10 +166,26 @@ class Door:
         if is_of_another or not core.waits_for(done.name) or done.tick != session.go_tick:
             core.repeated += 1
             return
-        core.take_done(done.name)
+        self.take_done(done.name)
+        session.answered()
         session.done = done
 
-    def _session(self, message: Join | Up | Done) -> Session | None:
+    def take_done(self, client: str) -> None:
+        """A tick waits for this client no more."""
+        self._core.waited.remove(client)
+        self._core.waits.client = client
+
+    def failure(self, failure: Failure, payload: bytes, now_ns: int) -> None:
+        """A client says that it has failed. Without a player the run cannot go on."""
+        core = self._core
+        session = self._session(failure)
+        if session is None or core.deployment is None:
+            return
+        if failure.name not in core.deployment.players:
+            raise Malformed(f"{failure.name} says that it has failed, it is no player")
+        core.give_up(failure.reason)
+
+    def _session(self, message: Join | Up | Done | Failure) -> Session | None:
         session = self._core.sessions.by_name.get(message.name)
         if session is None or session.boot != message.boot:
             self._core.repeated += 1
@@ -157,6 +201,16 @@ class Door:
         waiting = core.releases.first_number(name)
         return member.downlink - core.waits_for(name) if waiting is None else waiting - 1
 
+    def tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
+        """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
+        releases, pace = self._core.releases, parse_pace(tempo.pace)
+        if releases is None:
+            return
+        was_fast = not releases.factor
+        releases.set_tempo(0.0 if pace.kind == "fast" else float(pace.factor), tempo.paused)
+        if was_fast != (not releases.factor):
+            self._turn_to_pace(now_ns)
+
     # --- who is away -------------------------------------------------------------------------------------------------
 
     def gone(self, name: str, now_ns: int) -> None:
@@ -165,28 +219,136 @@ class Door:
         session = core.sessions.by_name.get(name)
         if session is None or core.state is None or core.deployment is None or core.ended is not None:
             return
+        session.is_gone = True
         if self._is_waited_for(name):
-            session.away_ns = now_ns + core.deployment.deadlines.client_back_ns
+            session.leave(self._back_ns(name), now_ns)
+            self._miss(name, session.boot, "its connection closed")
             return
         self._leave(name)
 
+    def _miss(self, name: str, boot: str, reason: str) -> None:
+        """Note that a player's process is away from a run that has begun."""
+        core = self._core
+        if core.deployment is not None and may_restart(core.deployment, name) and core.epoch > 0:
+            self.absences.begin(name, boot, reason, self._tick)
+            self.tell()
+
+    def tell(self) -> None:
+        """Tell the supervisor at once of whoever has gone or come, when that is written: a run may end soon."""
+        if self.absences.is_new:
+            self.absences.is_new = False
+            self._core.say_heartbeat()
+
+    def _back_ns(self, name: str) -> int:
+        """Return for how long the run waits for a client that is away."""
+        core = self._core
+        assert core.deployment is not None
+        is_started_again = may_restart(core.deployment, name) and not self._may_go_on_without(name)
+        return self._start_ns if is_started_again or not core.epoch else core.deployment.deadlines.client_back_ns
+
+    def _may_go_on_without(self, name: str) -> bool:
+        """Whether the run goes on while a client is started again: in realtime, once it has begun."""
+        core = self._core
+        assert core.deployment is not None
+        is_realtime = core.releases is not None and core.releases.factor > 0
+        return may_restart(core.deployment, name) and is_realtime and core.epoch > 0
+
+    def _turn_to_pace(self, now_ns: int) -> None:
+        """The run goes by the wall clock now, or does not any more: players that are away have the time of then."""
+        deployment = self._core.deployment
+        for name, session in self._core.sessions.by_name.items():
+            if session.away_ns >= 0 and deployment is not None and may_restart(deployment, name):
+                session.leave(self._back_ns(name), now_ns)
+
+    @property
+    def _tick(self) -> int:
+        """The tick that is closed next."""
+        return 0 if self._core.state is None else self._core.state.closed + 1
+
+    @property
+    def holds(self) -> bool:
+        """Whether the vHub waits for its supervisor: nothing can go on, and nobody is let in."""
+        return self._core.orphan.is_alone or self._core.footing.waits
+
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The vHub's own loop stood still for so long: that counts against no client, and not against the supervisor.
+
+        Where connections may have closed by it, clients have their whole time from now on (`standstill`).
+        """
+        core = self._core
+        core.orphan.rest(stood_ns, now_ns)
+        if stood_ns >= TOLD_NS:
+            core.actions.append(Say("warning", told(stood_ns)))
+        core.sessions.rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
+        self._looked_ns = now_ns
+
     def wake(self, now_ns: int) -> None:
-        """Give up who was away for too long."""
+        """Say Go again, lose who has not answered in time, and give up who was away for too long.
+
+        Both clocks rest while the run is paused; they begin anew when the vHub has waited for its supervisor, since
+        what closed that connection may have closed those of clients as well.
+        """
         core = self._core
         if core.state is None:
             return
+        core.sessions.repeat(core.waited, now_ns)
+        passed_ns, self._looked_ns = now_ns - self._looked_ns, now_ns
+        if self.holds:
+            core.sessions.rest(limits.COUNTER_MAX, now_ns)
+        elif core.releases is not None and core.releases.paused:
+            core.sessions.rest(passed_ns, now_ns)
+        for late in core.sessions.overdue(now_ns):
+            core.give_up(late.unanswered)
         for name in core.sessions.late(now_ns):
             session = core.sessions.by_name[name]
-            if self._is_waited_for(name):
-                session.away_ns = -1  # its session stays: a tick may be waiting for it
-                core.lose(name, "its connection closed" if session.boot else "it did not come back to the vHub")
-            else:
+            if not self._is_waited_for(name):
                 self._leave(name)
+                continue
+            session.away_ns = -1  # its session stays: a tick may be waiting for it, and another process may come
+            if self._may_go_on_without(name):
+                self._go_on_without(name)
+            else:
+                core.lose(name, self._why_lost(session))
+
+    def _why_lost(self, session: Session) -> str:
+        """Return why the run does not wait any longer for a client that is away."""
+        deployment = self._core.deployment
+        assert deployment is not None
+        if may_restart(deployment, session.name):
+            return f"it was not started again within {deployment.deadlines.start_ns / 1e9:g} s (deadlines.start)"
+        return "its connection closed" if session.boot else "it did not come back to the vHub"
+
+    def _go_on_without(self, name: str) -> None:
+        """A player leaves until it is started again: at the tick whose Done it owes, or at the next one."""
+        core = self._core
+        core.sessions.joins.pop(name, None)
+        core.sessions.by_name[name].answered()
+        if core.waits_for(name):
+            core.waited.remove(name)
+            self._owing.append(name)
+        else:
+            self._leaves.append(name)
+
+    def leave_owing(self, state: HubState, closing: Closing) -> None:
+        """Let those go without whose Dones the tick is closed; its record says so, before anything else does."""
+        closing.owing += sorted(self._owing)
+        for name in closing.owing:
+            state.leave(name)
+            self.absences.leave(name, closing.frame.tick)
+        self._owing = []
 
     def _is_waited_for(self, name: str) -> bool:
         """Whether the run waits for a client: it is in lockstep, or a tick still waits for its Done."""
         known = self._known(name)
-        return self._core.waits_for(name) or (known is not None and known.period > 0)
+        is_here = isinstance(known, Joining) or (known is not None and known.active and name not in self._leaves)
+        return self._core.waits_for(name) or (known is not None and is_here and known.period > 0)
+
+    @property
+    def _start_ns(self) -> int:
+        """How long a client has to come whose process is being started."""
+        assert self._core.deployment is not None
+        deadlines = self._core.deployment.deadlines
+        return max(deadlines.client_back_ns, deadlines.start_ns)
 
     def _leave(self, name: str) -> None:
         core = self._core
@@ -197,6 +359,20 @@ class Door:
 
 def _is_member(known: Member | Joining, join: Join) -> bool:
     """Whether a client takes part as it asks to."""
-    wanted = {(item.source, item.channel) for item in join.subscriptions}
+    wanted = [{(item.source, item.channel) for item in items} for items in (join.subscriptions, join.arrivals)]
     active = isinstance(known, Joining) or known.active
-    return active and known.period == join.period and {(source, name) for source, name in known.subscriptions} == wanted
+    is_timed_so = (known.period, known.offset) == (join.period, join.offset)
+    heard = [{(source, name) for source, name in pairs} for pairs in (known.subscriptions, known.arrivals)]
+    return active and is_timed_so and heard == wanted
+
+
+def _check_timing(join: Join) -> None:
+    """Raises Malformed for an offset or arrivals that its period or its subscriptions do not allow."""
+    if join.offset >= (1 if join.arrivals else max(1, join.period)):
+        acts = ", and acts at arrival" if join.arrivals else ""
+        raise Malformed(f"{join.name} joins with an offset of {join.offset} ticks, its period is {join.period}{acts}")
+    if join.arrivals and not join.period:
+        raise Malformed(f"{join.name} acts at arrival and joins free-running: only who is in lockstep can")
+    for item in join.arrivals:
+        if item not in join.subscriptions:
+            raise Malformed(f"{join.name} acts at the arrival of {item.source} {item.channel}, which it does not hear")

@@ -171,10 +171,10 @@ class Stages:
         share, window_ns = settings.duty_cycle, settings.duty_window_ns
         airtime_ns = stage.airtime_ns(row.size, row.published)
         facts: dict[str, Any] = {"duty_cycle": share, "window_ns": window_ns, "airtime_ns": airtime_ns}
-        text = f"{100 * share:g} % of {_time(window_ns)} on air, the packet takes {_time(airtime_ns)}"
+        text = f"{100 * share:g} % of any {_time(window_ns)} on air, the packet takes {_time(airtime_ns)}"
         if self.dropped_by == "duty":
             facts["left_ns"] = row.decided_by.duty_left_ns
-            text += f", {_time(row.decided_by.duty_left_ns)} is left"
+            text += f", {_time(row.decided_by.duty_left_ns)} is left of the one that ends with it"
         return text, facts
 
     def _queue(self) -> Told:

@@ -99,7 +99,7 @@ class Fabric:
             link = self._by_rule.get(key)
             if link is None:
                 profile = self.profiles.of_rule(rule, source, destination)
-                state = self.states.setdefault((source, destination, _name(profile)), LinkState())
+                state = self.states.setdefault((source, destination, name_of(profile)), LinkState())
                 link = self._by_rule[key] = Link(source, destination, profile, self, state)
             self._links[source, destination, kind] = link
         return link
@@ -114,7 +114,7 @@ class Fabric:
         """Take up what was written down of a network in which nothing has been sent yet."""
         self.states = {(source, destination, name): state for source, destination, name, state in links}
         self.radios = {(endpoint, radio): state for endpoint, radio, state in radios}
-        self.airs = {name: Air(state) for name, state in airs}
+        self.airs = {name: Air(state, self.radios) for name, state in airs}
         for tick, text in asked:
             self.take(tick, tick * self.deployment.tick_ns, text)
 
@@ -124,6 +124,7 @@ class Fabric:
         settings, name = profile.settings, profile.radio or self.network.defaults.preset
         if settings.is_on_air:
             self._air(name, settings).restore(flight, self._propagation(name, settings))
+            self.link(flight.source, flight.destination, flight.channel).restore(flight)
 
     def setup(
         self,
@@ -191,7 +192,7 @@ class Fabric:
         name = settings.air or name
         found = self.airs.get(name)
         if found is None:
-            found = self.airs[name] = Air(AirState())
+            found = self.airs[name] = Air(AirState(), self.radios)
         return found
 
     def _model(self, settings: Radio) -> LinkModel | None:
@@ -219,6 +220,6 @@ def _sender(source: str, destination: str, profile: Profile) -> RadioKey:
     return (source + _OWN_QUEUE + destination, profile.rule) if profile.is_own_queue else (source, profile.radio)
 
 
-def _name(profile: Profile) -> str:
+def name_of(profile: Profile) -> str:
     """Return a profile's name: its rule, and the radio where the rule does not say it."""
     return profile.rule if not profile.radio or profile.radio == profile.rule else f"{profile.rule}/{profile.radio}"

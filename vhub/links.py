@@ -107,6 +107,13 @@ class Link:
         self._settle(time_ns)
         return self._is_apart
 
+    def restore(self, flight: Flight) -> None:
+        """Take up a packet on its way of a state that was written down: its turn may not have begun."""
+        self._settle(flight.sent_ns)
+        for stage in self._stages:
+            if isinstance(stage, Delay):
+                stage.plan(flight)
+
     def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
         """Clogs have changed: give packets on their way, in the order of sending, new due times."""
         judged = [(flight, self._is_late(flight)) for flight in flights]

@@ -20,6 +20,7 @@ from foosim.protocol.radio_references import unheeded
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.jitter import interpolate_ns, moments_ns, quantiles_ns
+from foosim.vhub.lint_phase import phase_warnings
 from foosim.vhub.profiles import NO_RADIO, Profile, Profiles, over, preset_radio
 from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
@@ -36,6 +37,7 @@ from foosim.vhub.radio.contention import saturation_rate_hz, sensing
 from foosim.vhub.radio.noise import noise_dbm as radio_noise_dbm
 from foosim.vhub.radio.path_loss import range_m
 from foosim.vhub.radio.timings import LORA_DUTY_CYCLES, LRWPAN
+from foosim.vhub.stages.duty import packets_an_hour
 from foosim.vhub.stages.medium import BASE_STATION_DBM, OPPORTUNITY_BYTES, mode_of, wifi_modes, wifi_timing
 from foosim.vhub.stages.residual import chain_of_burst
 
@@ -46,7 +48,6 @@ MANY: Final = 10
 HEIGHT_M: Final = 1.5
 SPACING_NS: Final = 10_000_000
 """Between packets of which it is asked whether they overtake each other."""
-HOUR_NS: Final = 3_600_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,7 @@ class Meaning:
     """At which 90 % of single frames of SMALL_BYTES arrive, at the lowest rate, in line of sight."""
     range_nlos_m: float | None
     duty_packets_h: int | None
-    """Packets of SMALL_BYTES in an hour that the duty cycle allows."""
+    """Packets of SMALL_BYTES in an hour that the duty cycle allows, hour after hour."""
     queue_ns: int | None
     """How long the last packet of a full queue waits."""
     model: str | None
@@ -160,10 +161,11 @@ def meanings(deployment: Deployment) -> list[Meaning]:
     uses = uses_of(deployment)
     offered = _offered(deployment, uses)
     files = deployment.asset_files
+    phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])
     found = []
     for use in uses:
         meaning = meaning_of(use, files)
-        warnings = [*meaning.warnings]
+        warnings = [*meaning.warnings, *phased.get((use.rule, use.radio), ())]
         if use.links == 0:
             warnings.append("no link uses it")
         capacity_hz = _capacity_hz(meaning)
@@ -204,7 +206,7 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
         carried,
         los_m,
         nlos_m,
-        int(duty * HOUR_NS / carried[0].airtime_ns) if is_limited else None,
+        packets_an_hour(duty, settings.duty_window_ns, carried[0].airtime_ns) if is_limited else None,
         _queue_ns(settings, carried),
         None if settings.model is None else settings.model.name,
         (),
@@ -362,9 +364,7 @@ def _carried(settings: Radio, size: int, rate_bps: int) -> Carried:
         one, many = (sensing(n, airtime_ns, True, timing_154).rate_hz for n in (1, MANY))
         return Carried(size, airtime_ns, int(bits * one), int(bits * many))
     if settings.medium == "lora":
-        airtime_ns = lora_airtime_ns(
-            settings.spreading_factor, size, int(settings.bandwidth_hz), settings.coding_rate
-        )
+        airtime_ns = lora_airtime_ns(settings.spreading_factor, size, int(settings.bandwidth_hz), settings.coding_rate)
         load = min(0.5, MANY * settings.duty_cycle)  # pure ALOHA: G e^-2G, at most at G = 1/2
         one, many = (share * bits * 1e9 / airtime_ns for share in (settings.duty_cycle, load * exp(-2.0 * load)))
         return Carried(size, airtime_ns, int(one), int(many))
@@ -372,9 +372,7 @@ def _carried(settings: Radio, size: int, rate_bps: int) -> Carried:
     return Carried(size, airtime_ns, bits * 1_000_000_000 // airtime_ns, None)
 
 
-def ranges_of(
-    settings: Radio, ends_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)
-) -> tuple[float | None, float | None]:
+def ranges_of(settings: Radio, ends_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)) -> tuple[float | None, float | None]:
     """Return the range with and without line of sight; None on wires, and where walls alone decide it.
 
     `ends_m` are the heights of the two ends above the ground, beside which the antennas are mounted.

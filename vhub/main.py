@@ -25,33 +25,41 @@ from foosim.protocol.addresses import LOOPBACK, Address, check_listen, parse_add
 from foosim.protocol.admission import Admission
 from foosim.protocol.certificates import Credentials, check_host, load_credentials, passwords_file, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
-from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Level
-from foosim.protocol.errors import BadValue, DeploymentError
+from foosim.protocol.errors import BadValue, DeploymentError, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, JournalError, read_journal, remove_journal
+from foosim.protocol.journal import (
+    Journal,
+    JournalDamaged,
+    JournalError,
+    journal_files,
+    read_journal,
+    read_whole,
+    remove_journal,
+)
 from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.messages import Build, End
+from foosim.protocol.messages import Build
 from foosim.protocol.notify import Notify
-from foosim.protocol.orphan import Orphan
 from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
-from foosim.vhub.capture_file import check_new, origin_metadata
+from foosim.vhub.branching import branch_command
+from foosim.vhub.capture_file import check_new, ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 from foosim.vhub.records import Closing, first_head
-from foosim.vhub.resume import Captured, end_of, first_tick_of, recall, was_captured
+from foosim.vhub.resume import Captured, end_of, first_tick_of, last_tick_of, recall, was_captured
 from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
@@ -99,9 +107,10 @@ class HubProcess:
         self._capture: CaptureWriter | None = None
         self._room: RoomWatch | None = None
         self._forget_ns = self._look_ns = 0
-        self._is_abandoned = False
-        self._orphan = Orphan()
-        self._why_abandoned = "the vHub was told to end"
+        self._is_closing = False
+        """Whether the run has ended, and the capture takes nothing any more."""
+        self._why_abandoned = ""
+        """Why it ends though the run has not."""
         self._log: logging.Logger = start_log(VHUB)
         warn_of_end(credentials, self._log)
         self._wire = Wire(simulation, Plane.SIMULATION, inbox, VHUB)
@@ -110,7 +119,7 @@ class HubProcess:
         self._loop.show_progress(options.progress)
         self._loop.notify = Notify()
         self._loop.turn = self._turn
-        self._loop.took = self.core.waits.took
+        self._loop.took, self._loop.stood = self.core.waits.took, self.core.door.rest
         self._loop.lacking = lambda: self.core.lacking
         self._loop.other = self._keep
         self.core.speak = self._speak
@@ -123,7 +132,8 @@ class HubProcess:
     def run(self) -> int:
         """Take part until the end, close the capture, say farewell; return the exit code.
 
-        Whatever else ends it leaves the capture without an end, and the journal.
+        Whatever else ends it, its supervisor's absence among them, leaves the capture without an end, and the journal:
+        a vHub that is started again goes on with both.
         """
         sys.setswitchinterval(SWITCH_S)
         try:
@@ -135,26 +145,54 @@ class HubProcess:
         if self.core.finished:
             self._close()
         else:
+            if self._is_abandoned:
+                self.core.actions.append(Say("error", self._why_abandoned))
+                self._loop.perform()
             self._leave()
         if self.core.member.refusal:
             return REFUSED
         if self.core.failure:
             self._log.error(self.core.failure)
             return FAILED
+        if self._is_abandoned:
+            return FAILED
         farewell = self.core.farewell()
         self._wire.put(farewell.channel, farewell.name, farewell.payload)
-        return FAILED if self._is_abandoned else DONE
+        return DONE
 
     def stop(self) -> None:
-        """Have `run` end what it has and return; a signal handler may call this."""
-        self._is_abandoned = True
+        """Have `run` leave what it has and return; a signal handler may call this."""
+        self._why_abandoned = self._why_abandoned or "was told to end while the run goes on"
         self._inbox.wake()
 
     def _is_over(self) -> bool:
         core = self.core
-        if core.state is None and (self._is_abandoned or core.ended is not None):
+        if core.ended is not None and core.state is None:
             return True
-        return core.finished or bool(core.member.refusal or core.failure)
+        if core.finished:
+            return self._has_closed()
+        return self._is_abandoned or bool(core.member.refusal or core.failure)
+
+    def _has_closed(self) -> bool:
+        """Begin to close the capture, once all that goes into it is handed over; return whether that is done.
+
+        Until then the vHub shows that it lives, and how far it is.
+        """
+        capture, ended = self._capture, self.core.ended
+        if capture is None:
+            return True
+        if not self._is_closing:
+            assert ended is not None
+            self._loop.perform()
+            self._is_closing, closing = True, ClosingCore(self.core)
+            self._loop.core, self._loop.deadline_ns = closing, lambda now_ns: closing.deadline_ns()
+            capture.on_end = self._inbox.wake
+            capture.begin_finish({**ending_metadata(ended), "ended": wall.now_text()})
+        return capture.has_ended
+
+    @property
+    def _is_abandoned(self) -> bool:
+        return bool(self._why_abandoned) and self.core.ended is None
 
     # --- rounds of the loop ------------------------------------------------------------------------------------------
 
@@ -164,13 +202,8 @@ class HubProcess:
         self._admission.check(now_ns)
         if core.member.build is not None and self._journal is None:
             self._begin(core.member.build, now_ns)
-        if self._orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._is_abandoned:
+        if core.orphan.is_over(core.deployment, now_ns) and core.ended is None and not self._why_abandoned:
             self._why_abandoned = "lost the supervisor, and it has not come back"
-            core.actions.append(Say("error", self._why_abandoned))
-            self._is_abandoned = True
-        if self._is_abandoned and core.ended is None and core.state is not None:
-            end = End(core.state.closed + 1, self._why_abandoned, True)
-            core.receive(channels.END, SUPERVISOR, encode(end), now_ns)
         core.advance(now_ns)
         reminder = "" if self._exposure is None else self._exposure.due(now_ns)
         if reminder:
@@ -196,7 +229,7 @@ class HubProcess:
         core = self.core
         core.actions += [Say(level, text) for level, text in room.look(now_ns)]
         core.recording = room.recording
-        if room.ends is not None and not core.lost:
+        if room.ends is not None and not core.lost and not core.finished:
             core.lose(*room.ends)
 
     def _on_unwritten(self, error: JournalError) -> None:
@@ -223,8 +256,27 @@ class HubProcess:
             core.lose("the network", error.problems[0])
             return
         folder = (self._options.folder or Path(f"{build.run}.vhub")) / "journals"
+        goes_on = bool(journal_files(folder, VHUB))
         self._journal = self._loop.journal = Journal(folder, VHUB)
-        records = list(read_journal(folder, VHUB))
+        try:
+            self._go_on(build, deployment, folder, now_ns)
+        except Refused as error:
+            if not goes_on:
+                raise
+            if self._capture is not None:  # it stays as it is, without a line about this
+                self._capture.leave()
+                self._capture = None
+            core.failure = f"cannot go on: {error}"
+            core.lose(VHUB, f"it cannot go on: {error}")
+            return
+        self._listen(deployment)
+
+    def _go_on(self, build: Build, deployment: Deployment, folder: Path, now_ns: int) -> None:
+        """Begin, or be the vHub that was there before, with its capture. Raises Refused for what it has left."""
+        core = self.core
+        records, damaged = read_whole(read_journal(folder, VHUB))
+        if damaged is not None:
+            raise self._refusal(build, records, damaged)
         captured = self._open_capture(build, deployment, records)
         self._room = RoomWatch(self._capture, folder, deployment.capture.reserve_bytes)
         core.recording = self._room.recording
@@ -234,7 +286,13 @@ class HubProcess:
         core.begin(past, now_ns)
         for line in start_lines(meanings(deployment), build.deployment_name) if past is None else ():
             self._log.info(line)
-        self._listen(deployment)
+
+    def _refusal(self, build: Build, records: list[bytes], damaged: JournalDamaged) -> Refused:
+        """Return why nobody goes on over a damaged journal, and what helps."""
+        before = was_captured(records)
+        capture = self._options.capture if before is None else Path(before) if before else None
+        what = f"{damaged}; tick {last_tick_of(records)} is the last before it"
+        return Refused(f"{what}. {branch_command([build.deployment_name], capture)}")
 
     def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:
         """Begin the capture, or go on with the one that the vHub before has begun; return how far it is."""
@@ -287,7 +345,7 @@ class HubProcess:
             self._capture.keep(action.closing if isinstance(action, Keep) else action.epoch)
 
     def _on_say(self, say: Say) -> None:
-        if self._capture is not None:
+        if self._capture is not None and not self._is_closing:
             self._capture.log(say.level, say.text, self.core.statistics().closed + 1)
 
     def _say(self, level: str, text: str) -> None:
@@ -298,19 +356,19 @@ class HubProcess:
             self._admission.heard(name, is_alive)
         if is_alive:
             if name == SUPERVISOR:
-                self._orphan.hear(True, time.monotonic_ns())
+                self.core.orphan.hear(True, time.monotonic_ns())
             return
         if plane is Plane.RADIO:
             self.core.client_gone(name, time.monotonic_ns())
         elif name == SUPERVISOR and self.core.ended is None:
             self.core.actions.append(Say("warning", "lost the supervisor: holds until it is back"))
-            self._orphan.hear(False, time.monotonic_ns())
+            self.core.orphan.hear(False, time.monotonic_ns())
 
     def _close(self) -> None:
-        """Finish the capture; only then is the journal done with."""
+        """Take notice of the end of the capture; only then is the journal done with."""
         assert self.core.ended is not None
         if self._capture is not None:
-            self._capture.finish({"reason": self.core.ended.reason, "ended": wall.now_text()})
+            self._capture.finish()
             self.core.capture = str(first_there(Path(self.core.capture)))
         if self._room is not None:
             self.core.recording = self._room.recording

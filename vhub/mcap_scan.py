@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import struct
 from array import array
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import BinaryIO, Final
+from zlib import crc32
 
 import zstandard
 from mcap import records
@@ -22,10 +23,12 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
+from foosim.vhub.mcap_checks import CHECKS, Described, read_attachment, read_metadata
 from foosim.vhub.mcap_file import (
     CHUNK_BYTES_MAX,
     CHUNK_FIELDS,
     CHUNK_HEAD_BYTES_MAX,
+    IN_DATA,
     INDEX_FIELDS,
     MAGIC,
     MESSAGE_FIELDS,
@@ -34,6 +37,7 @@ from foosim.vhub.mcap_file import (
     Book,
     Message,
     chunk_records,
+    next_chunk,
     unpack_chunk,
 )
 from foosim.vhub.rows import CaptureError
@@ -105,6 +109,7 @@ class _Scan:
         self._void = void
         self._found = Scanned(Book(), size)
         self._book = self._found.book
+        self._described = Described()
         self._topics: dict[int, str] = {}
         self._chunk = b""
         """The records of the last chunk."""
@@ -122,6 +127,9 @@ class _Scan:
             self._pass_over(trusted)
         while self._book.offset and self._next():
             continue
+        found = self._found
+        if found.is_cut and not found.finished and next_chunk(self._stream, self._book.offset + 1, found.size):
+            found.is_cut = False
         self._look_at_the_last_chunk()
         self._read_places()
         return self._found
@@ -131,7 +139,7 @@ class _Scan:
         book, stop = self._book, len(content)
         while (at := book.offset + RECORD.size) <= stop:
             opcode, length = RECORD.unpack_from(content, book.offset)
-            if at + length > stop or not 1 <= opcode < Opcode.DATA_END:
+            if at + length > stop or opcode not in IN_DATA - {Opcode.DATA_END}:
                 break
             if opcode == Opcode.CHUNK:
                 head = bytes(content[at : at + CHUNK_HEAD_BYTES_MAX])
@@ -175,7 +183,7 @@ class _Scan:
         if length > left:
             return False
         content = self._stream.read(length) if length <= CHUNK_BYTES_MAX else b""
-        if len(content) < length or not 1 <= opcode <= Opcode.DATA_END:
+        if len(content) < length or opcode not in IN_DATA:
             self._found.is_cut = False
             return False
         if opcode == Opcode.DATA_END:
@@ -203,19 +211,30 @@ class _Scan:
             book.counts[channel.id] = 0
             self._topics[channel.id] = channel.topic
         elif opcode == Opcode.ATTACHMENT:
-            attachment = records.Attachment.read(_stream(content))
+            attachment = read_attachment(content)
+            self._described.take(attachment)
             size, kind = len(attachment.data), attachment.media_type
             book.attachments.append(
                 records.AttachmentIndex(offset, length, 0, 0, data_size=size, name=attachment.name, media_type=kind)
             )
         elif opcode == Opcode.METADATA:
-            metadata = records.Metadata.read(_stream(content))
+            metadata = read_metadata(content)
+            if metadata.name == CHECKS:
+                self._check_described(metadata.metadata)
             book.metadata.append(records.MetadataIndex(offset=offset, length=length, name=metadata.name))
             self._found.metadata[metadata.name] = metadata.metadata
         elif opcode == Opcode.CHUNK:
             self._take_chunk(content)
         elif opcode == Opcode.MESSAGE_INDEX:
             self._take_index(content, offset, length)
+
+    def _check_described(self, told: Mapping[str, str]) -> None:
+        """Compare what stands before the first chunk with its digests. Raises ValueError."""
+        place = self._stream.tell()
+        self._stream.seek(0)
+        before = crc32(self._stream.read(self._book.offset))
+        self._stream.seek(place)
+        self._described.check(told, before)
 
     def _take_chunk(self, content: bytes) -> None:
         chunk = unpack_chunk(content, self._name)
@@ -269,7 +288,9 @@ class _Scan:
         self._note_index(channel, len(entries) // 2, offset, length)
 
     def _note_last(self, channel: int, chunk: bytes, at: int) -> None:
-        _, start, stop = next(chunk_records(chunk[at:]))
+        opcode, start, stop = next(chunk_records(chunk[at:]))
+        if opcode != Opcode.MESSAGE or MESSAGE_FIELDS.unpack_from(chunk, at + start)[0] != channel:
+            raise ValueError(f"an index of channel {channel} that leads to something else")
         self._found.last[self._topics[channel]] = chunk[at + start + MESSAGE_FIELDS.size : at + stop]
 
     def _note_index(self, channel: int, count: int, offset: int, length: int) -> None:

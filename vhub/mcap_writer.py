@@ -18,6 +18,7 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
+from foosim.vhub.mcap_checks import CHECKS, Described, combined_crc, sealed
 from foosim.vhub.mcap_file import COMPRESSION, LIBRARY, MAGIC, MESSAGE, RECORD, Book
 
 COMPRESSION_LEVEL: Final = 1
@@ -33,15 +34,34 @@ class Record(Protocol):
     def write(self, stream: RecordBuilder) -> None: ...
 
 
+class Earlier(Protocol):
+    """The CRC-32 of so many bytes that a file had before; `value` may wait, and raises OSError."""
+
+    size: int
+
+    def value(self) -> int: ...
+
+
 class McapWriter:
     """Packs an MCAP file; `write` takes the bytes, in order. Messages are collected until `end_chunk`.
 
-    With the `book` of an unfinished file (`mcap_scan`) it goes on behind what that one has.
+    With the `book` of an unfinished file (`mcap_scan`) it goes on behind what that one has, which is `earlier`.
     """
 
-    def __init__(self, write: Callable[[bytes], None], profile: str, book: Book | None = None) -> None:
+    def __init__(
+        self,
+        write: Callable[[bytes], None],
+        profile: str,
+        book: Book | None = None,
+        earlier: Earlier | None = None,
+    ) -> None:
+        assert (book is None) == (earlier is None), "a file that is gone on with has a beginning"
         self._write = write
         self._book = book or Book()
+        self._earlier = earlier
+        self._crc = 0
+        """Of what is written, behind what is earlier."""
+        self._described = Described()
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._chunk = bytearray()
         self._index: dict[int, list[int]] = {channel.id: [] for channel in self._book.channels}
@@ -82,9 +102,9 @@ class McapWriter:
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Attach a file; it has no times, so that equal runs attach equally."""
         offset = self._book.offset
-        length = self._put_record(
-            records.Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
-        )
+        attachment = records.Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+        length = self._put_record(attachment)
+        self._described.take(attachment)
         self._book.attachments.append(
             records.AttachmentIndex(
                 offset=offset,
@@ -98,10 +118,15 @@ class McapWriter:
         )
 
     def add_metadata(self, name: str, content: Mapping[str, str]) -> None:
-        """Add a table of texts."""
+        """Add a table of texts, with its digest."""
         offset = self._book.offset
-        length = self._put_record(records.Metadata(name=name, metadata=dict(content)))
+        length = self._put_record(records.Metadata(name=name, metadata=sealed(name, content)))
         self._book.metadata.append(records.MetadataIndex(offset=offset, length=length, name=name))
+
+    def add_checks(self) -> None:
+        """Add the digests of the attachments and the checksum of the file so far, once all of them are there."""
+        assert self._earlier is None, "what is earlier has its own"
+        self.add_metadata(CHECKS, self._described.entries(self._crc))
 
     def add_message(self, channel: int, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
         """Add a message to the chunk. The hot path: see the bench before changing it."""
@@ -159,13 +184,13 @@ class McapWriter:
             del entries[:]
         return dropped
 
-    def mark(self) -> tuple[int, int]:
+    def mark(self) -> tuple[int, int, int]:
         """Return where the file is between two records, for `rewind`."""
-        return self._book.offset, len(self._book.metadata)
+        return self._book.offset, self._crc, len(self._book.metadata)
 
-    def rewind(self, mark: tuple[int, int]) -> None:
+    def rewind(self, mark: tuple[int, int, int]) -> None:
         """Forget metadata and the end that were written behind a mark; the caller cuts them off."""
-        self._book.offset, count = mark
+        self._book.offset, self._crc, count = mark
         del self._book.metadata[count:]
 
     @property
@@ -205,9 +230,12 @@ class McapWriter:
             del entries[:]
 
     def finish(self) -> None:
-        """Write the last chunk and the summary, which makes the file whole."""
+        """Write the last chunk and the summary, which makes the file whole.
+
+        Raises OSError when the beginning of a file that was gone on with cannot be read.
+        """
         self.end_chunk()
-        self._put_record(records.DataEnd(0))
+        self._put_record(records.DataEnd(self._data_crc()))
         summary_start = self._book.offset
         groups: tuple[tuple[Opcode, list[Record]], ...] = (
             (Opcode.SCHEMA, [*self._book.schemas]),
@@ -231,6 +259,13 @@ class McapWriter:
         self._put_record(records.Footer(summary_start, offset_start, checksum))
         self._put(MAGIC)
 
+    def _data_crc(self) -> int:
+        """Return the CRC-32 of the file so far."""
+        earlier = self._earlier
+        if earlier is None:
+            return self._crc
+        return combined_crc(earlier.value(), self._crc, self._book.offset - earlier.size)
+
     def _statistics(self) -> records.Statistics:
         return records.Statistics(
             attachment_count=len(self._book.attachments),
@@ -252,6 +287,7 @@ class McapWriter:
     def _put(self, content: bytes) -> None:
         self._write(content)
         self._book.offset += len(content)
+        self._crc = crc32(content, self._crc)
 
 
 def _serialised(record: Record) -> bytes:

@@ -56,7 +56,7 @@ class Sending(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A sender's radio, or port of a wire: its queue, when it is free, how much of its duty cycle is left."""
+    """A sender's radio, or port of a wire: its queue, when it is free, what its duty cycle counts."""
 
     free_ns: int = 0
     waiting: list[tuple[int, int]] = []
@@ -67,9 +67,10 @@ class RadioState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     last_count: int = 0
     is_dropping: bool = False
     """CoDel's variables, by the names of RFC 8289."""
-    tokens_ns: int = -1
-    tokens_at_ns: int = 0
-    """Airtime that the duty cycle leaves, as of a time; -1 before the first packet."""
+    sent: list[tuple[int, int, int]] = []
+    """Where a duty cycle limits it: (start, end, airtime) of what it sent; of many, neighbours are taken together."""
+    sent_ns: int = 0
+    """The airtime of these together."""
     opportunity: int = 0
     opportunity_bytes: int = 0
     """How far a trace of capacity is used up."""
@@ -95,6 +96,13 @@ class Transmission(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     position: tuple[float, float, float]
     power_cdbm: int
     spreading_factor: int = 0
+    ready_ns: int = 0
+    """When its packet was the first of its radio's queue."""
+    turn_ns: int = -1
+    """When its station's turn begins: until then it is put off by who comes in between; -1 where turns are for good."""
+    radio: str = ""
+    hears: list[str] = []
+    """Where it can be put off: its sender's radio, and whom the sender hears of those that can be, too."""
 
 
 class AirState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
@@ -175,6 +183,8 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """Of LoRa: the interference by spreading factor, from 7 on."""
     held_ns: int = 0
     """For how long clogs put off its due time."""
+    put_off_ns: int = 0
+    """For how long others did who had their turn on the air before it, after it was sent."""
     model_ns: int = 0
     """What a link model of one's own adds to its delay."""
     outcome: str = ""
@@ -183,12 +193,64 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """The numbers by which a stage dropped it that it has nowhere else; `to_rows.DECIDING` has their names."""
 
 
+Counts = dict[int, int]
+"""How often each age was seen, in ticks."""
+
+
+class HeardState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    """A channel that a client hears, or has heard: when its newest packet was sent, and ages at use.
+
+    Those up to the last row, and those since.
+    """
+
+    source: str
+    channel: str
+    sent_ns: int
+    """-1 while nothing has come."""
+    is_heard: bool
+    """Whether it still hears it."""
+    whole: Counts
+    recent: Counts
+
+
+class Age(msgspec.Struct, frozen=True):
+    """The ages at use of one channel at one client, of some time or of the whole run, up to the closing of a tick."""
+
+    tick: int
+    client: str
+    source: str
+    channel: str
+    counts: Counts
+
+
 class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A client that joins (again): its period in ticks (0: free-running) and what it subscribes to."""
+    """A client that joins (again): period and offset in ticks (0: free-running), what it subscribes to, and of that at
+    the arrival of what it acts, if it does."""
 
     name: str
     period: int
     subscriptions: list[tuple[str, str]]
+    offset: int = 0
+    arrivals: list[tuple[str, str]] = []
+
+    def suits(self, tick: int) -> bool:
+        """Whether it can join at a tick."""
+        return self.period == 0 or bool(self.arrivals) or tick % self.period == self.offset
+
+
+class MemberState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A client that takes part, as it is written down: what a `members.Member` is."""
+
+    period: int
+    subscriptions: tuple[tuple[str, str], ...]
+    joined_tick: int
+    sequence: int = 0
+    downlink: int = 0
+    active: bool = True
+    branched: int = 0
+    offset: int = 0
+    arrivals: tuple[tuple[str, str], ...] = ()
+    called_tick: int = -1
 
 
 class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -197,12 +259,13 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     closed: int
     packets: tuple[int, int, int, int, int]
     refusals: list[tuple[str, int]]
-    members: list[tuple[str, int, list[tuple[str, str]], int, int, int, bool, int]]
+    members: list[tuple[str, MemberState]]
     links: list[tuple[str, str, str, LinkState]]
     radios: list[tuple[str, str, RadioState]]
     airs: list[tuple[str, AirState]]
     asked: list[tuple[int, str]]
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
+    ages: list[tuple[str, list[HeardState]]]
     branch: tuple[int, int]
     flights: list[FlightState]

@@ -17,6 +17,7 @@ from msgspec import json
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.impairments import TableJitter
+from foosim.vhub.memory import RadioState, Transmission
 from foosim.vhub.radio.airtime import lora_airtime_ns, lrwpan_airtime_ns, wifi_ack_ns, wifi_airtime_ns
 from foosim.vhub.radio.contention import sensing, wifi_contention
 from foosim.vhub.radio.errors import (
@@ -32,6 +33,8 @@ from foosim.vhub.radio.materials import MATERIALS, slab_loss_db
 from foosim.vhub.radio.noise import centi
 from foosim.vhub.radio.path_loss import ENVIRONMENTS
 from foosim.vhub.radio.timings import DOT11P, WIFI_2_4, WIFI_5
+from foosim.vhub.stages.duty import packets_an_hour
+from foosim.vhub.turns import Contest, Turn
 
 MODEL_HASH: Final = "model_hash"
 """The entry of the metadata `foosim`."""
@@ -79,7 +82,7 @@ def _errors() -> Iterator[object]:
 
 
 def _airtimes() -> Iterator[object]:
-    """Yield times on the air (ns), and how likely attempts collide."""
+    """Yield times on the air (ns), how likely attempts collide, whose turn is first, and what a duty cycle leaves."""
     for timing in (WIFI_2_4, WIFI_5, DOT11P):
         family = "ofdm10" if timing is DOT11P else "ofdm"
         modes = sorted(name for name, mode in MODES.items() if mode.family == family)
@@ -87,6 +90,15 @@ def _airtimes() -> Iterator[object]:
         yield [wifi_contention(n, timing, unicast=n % 2 == 0).threshold >> _PPM_SHIFT for n in range(1, 20)]
     yield lrwpan_airtime_ns(50), [sensing(n, lrwpan_airtime_ns(50), True).threshold >> _PPM_SHIFT for n in range(1, 9)]
     yield [lora_airtime_ns(factor, 20) for factor in LORA_FACTORS]
+    yield list(_turns()), [packets_an_hour(0.01, seconds * 1_000_000_000, 56_576_000) for seconds in (20, 3600)]
+
+
+def _turns() -> Iterator[int]:
+    """Yield when turns begin (ns) of stations with several backoffs that meet two whose turns are known."""
+    known = [Transmission("a", 1, 0, 0, 0, at_ns + 50_000, (0.0, 0.0, 0.0), 0, turn_ns=at_ns) for at_ns in (9, 90_000)]
+    turns = [Turn(transmission, RadioState()) for transmission in known]
+    for backoff_ns in range(0, 150_000, 15_000):
+        yield Contest(0, 3, 0, list(turns), []).turn_ns(backoff_ns, WIFI_5.slot_ns)
 
 
 def _lora() -> object:

@@ -50,6 +50,7 @@ class Flight:
         self.mangled = b""
         self.phase_ns = self.queue_bytes = self.queue_ns = self.access_ns = self.airtime_ns = 0
         self.propagation_ns = self.jitter_ns = self.held_ns = self.model_ns = self.bits_flipped = 0
+        self.put_off_ns = 0
         self.is_bad = self.is_doubled = self.is_settled = False
         self.walls: tuple[str, ...] = ()
         self.by_factor: tuple[int, ...] = ()

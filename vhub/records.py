@@ -21,7 +21,7 @@ from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Build, Commit, Delivered, Edit, Epoch, Recovered, RobotPacket, Samples, Sent
 from foosim.protocol.sampling import Sampling
 from foosim.protocol.start import first_chain
-from foosim.vhub.memory import Joining
+from foosim.vhub.memory import Age, Joining
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState
 
@@ -64,7 +64,8 @@ class InputsRecord(msgspec.Struct, frozen=True, array_like=True, tag="inputs", f
 class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbid_unknown_fields=True):
     """One closed tick: the commit and samples as they came, what was admitted, who joined and left, and the result.
 
-    `refused` counts by cause what was refused at the door since the tick before.
+    `refused` counts by cause what was refused at the door since the tick before. `owing` left while the tick waited for
+    their Dones: its Go was said to them, and they are gone when what clients sent is judged.
     """
 
     tick: int
@@ -75,6 +76,7 @@ class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbi
     leaves: list[str]
     refused: list[tuple[str, int]]
     deliveries: bytes
+    owing: list[str] = []
 
 
 HubRecord = HeadRecord | TickRecord | InputsRecord | Epoch
@@ -97,6 +99,10 @@ class Closing:
     """Losses and returns that were over with this frame."""
     chain: bytes = b""
     """Over the frames up to this one, without the one that the run began with."""
+    owing: list[str] = field(default_factory=list)
+    """Clients that left while the tick waited for their Dones."""
+    ages: Sequence[Age] = ()
+    """Ages at use since they were told last, where this closing tells them."""
 
 
 def closing_of(
@@ -125,7 +131,8 @@ def tick_record(
     """Return the record of a closing: what has to be written before its deliveries are spoken."""
     sampled = [raw for raw, message in samples if message.digest == closing.digest]
     clients = sorted(admitted.items()), closing.joins, closing.leaves
-    return encode(TickRecord(closing.frame.tick, commit, sampled, *clients, state.refused_at_door, deliveries))
+    given = state.refused_at_door, deliveries, closing.owing
+    return encode(TickRecord(closing.frame.tick, commit, sampled, *clients, *given))
 
 
 def world_packets(
@@ -219,7 +226,11 @@ class Fold:
         released = state.close_world(frame, packets, closing.fates, commit.edits)
         count_downlinks(state, frame.tick, released)
         state.at_door = dict(record.refused)
+        closing.owing += record.owing
+        for name in record.owing:
+            state.leave(name)
         deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
+        closing.ages = state.aged
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
         self.commit, self.inputs = record.commit, None

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import msgspec
 
 from foosim.protocol.codec import encode_json
+from foosim.vhub.ages import quantile
+from foosim.vhub.fabric import LinkKey, name_of
 from foosim.vhub.state import HubState
 
 if TYPE_CHECKING:
@@ -65,8 +67,9 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
     Only the last report has everything as it is at this moment.
 
     `links` are those with the most traffic: [from, to, offered, delivered, dropped, mean delay in ns, rule, how long
-    its queue is in ns, dropped by cause], and `links_in_all` how many there are. `refused` counts messages by channel
-    and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime, null if none did.
+    its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many there are. Ages at use are [channel,
+    uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts messages by channel and sender,
+    `refusals` packets by reason; `lateness_ms` is how late packets left in realtime, null if none did.
     """
     state, refused = core.state, core.refusals.by_sender()
     if state is None:
@@ -87,6 +90,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
             "links": core.links_told.lines(state, anew=is_last),
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
+            "absences": {"boot": core.member.boot, **core.door.absences.report()},
             "lateness_ms": lateness.as_json() if lateness is not None and lateness.count else None,
             "capture": core.capture,
             "recording": core.recording,
@@ -98,12 +102,18 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
 def _links(state: HubState) -> list[list[Any]]:
     """Return the links that are told, by name."""
     fabric, now_ns = state.fabric, state.closed * state.tick_ns
+    ages: dict[LinkKey, list[tuple[str, int, int, int]]] = {}
+    for name in state.members:
+        for age in state.ages.of(name, state.closed):
+            key = age.source, name, name_of(fabric.profiles.find(age.source, name, age.channel))
+            p50, p99 = (quantile(age.counts, share) * state.tick_ns for share in (0.5, 0.99))
+            ages.setdefault(key, []).append((age.channel, sum(age.counts.values()), p50, p99))
     busiest = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))[:LINKS_TOLD_MAX]
     return [
         [
             *key[:2],
             *(its.offered, its.delivered, its.dropped, its.delay_ns // its.delivered if its.delivered else 0),
-            *(key[2], fabric.queue_ns(key, now_ns), dict(sorted(its.causes.items()))),
+            *(key[2], fabric.queue_ns(key, now_ns), dict(sorted(its.causes.items())), ages.get(key, [])),
         ]
         for key, its in sorted(busiest, key=lambda item: item[0])
     ]

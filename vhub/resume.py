@@ -183,6 +183,12 @@ def first_tick_of(records: Sequence[bytes]) -> int | None:
     return next(ticks, limits.COUNTER_MAX) if records else None
 
 
+def last_tick_of(records: Sequence[bytes]) -> int:
+    """Return the last tick of which a journal has a record, -1 when it has none."""
+    ticks = (record.tick for raw in reversed(records) if isinstance(record := decode_any(HubRecord, raw), TickRecord))
+    return next(ticks, -1)
+
+
 def end_of(deployment: Deployment, records: Sequence[bytes]) -> Captured | None:
     """Return the last tick and epoch of a journal; None when there is no journal. Raises Malformed for what is none."""
     tick, epoch = -1, 0

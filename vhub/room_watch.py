@@ -15,7 +15,8 @@ from foosim.vhub.capture_writer import CaptureState, CaptureWriter
 LOOK_NS: Final = 1_000_000_000
 """How often the disk of the journal is looked at."""
 _STATES: Final = {Level.FINE: "on", Level.LOW: "low", Level.FULL: "full", Level.OUT: "ended"}
-NOT_RECORDED: Final = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0}
+CLOSING: Final = "closing"
+NOT_RECORDED: Final = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
 
 
 class RoomWatch:
@@ -73,10 +74,12 @@ class RoomWatch:
         if self._capture is None:
             return NOT_RECORDED
         state, counts = self._capture.state, self._capture.statistics()
+        is_closing = self._capture.is_closing and state.level <= Level.LOW
         return {
-            "state": _STATES[state.level],
+            "state": CLOSING if is_closing else _STATES[state.level],
             "problem": state.text,
             "offered": counts.offered,
             "written": counts.written,
             "refused": counts.refused,
+            "bytes": counts.bytes,
         }

@@ -20,7 +20,7 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.message_types import Counter
 from foosim.protocol.messages import Add, Delivered, Disrupt, Edit, Freeze, Push, Remove, Thaw
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 """Version of the rows and of the capture's metadata; a reader refuses another one."""
 PROFILE: Final = "foosim"
 
@@ -214,13 +214,40 @@ class SubscriptionRow(Row, frozen=True):
 
 
 class ClientRow(Row, frozen=True):
-    """A client that joins or leaves at `tick`; `period` is in ticks (0: free-running)."""
+    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks.
+
+    One with `arrivals` acts when a packet of these channels reaches it, and when it has not for a period. One that
+    `leaves_owing` was told its turn at that tick, and is gone without an answer.
+    """
 
     tick: Counter
     client: str
-    event: Literal["joins", "leaves"]
+    event: Literal["joins", "leaves", "leaves_owing"]
     period: Counter
     subscriptions: list[SubscriptionRow]
+    offset: Counter = 0
+    arrivals: list[SubscriptionRow] = []
+
+
+class AgeRow(Row, frozen=True):
+    """How old the newest packet of a channel was when its receiver acted, since the row before: told each second of
+    simulated time, up to the closing of `tick`, and at the end.
+
+    `uses` counts the ticks at which the client acted and had something of the channel; `p50_ns`, `p99_ns` and `most_ns`
+    are of these. `counts` says how often each of `ages_ns` was seen; ages of 64 ticks and more are rounded down to
+    1/32.
+    """
+
+    tick: Counter
+    client: str
+    source: str
+    channel: str
+    uses: Counter
+    p50_ns: Counter
+    p99_ns: Counter
+    most_ns: Counter
+    ages_ns: list[int]
+    counts: list[int]
 
 
 class OwnerRow(Row, frozen=True):
@@ -265,6 +292,7 @@ RECOVERIES: Final = "/recoveries"
 TICK: Final = "/tick"
 LAYOUT: Final = "/layout"
 FRAME: Final = "/frame"
+AGES: Final = "/ages"
 PACKETS: Final = "/packets"
 CLIENTS: Final = "/clients"
 
@@ -275,6 +303,7 @@ ROW_TYPES: Final[Mapping[str, type[Row]]] = {
     CLIENTS: ClientRow,
     TICK: TickRow,
     FRAME: FrameRow,
+    AGES: AgeRow,
     PACKETS: PacketRow,
 }
 """The type of the rows of each topic."""

@@ -8,7 +8,7 @@ Neighbours: `state` judges, `core` speaks between the two.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from foosim.vhub.packet import Flight
 
@@ -34,6 +34,11 @@ class Sendings:
         else:
             self._waiting.append((len(self._dropped), flights))
             self._dropped += [[], []]
+
+    @property
+    def waiting(self) -> Iterator[Flight]:
+        """What is not judged yet."""
+        return (flight for _, flights in self._waiting for flight in flights)
 
     def judge_rest(self) -> None:
         """Judge what has not been judged, in its order."""

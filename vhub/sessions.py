@@ -28,14 +28,9 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.names import nearest_name
 from foosim.vhub.downlinks import Downlinks
+from foosim.vhub.members import may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.state import HubState
-
-
-def may_lockstep(deployment: Deployment, name: str) -> bool:
-    """Whether the run waits for this client: no other can hold it up."""
-    declared = deployment.players.get(name) or deployment.clients.get(name)
-    return declared is not None and declared.lockstep
 
 
 @dataclass(slots=True)
@@ -51,8 +46,17 @@ class Session:
     """The last downlink up to which it had all at its hello."""
     is_behind: bool = True
     """Whether it is to be told what it had not received then."""
+    is_gone: bool = False
+    """Whether its process has gone, and has not come back, nor another one."""
+    returns: int = 0
+    """How often its process had lost the vHub when it said hello."""
+    before: set[str] = field(default_factory=set)
+    """Boots of processes that are gone for good: what comes late of them is of nobody."""
     away_ns: int = -1
-    """Until when a client that is away may come back; -1 while it is here."""
+    """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
+    here."""
+    back_ns: int = 0
+    """How long it has for that."""
     next_sequence: int = 1
     """The number of its next packet: nothing behind a gap is taken."""
     heard: int = 0
@@ -63,19 +67,51 @@ class Session:
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
+    """By when it is to answer; 0 while no answer is waited for."""
     allowed_ns: int = 0
+    deadline: str = ""
+    """Which one of the deployment's that is."""
     done: Done | None = None
     inbox: list[Sent] = field(default_factory=list)
     inbox_bytes: int = 0
     """As they came."""
 
-    def come(self, boot: str, received: int, sequence: int) -> None:
-        """A process of the client is here; it goes on behind these numbers."""
+    def is_late(self, hello: ClientHello) -> bool:
+        """Whether a hello was said by a process that has gone since: one that comes back counts one return more."""
+        is_of_gone = self.is_gone and hello.boot == self.boot and hello.returns <= self.returns
+        return is_of_gone or hello.boot in self.before
+
+    def come(self, boot: str, received: int, sequence: int, joins_first: bool = False) -> None:
+        """A process of the client is here; it goes on behind these numbers. It may be away until it `joins_first`."""
         if boot != self.boot:
+            if self.boot:
+                self.before.add(self.boot)
             self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
         self.is_present = self.is_present and boot == self.boot
-        self.boot, self.received, self.is_behind, self.away_ns = boot, received, True, -1
+        self.boot, self.received, self.is_behind, self.is_gone = boot, received, True, False
+        self.away_ns = self.away_ns if joins_first else -1
         self.next_sequence = max(self.next_sequence, sequence + 1)
+
+    @property
+    def lost_ns(self) -> int:
+        """When a client that is away is lost: its process may be gone, or only stand still, so the later time counts
+        of those for coming back and for its answer."""
+        return max(self.away_ns, self.deadline_ns)
+
+    def answered(self) -> None:
+        """No answer is waited for."""
+        self.deadline_ns = 0
+
+    def leave(self, back_ns: int, now_ns: int) -> None:
+        """The client is away, and has so long to come back."""
+        self.back_ns, self.away_ns = back_ns, now_ns + back_ns
+
+    def rest(self, for_ns: int, now_ns: int) -> None:
+        """For so long the client could do nothing: move its deadlines, at most to where they would begin now."""
+        if self.away_ns >= 0:
+            self.away_ns = min(self.away_ns + for_ns, now_ns + self.back_ns)
+        if self.deadline_ns:
+            self.deadline_ns = min(self.deadline_ns + for_ns, now_ns + self.allowed_ns)
 
     def take(self, packets: Sequence[Sent]) -> int:
         """Take what the client sends, each number once and in order; return how many were taken before."""
@@ -87,6 +123,12 @@ class Session:
             elif packet.sequence < self.next_sequence:
                 repeated += 1
         return repeated
+
+    @property
+    def unanswered(self) -> str:
+        """What is said when the deadline has passed."""
+        told = f"{self.name} has not answered tick {self.go_tick} for {self.allowed_ns / 1e9:g} s"
+        return f"{told} (deadlines.{self.deadline})"
 
     def wait(self, now_ns: int, allowed_ns: int, again_after_ns: int) -> None:
         """Begin to wait for a Done."""
@@ -136,10 +178,12 @@ class Sessions:
             downlink = min(has, downlink)
         else:  # another process: the numbers of what the one before has sent are taken
             waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
+            waiting += [] if session.done is None else session.done.packets
             sequence = max([sequence, *(packet.sequence for packet in waiting)])
         if session.boot != hello.boot:
             self._left_behind.setdefault(hello.name, []).extend(session.inbox)
-        session.come(hello.boot, downlink, sequence)
+        session.returns = hello.returns
+        session.come(hello.boot, downlink, sequence, hello.returns == 0 and may_restart(deployment, hello.name))
         welcome = ClientWelcome(
             hello.name,
             hello.boot,
@@ -166,7 +210,7 @@ class Sessions:
             hint = f", nearest is {nearest}" if nearest else ""
             return f"no client {hello.name} is declared; declared are {', '.join(sorted(declared)) or 'none'}{hint}"
         session = self.by_name.get(hello.name)
-        if session is not None and session.boot not in ("", hello.boot) and session.away_ns < 0:
+        if session is not None and session.boot not in ("", hello.boot) and not session.is_gone:
             return f"a client {hello.name} is already here"
         return ""
 
@@ -176,28 +220,32 @@ class Sessions:
         here = {name for name, member in state.members.items() if member.active} | self.joins.keys()
         return [name for name in declared if may_lockstep(deployment, name) and name not in here]
 
-    def expect(self, names: Iterable[str], until_ns: int) -> None:
+    def expect(self, names: Iterable[str], back_ns: int, now_ns: int) -> None:
         """These clients come back, by then, to this vHub, which is another one."""
         for name in sorted(names):
-            self.by_name[name] = Session(name, "", away_ns=until_ns)
+            self.by_name[name] = Session(name, "")
+            self.by_name[name].leave(back_ns, now_ns)
 
     def late(self, now_ns: int) -> list[str]:
         """Return the clients that were away for too long, in name order."""
-        return [name for name, session in sorted(self.by_name.items()) if 0 <= session.away_ns <= now_ns]
+        away = [(name, session) for name, session in sorted(self.by_name.items()) if session.away_ns >= 0]
+        return [name for name, session in away if session.lost_ns <= now_ns]
 
     @property
     def late_ns(self) -> int | None:
         """When the next client has been away for too long."""
-        return min((session.away_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
+        return min((session.lost_ns for session in self.by_name.values() if session.away_ns >= 0), default=None)
 
     def join(self, join: Join) -> None:
-        """Note a join; it takes effect when the hub closes a tick that suits its period."""
-        subscriptions = [(wanted.source, wanted.channel) for wanted in join.subscriptions]
-        self.joins[join.name] = Joining(join.name, join.period, sorted(set(subscriptions)))
+        """Note a join; it takes effect when the hub closes a tick that suits it."""
+        subscriptions = {(wanted.source, wanted.channel) for wanted in join.subscriptions}
+        arrivals = {(wanted.source, wanted.channel) for wanted in join.arrivals}
+        what = sorted(subscriptions), join.offset, sorted(arrivals)
+        self.joins[join.name] = Joining(join.name, join.period, *what)
 
     def take_joins(self, tick: int) -> list[Joining]:
         """Take the joins that take effect at `tick`, in name order."""
-        due = [name for name, j in sorted(self.joins.items()) if j.period == 0 or tick % j.period == 0]
+        due = [name for name, joining in sorted(self.joins.items()) if joining.suits(tick)]
         return [self.joins.pop(name) for name in due]
 
     def leave(self, name: str) -> None:
@@ -255,8 +303,9 @@ class Sessions:
     def catch_up(self, session: Session, waits: bool, now_ns: int) -> None:
         """A client has joined (again): say what it had not received; `waits` is whether a tick waits for its Done."""
         session.is_present = True
+        session.away_ns = -1
         if session.is_behind:
-            session.deadline_ns = now_ns + session.allowed_ns
+            session.deadline_ns = now_ns + session.allowed_ns if waits else 0
             session.is_behind = False
             missed = [*self.downlinks.behind(session.name, session.received), *([session.go] if waits else [])]
             self._actions += [Publish(channels.DOWN, session.name, payload) for payload in missed]
@@ -271,13 +320,15 @@ class Sessions:
                 session.heard, session.heard_ns = member.sequence, now_ns
                 self._actions.append(Publish(channels.DOWN, name, encode(Heard(member.sequence, state.branch))))
 
-    def overdue(self, waited: Sequence[str], paused: bool, now_ns: int) -> list[Session]:
-        """Return those whose deadline has passed; while the run is paused none passes."""
-        sessions = [self.by_name[name] for name in waited]
-        if paused:
-            for session in sessions:
-                session.deadline_ns = max(session.deadline_ns, now_ns + limits.WANT_EVERY_NS_MAX)
-        return [session for session in sessions if now_ns >= session.deadline_ns and session.away_ns < 0]
+    def rest(self, for_ns: int, now_ns: int) -> None:
+        """For so long no client could do anything."""
+        for session in self.by_name.values():
+            session.rest(for_ns, now_ns)
+
+    def overdue(self, now_ns: int) -> list[Session]:
+        """Return those who are here and have not answered in time, in name order."""
+        waited = [session for _, session in sorted(self.by_name.items()) if session.deadline_ns]
+        return [session for session in waited if now_ns >= session.deadline_ns and session.away_ns < 0]
 
     def again_ns(self, waited: Sequence[str]) -> int:
         """When the next Go is said again."""

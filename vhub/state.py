@@ -20,9 +20,11 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Delivered, Deliveries, Disrupt, Edit, Epoch, RobotPacket, Sent
 from foosim.protocol.sampling import Sampling, are_answered
+from foosim.vhub.ages import Ages
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.links import Link
-from foosim.vhub.memory import Joining, Snapshot
+from foosim.vhub.members import Here, Member
+from foosim.vhub.memory import Age, Joining, Snapshot
 from foosim.vhub.packet import Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.room import Room
 from foosim.vhub.sendings import Sendings
@@ -31,38 +33,6 @@ from foosim.vhub.transit import TRANSIT_FULL, Transit
 
 OUTBOX_SHIFT = 16
 """A robot's sequence number is tick x 2^16 + index."""
-
-
-class Member:
-    """A client that takes part, as the state knows it: in ticks and numbers, without its session."""
-
-    def __init__(
-        self,
-        period: int,
-        subscriptions: tuple[tuple[str, str], ...],
-        joined_tick: int,
-        sequence: int = 0,
-        downlink: int = 0,
-        active: bool = True,
-        branched: int = 0,
-    ) -> None:
-        self.period = period
-        self.subscriptions = subscriptions
-        self.joined_tick = joined_tick
-        self.sequence = sequence
-        """Greatest sequence number that was admitted."""
-        self.downlink = downlink
-        """Number of the last message to the client."""
-        self.active = active
-        self.branched = branched
-        """The number of that message when the last branch began: what was said then behind it is void."""
-
-    def is_due(self, tick: int) -> bool:
-        return self.active and self.period > 0 and tick % self.period == 0
-
-    def release_tick(self, tick: int) -> int:
-        """Return the first tick, from `tick` on, at which something can be released to the client."""
-        return tick if self.period == 0 else -(-tick // self.period) * self.period
 
 
 class HubState:
@@ -90,6 +60,9 @@ class HubState:
         """Refusals since the last closing by cause, of what never got as far as the state: counted by the next one."""
         self.refused_at_door: list[tuple[str, int]] = []
         """Those that the last closing counted: an input of it, which the journal keeps."""
+        self.ages = Ages(self.tick_ns)
+        self.aged: list[Age] = []
+        """What the last closing tells of them."""
         self._flights: dict[int, list[Flight]] = {}
         """What is in flight, by the tick at which it arrives."""
         self._sendings = Sendings(lambda flights, dropped: None)
@@ -98,8 +71,7 @@ class HubState:
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
         self._transit = Transit(len(self._endpoints))
-        self._receivers: dict[tuple[str, str], tuple[str, ...]] | None = None
-        """Who hears each (endpoint, channel), in name order; None when it is to be found anew."""
+        self._here = Here(deployment)
 
     def turn_to(self, epoch: Epoch) -> bool:
         """Go on in the branch that an epoch is of; False when it is the present one.
@@ -120,18 +92,18 @@ class HubState:
     def join(self, joining: Joining, tick: int) -> None:
         """Take a client in, from `tick` on; one that comes back keeps its numbers."""
         known = self.members.get(joining.name)
-        subscriptions = tuple((robot, channel) for robot, channel in joining.subscriptions)
-        member = self.members[joining.name] = Member(joining.period, subscriptions, tick)
+        member = self.members[joining.name] = Member.of(joining, tick)
         if known is not None:
             member.sequence, member.downlink, member.branched = known.sequence, known.downlink, known.branched
-        self._receivers = None
+        self.ages.joins(joining.name, member.subscriptions)
+        self._here.renew(self.members)
 
     def leave(self, name: str) -> None:
         """Let a client go: nothing is offered to it any more."""
         if name in self.members:
             self.members[name].subscriptions = ()
             self.members[name].active = False
-            self._receivers = None
+            self._here.renew(self.members)
 
     def due_members(self, tick: int) -> list[str]:
         """Return the lockstep clients that are due at `tick`, in name order."""
@@ -164,7 +136,11 @@ class HubState:
                 what = sequence, sent_ns, 0, packet.payload, published
                 flights.append(Flight(packet.robot, receiver, packet.channel, *what))
             self._send(flights, tick, fates)
-        return self._arrive_at_clients(tick, fates)
+        released = self._arrive_at_clients(tick, fates)
+        for name, member in self.members.items():
+            if member.is_due(tick):
+                self.ages.used(name, tick)
+        return released
 
     def _in_phase(self, packets: Iterable[RobotPacket]) -> Iterable[RobotPacket]:
         """Return packets in the order in which they come to their radios."""
@@ -191,7 +167,7 @@ class HubState:
         has_radios = self.fabric.profiles.on_radio
         shares = has_radios and any(not self._is_apart(flight) for flight in self._flights.get(tick + 1, ()))
         for source in sorted(admitted, key=lambda name: (self.fabric.phase_ns(name), name)):
-            copies = 0
+            copies, before = 0, self._sequence_of(source)
             for sent in sorted(admitted[source], key=attrgetter("sequence")):
                 if not self._admit(source, sent):
                     continue
@@ -206,13 +182,17 @@ class HubState:
                 is_apart = to_robot and self._is_apart(flights[0])
                 shares = shares or (to_robot and not is_apart)
                 sendings.send(flights, now=is_apart or not has_radios)
+            if self._sequence_of(source) > before and not self.members[source].period:
+                self.ages.used(source, tick)
         if shares:
             sendings.judge_rest()
         self.closed = tick
+        self.aged = self.ages.take(tick)
         deliveries = self._arrive_at_robots(tick + 1, sendings.arrived)
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
         self.was_final = tick < self.final
         if self.was_final:
+            assert not any(member.is_due(tick) for member in self.members.values()), f"tick {tick} asks a client"
             assert not deliveries, f"deliveries {tick + 1} were final without packets"
             return Deliveries(tick + 1, [], branch=self.branch)
         following = self._following(tick)
@@ -244,29 +224,35 @@ class HubState:
         """Return for how many ticks behind the next one it is certain that nothing reaches robots.
 
         That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
-        filled, no lockstep client is due, and no other is here.
+        filled, no lockstep client is due, or may be by what is in flight, none may join, and no other client is here.
         """
+        if not self._here.is_complete:
+            return 0
         members = [member for member in self.members.values() if member.active]
         if any(member.period == 0 for member in members):
             return 0
-        if self._is_clogged(tick):
+        if self._is_clogged(tick) or (self._here.on_arrival and any(map(self._here.calls, self._sendings.waiting))):
             return 0
         if are_answered(self.deliveries[tick]) or are_answered(self.deliveries[tick + 1]):
             return 0
         for following in range(limits.RELEASE_AHEAD):
             sent, arrival = tick + 1 + following, tick + 2 + following
-            if self.sampling.is_due(sent) or any(member.is_due(sent) for member in members):
+            if self.sampling.is_due(sent) or any(member.may_be_due(sent) for member in members):
+                return following
+            if self._here.on_arrival and any(map(self._here.calls, self._flights.get(sent, ()))):
                 return following
             if any(flight.destination in self._robots for flight in self._flights.get(arrival, ())):
                 return following
         return limits.RELEASE_AHEAD
 
     def _is_clogged(self, tick: int) -> bool:
-        """Whether a clog holds something back from a robot: a heal may let it go at any tick."""
+        """Whether a clog holds something back from a robot, or from who acts at its arrival: a heal may let it go at
+        any tick."""
         if not self.fabric.timeline.has_holds:
             return False
         flights = (flight for arrival, those in self._flights.items() if arrival > tick for flight in those)
-        return any(flight.held_ns > 0 and flight.destination in self._robots for flight in flights)
+        held = (flight for flight in flights if flight.held_ns > 0)
+        return any(flight.destination in self._robots or self._here.calls(flight) for flight in held)
 
     def _admit(self, source: str, sent: Sent) -> bool:
         """Refuse at the door what is no packet of this run: a repeat, or to nobody."""
@@ -279,6 +265,11 @@ class HubState:
         if sent.destination and sent.destination not in self._endpoints:
             return self.refuse("no_route")
         return True
+
+    def _sequence_of(self, source: str) -> int:
+        """Return the greatest number that was admitted of a client."""
+        member = self.members.get(source)
+        return 0 if member is None else member.sequence
 
     def refuse(self, cause: str, count: int = 1) -> bool:
         """Count packets that are refused; they are in no link's account."""
@@ -297,13 +288,7 @@ class HubState:
         """
         if destination:
             return (destination,)
-        if self._receivers is None:
-            heard: dict[tuple[str, str], list[str]] = {}
-            for name in sorted(self.members):
-                for pair in self.members[name].subscriptions:
-                    heard.setdefault(pair, []).append(name)
-            self._receivers = {pair: tuple(names) for pair, names in heard.items()}
-        return self._receivers.get((source, channel), ())
+        return self._here.receivers.get((source, channel), ())
 
     def _send(self, flights: Sequence[Flight], tick: int, fates: list[Flight]) -> None:
         """Judge a packet for each of its receivers, then the copies: all receivers of a broadcast share the air."""
@@ -389,26 +374,50 @@ class HubState:
         rest = [flight for flight in flights if (flight.destination in robots) is not to_robots]
         if rest:
             self._flights[tick] = rest
+        late = [flight for flight in taken if flight.put_off_ns and flight.due_ns > tick * self.tick_ns]
+        for flight in late:
+            taken.remove(flight)
+            self._let_fly(flight, tick + 1)
         taken.sort(key=order_of)
         return taken
 
     def _arrive_at_clients(self, tick: int, fates: list[Flight]) -> dict[str, list[Flight]]:
         released: dict[str, list[Flight]] = {}
+        turns = self._here.on_arrival
+        for client in turns.values():
+            if client.is_over(tick):
+                client.called_tick = tick
         arriving = self._take_arrivals(tick, to_robots=False)
         if not arriving:
             return released
         room, world = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False), self.fabric.world
+        judged: list[Flight] = []
+        if turns:  # what makes them act is judged first: with it comes what else is there
+            arriving.sort(key=self._here.calls, reverse=True)
         for flight in arriving:
             member = self.members.get(flight.destination)
             if member is not None and member.active and member.release_tick(tick) != tick:
                 flight.arrival_tick = member.release_tick(tick)
                 self._flights.setdefault(flight.arrival_tick, []).append(flight)
                 continue
+            is_call = flight.destination in turns and self._here.calls(flight)
+            if flight.destination in turns and not is_call and turns[flight.destination].called_tick != tick:
+                flight.arrival_tick = tick + 1
+                self._flights.setdefault(tick + 1, []).append(flight)
+                continue
             down = member is None or not member.active or world.is_down(flight.destination)
             hindered = RECEIVER_DOWN if down else "" if room.takes(flight) else RECEIVER_FULL
             if self._arrive(flight, hindered):
                 released.setdefault(flight.destination, []).append(flight)
-            fates.append(flight)
+                self.ages.reached(flight.destination, flight.source, flight.channel, flight.sent_ns)
+                if is_call:
+                    turns[flight.destination].called_tick = tick
+            judged.append(flight)
+        if turns:
+            judged.sort(key=order_of)
+            for flights in released.values():
+                flights.sort(key=order_of)
+        fates += judged
         return released
 
     def _arrive_at_robots(self, tick: int, fates: list[Flight]) -> list[Delivered]:
@@ -441,16 +450,14 @@ class HubState:
                 "closed": self.closed,
                 "packets": [p.offered, p.delivered, p.dropped, p.refused, p.copies],
                 "refusals": sorted(self.refusals.items()),
-                "members": [
-                    [name, m.period, m.subscriptions, m.joined_tick, m.sequence, m.downlink, m.active, m.branched]
-                    for name, m in sorted(self.members.items())
-                ],
+                "members": [[name, member.state()] for name, member in sorted(self.members.items())],
                 "links": [[*key, fabric.states[key]] for key in sorted(fabric.states)],
                 "radios": [[*key, fabric.radios[key]] for key in sorted(fabric.radios)],
                 "airs": [[name, fabric.airs[name].state] for name in sorted(fabric.airs)],
                 "asked": fabric.asked,
                 "deliveries": sorted(self.deliveries.items()),
                 "final": [self.final, self.was_final],
+                "ages": self.ages.state(),
                 "branch": [self.branch, self.branch_tick],
                 "flights": [state_of(flight) for flight in self.in_flight()],
             }
@@ -464,12 +471,14 @@ class HubState:
         state.closed = content.closed
         state.packets = Packets(*content.packets)
         state.refusals = dict(content.refusals)
-        for name, period, subscriptions, *rest in content.members:
-            state.members[name] = Member(period, tuple(subscriptions), *rest)
+        for name, written in content.members:
+            state.members[name] = Member(written)
+        state._here.renew(state.members)
         state.fabric.restore(content.links, content.radios, content.airs, content.asked)
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final
         state.branch, state.branch_tick = content.branch
+        state.ages.restore(content.ages)
         if not {state.closed, state.closed + 1} <= state.deliveries.keys():
             raise Malformed(f"a state after tick {state.closed} without the deliveries of that tick and the next")
         ends = {(source, destination) for source, destination, _ in state.fabric.states}

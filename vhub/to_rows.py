@@ -18,11 +18,14 @@ from foosim.protocol.draws import Slot
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Add, Disrupt, Edit, Epoch, Freeze, Push, Recovered, Remove
+from foosim.vhub.ages import quantile
 from foosim.vhub.air import DEAF
 from foosim.vhub.mcap_writer import McapWriter
+from foosim.vhub.memory import Age
 from foosim.vhub.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import (
+    AGES,
     CLIENTS,
     EPOCHS,
     FRAME,
@@ -31,6 +34,7 @@ from foosim.vhub.rows import (
     RECOVERIES,
     TICK,
     AddedRow,
+    AgeRow,
     ClientRow,
     DecidedRow,
     DeliveredRow,
@@ -90,7 +94,18 @@ def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]
         entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
         if known is None or frame.tick % plan.frames_every == 0:
             entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
-    return entries
+    return [*entries, *(_age_entry(age, plan.tick_ns) for age in closing.ages)]
+
+
+def _age_entry(age: Age, tick_ns: int) -> Entry:
+    """Return the row of ages at use, at the last tick that it tells of."""
+    ages = sorted(age.counts)
+    p50, p99 = quantile(age.counts, 0.5), quantile(age.counts, 0.99)
+    counts = [age.counts[ticks] for ticks in ages]
+    figures = sum(counts), p50 * tick_ns, p99 * tick_ns, ages[-1] * tick_ns
+    who = age.client, age.source, age.channel
+    row = AgeRow(age.tick, *who, *figures, [ticks * tick_ns for ticks in ages], counts)
+    return AGES, age.tick * tick_ns, age.tick * tick_ns, age.tick & 0xFFFF_FFFF, row
 
 
 def add_packets(
@@ -100,13 +115,18 @@ def add_packets(
     encode: Callable[[Row], bytes],
     kept: Callable[[Row], Row] | None,
 ) -> None:
-    """Add the rows of packets to a file, as `encode` writes them; `kept` makes of a row what is kept of it.
+    """Add the rows of one closing's packets to a file in the order of their log times, as `encode` writes them.
 
-    The hot path: see the bench before changing it.
+    `kept` makes of a row what is kept of it. The hot path: see the bench before changing it.
     """
-    for flight in flights:
+    for flight in sorted(flights, key=_log_time):
         _, log_ns, publish_ns, sequence, row = packet_entry(flight)
         mcap.add_message(channel, log_ns, publish_ns, sequence, encode(row if kept is None else kept(row)))
+
+
+def _log_time(flight: Flight) -> int:
+    """Return when a packet was sent: those of a closing arrive in another order, by their due times."""
+    return flight.sent_ns
 
 
 def packet_entry(flight: Flight) -> Entry:
@@ -265,9 +285,12 @@ def _client_rows(closing: Closing) -> list[ClientRow]:
     tick = closing.frame.tick
     rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
     for joining in closing.joins:
-        subscriptions = [SubscriptionRow(source, channel) for source, channel in joining.subscriptions]
-        rows.append(ClientRow(tick, joining.name, "joins", joining.period, subscriptions))
-    return rows
+        heard, calling = (
+            [SubscriptionRow(source, channel) for source, channel in pairs]
+            for pairs in (joining.subscriptions, joining.arrivals)
+        )
+        rows.append(ClientRow(tick, joining.name, "joins", joining.period, heard, joining.offset, calling))
+    return [*rows, *(ClientRow(tick, name, "leaves_owing", 0, []) for name in closing.owing)]
 
 
 def edit_row(edit: Edit) -> EditRow:
@@ -281,5 +304,3 @@ def edit_row(edit: Edit) -> EditRow:
     if isinstance(edit, Disrupt):
         return EditRow("network", "", event=edit.event)
     return EditRow("freeze" if isinstance(edit, Freeze) else "thaw", edit.name)
-
-

@@ -130,7 +130,7 @@ def _any_done(planting: Planting) -> None:
     def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
         session = self._session(done)
         if session is not None and self._core.waits_for(done.name):
-            self._core.take_done(done.name)
+            self.take_done(done.name)
             session.done = done
 
     planting.swap(Door, "done", done)
@@ -182,6 +182,15 @@ def _cut_dones(planting: Planting) -> None:
         before(self, replace(done, packets=[]) if self._core.repeated else done, payload, now_ns)
 
     before: Any = planting.swap(Door, "done", done)
+
+
+@register("who leaves is not written", "leaving is an input of the tick whose Done is owed", 71)
+def _unwritten_leave(planting: Planting) -> None:
+    def leave_owing(self: Any, state: Any, closing: Any) -> None:
+        before(self, state, closing)
+        closing.owing = []
+
+    before: Any = planting.swap(Door, "leave_owing", leave_owing)
 
 
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)

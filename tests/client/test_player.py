@@ -26,6 +26,8 @@ from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Receiv
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NAME = "player-red"
+SOURCE_LINES = [line.strip() for line in Path(__file__).read_text().splitlines()]
+RAISES = SOURCE_LINES.index("raise self.commands") + 1
 
 
 class Scripted:
@@ -41,7 +43,7 @@ class Scripted:
 
     def act(self, tick: int, samples: Samples) -> Commands:
         self.calls.append((tick, {pair: sample.value for pair, sample in samples.items()}))
-        if isinstance(self.commands, Exception):
+        if isinstance(self.commands, BaseException):
             raise self.commands
         commands: Commands = self.commands
         return commands
@@ -149,8 +151,8 @@ def test_a_free_running_player_acts_at_its_rate() -> None:
 @pytest.mark.parametrize(
     ("commands", "text"),
     [
-        (ZeroDivisionError("division by zero"), "act failed: ZeroDivisionError: division by zero"),
-        (KeyError(), "act failed: KeyError"),
+        (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero (PLACE)"),
+        (KeyError(), "KeyError (PLACE)"),
         ({"red.gaol": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence, red.goal,"
          " red.midfield), 'red.gaol', nearest is 'red.goal'"),
         ({"blue.goal": Command(0.0, 0.0)}, "not one of its robots (there are: camera, red.attack, red.defence,"
@@ -172,7 +174,8 @@ def test_what_a_player_must_not_do_ends_it(commands: Any, text: str) -> None:
     Scripted.made[-1].commands = commands
     with pytest.raises(PlayerError) as error:
         go(loop, 1)
-    assert str(error.value) == f"player {NAME} at tick 5: {text}"
+    place = f"{__file__}:{RAISES}: raise self.commands"
+    assert str(error.value) == f"{NAME} failed at tick 5: {text.replace('PLACE', place)}"
     assert error.value.exit_code == 1
     assert said(loop) == []
 
@@ -181,11 +184,11 @@ def test_whoever_says_too_much_at_once_is_named() -> None:
     loop = begun()
     much = Outgoing("", "talk", bytes(32 * 1024))
     Scripted.made[-1].commands = Turn({}, [much] * 40)
-    with pytest.raises(PlayerError, match=rf"^player {NAME} at tick 5: \d+ bytes in one answer, at most 1048576"):
+    with pytest.raises(PlayerError, match=rf"^{NAME} failed at tick 5: \d+ bytes in one answer, at most 1048576"):
         go(loop, 1)
     free = begun("players.player-red.lockstep=false")
     Scripted.made[-1].commands = Turn({}, [Outgoing("", "talk", b"")] * 65_537)
-    with pytest.raises(PlayerError, match=rf"^player {NAME} at tick 0: 65537 packets at once, at most 65536"):
+    with pytest.raises(PlayerError, match=rf"^{NAME} failed at tick 0: 65537 packets at once, at most 65536"):
         free.step(10_000_000)
 
 
@@ -198,7 +201,8 @@ def test_a_player_that_cannot_be_made_says_why() -> None:
         def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
             raise BadValue("parameter team is not one of red, blue", "green")
 
-    with pytest.raises(PlayerError, match=r"player player-red: .*players:Team cannot be made: KeyError: 'error'"):
+    before = "player-red failed before its first tick"
+    with pytest.raises(PlayerError, match=rf"^{before}: KeyError: 'error' \(.*raise parameters"):
         begun(load=lambda path: Fails)
     with pytest.raises(PlayerError, match="player player-red: parameter team is not one of red, blue, 'green'"):
         begun(load=lambda path: Refuses)

@@ -130,7 +130,7 @@ def test_parameters_that_are_not_right_are_refused() -> None:
 
 
 def test_two_teams_play_through_the_network() -> None:
-    played = rehearse(TABLE.read_text(), TABLE.name, 5000, nodes=2, sets=["engine=pure"]).json
+    played = rehearse(TABLE.read_text(), TABLE.name, 2000, nodes=2, sets=["engine=pure"]).json
     assert played["packets"]["dropped"] > 0
-    still = rehearse(TABLE.read_text(), TABLE.name, 5000, nodes=2, sets=["engine=pure", "players={}"]).json
+    still = rehearse(TABLE.read_text(), TABLE.name, 2000, nodes=2, sets=["engine=pure", "players={}"]).json
     assert played["handovers"] > max(2, still["handovers"]), "it is they who move the ball"

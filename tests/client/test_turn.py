@@ -104,7 +104,7 @@ def test_a_turn_that_must_not_be_ends_the_player(turn: Turn, text: str) -> None:
     loop, _ = begun()
     with pytest.raises(PlayerError) as error:
         go(loop, turn)
-    assert str(error.value).startswith(f"player {NAME} at tick 5: {text}")
+    assert str(error.value).startswith(f"{NAME} failed at tick 5: {text}")
 
 
 class Counts:

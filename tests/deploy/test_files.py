@@ -218,7 +218,7 @@ def test_systemd_accepts_the_units(tmp_path: Path) -> None:
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=900,
         check=False,
     )
     ours = [line for line in done.stderr.splitlines() if "foosim" in line]

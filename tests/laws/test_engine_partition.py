@@ -224,6 +224,9 @@ POSTS = (
 )
 """Posts between the rods, most of them aslant."""
 
+TICKS = 1000
+PILE_TICKS = 300
+"""Enough for each broken rule to be seen; the rules are held to as many."""
 PILE = ("tick=0.5 ms", "substeps=1", "table.ball.speed_limit=5 m/s")
 
 
@@ -240,33 +243,33 @@ def compare(factory: EngineFactory, ticks: int, sets: Sequence[str] = (), pile: 
 @pytest.mark.parametrize("factory", [BulletEngine, PureEngine])
 @pytest.mark.parametrize("sets", [(), ("substeps=5",)], ids=["four substeps", "five substeps"])
 def test_who_computes_what_changes_nothing(factory: EngineFactory, sets: Sequence[str]) -> None:
-    outcome = compare(factory, 3000, sets)
+    outcome = compare(factory, TICKS, sets)
     assert outcome.differing == []
-    assert outcome.rod_touches >= 20 and outcome.ball_touches >= 40, outcome
-    assert outcome.handovers >= 100 and outcome.rebuilt >= 30, outcome
+    assert outcome.rod_touches >= 7 and outcome.ball_touches >= 14, outcome
+    assert outcome.handovers >= 33 and outcome.rebuilt >= 10, outcome
     assert outcome.island_max == 4, "the ball and at most three rods"
 
 
 def test_meshes_change_nothing() -> None:
-    outcome = compare(BulletEngine, 3000, (DOMES,))
+    outcome = compare(BulletEngine, TICKS, (DOMES,))
     assert outcome.differing == []
-    assert outcome.rod_touches >= 20 and outcome.ball_touches >= 60, outcome
-    assert outcome.handovers >= 100 and outcome.rebuilt >= 30, outcome
+    assert outcome.rod_touches >= 7 and outcome.ball_touches >= 20, outcome
+    assert outcome.handovers >= 33 and outcome.rebuilt >= 10, outcome
 
 
 @pytest.mark.parametrize("factory", [BulletEngine, PureEngine])
 def test_cylinders_change_nothing(factory: EngineFactory) -> None:
-    outcome = compare(factory, 1500, (POSTS,))
+    outcome = compare(factory, TICKS, (POSTS,))
     assert outcome.differing == []
-    assert outcome.rod_touches >= 10 and outcome.ball_touches >= 25, outcome
-    assert outcome.handovers >= 50 and outcome.rebuilt >= 15, outcome
+    assert outcome.rod_touches >= 7 and outcome.ball_touches >= 17, outcome
+    assert outcome.handovers >= 33 and outcome.rebuilt >= 10, outcome
 
 
 @pytest.mark.parametrize("factory", [BulletEngine, PureEngine])
 def test_piles_in_islands_of_their_own_change_nothing(factory: EngineFactory) -> None:
-    outcome = compare(factory, 900, pile=True)
+    outcome = compare(factory, PILE_TICKS, pile=True)
     assert outcome.differing == []
-    assert outcome.ball_touches >= 300 and outcome.handovers >= 20 and outcome.rebuilt >= 10, outcome
+    assert outcome.ball_touches >= 100 and outcome.handovers >= 7 and outcome.rebuilt >= 3, outcome
     assert outcome.bodies_loaded_max < 28
 
 
@@ -347,5 +350,5 @@ class StillAsleep(BulletEngine):
     ],
 )
 def test_a_broken_rule_is_seen(broken: Callable[[Deployment, Layout], Engine], sets: Sequence[str], pile: bool) -> None:
-    outcome = compare(broken, 6000, sets, pile, until_it_differs=True)
+    outcome = compare(broken, PILE_TICKS if pile else TICKS, sets, pile, until_it_differs=True)
     assert outcome.differing, outcome

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from struct import pack
 from typing import TYPE_CHECKING, Any, Final
@@ -26,6 +27,7 @@ from foosim.protocol.messages import Answer, Delivered, Request
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.run_folder import RunFolder, RunInfo
+from foosim.vhub.capture_damage import damage_of
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.records import fold
@@ -171,7 +173,10 @@ def test_a_capture_cut_anywhere_is_a_beginning(fuzz: Fuzz, captured: Captured, t
 
 
 def check_capture(path: Path, content: bytes, digests: bytes) -> None:
-    """A capture is refused, or has the first of the true digests: a wrong one would be a wrong message."""
+    """A capture is refused, or has the first of the true digests: a wrong one would be a wrong message.
+
+    What is damaged is told of one that has its end and is refused, and of no other.
+    """
     path.write_bytes(content)
     try:
         found = open_capture(path)
@@ -181,7 +186,11 @@ def check_capture(path: Path, content: bytes, digests: bytes) -> None:
             pass
         assert len(found.packets) >= 0
     except CaptureError:
-        pass
+        with suppress(CaptureError):
+            damage = damage_of(path)
+            assert damage is None or damage.broken
+    else:
+        assert damage_of(path) is None
 
 
 def test_spoiled_journals_end_where_they_were_spoiled(

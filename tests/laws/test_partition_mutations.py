@@ -1,7 +1,7 @@
 """Faults that law 1 must catch, planted one at a time: what the partition may not touch, touched.
 
-Each test first sees the law hold, then plants the fault and sees it fail. Faults of the engines are planted in
-`test_engine_partition.py`, faults of speaking and committing in `test_trace_laws.py`.
+The first test sees the law hold in the same runs; then each plants its fault and sees it fail. Faults of the engines
+are planted in `test_engine_partition.py`, faults of speaking and committing in `test_trace_laws.py`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TICKS = 800
+TICKS = 400
 
 
 def differs() -> bool:
@@ -52,7 +52,6 @@ def test_a_draw_from_a_running_generator_is_caught(monkeypatch: pytest.MonkeyPat
 
 
 def test_an_island_split_between_two_solvers_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not differs()
     divide = Assignment._divide
 
     def split(self: Assignment, islands: tuple[Island, ...]) -> dict[str, Share]:

@@ -92,7 +92,7 @@ def delays_ms(settings: str, n: int, seed: int, delay_ns: int = 7 * MS) -> list[
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_jitter_has_its_law(proof: Proof, shape: str) -> None:
-    n = proof.size(50_000, 300_000)
+    n = proof.size(25_000, 300_000)
     cdf, mean, deviation = SHAPES[shape]
     settings = f"jitter: {{shape: {shape}}}"
     drawn = delays_ms(settings, n, proof.seed)
@@ -119,7 +119,7 @@ def test_jitter_has_its_law(proof: Proof, shape: str) -> None:
 
 def test_the_greater_of_a_least_delay_and_an_exponential_one(proof: Proof) -> None:
     """Where it is the least, it is that exactly, as often as it should; above, it is exponential."""
-    n, least, mean = proof.size(50_000, 300_000), 2.0, 5.0
+    n, least, mean = proof.size(25_000, 300_000), 2.0, 5.0
     drawn = delays_ms("jitter: {shape: shifted_exp, min: 2 ms, mean: 5 ms}", n, proof.seed)
     assert min(drawn) == least
     above = [x - least for x in drawn if x > least + 1e-3]
@@ -136,7 +136,7 @@ def test_the_greater_of_a_least_delay_and_an_exponential_one(proof: Proof) -> No
 
 def test_jitter_from_a_table(proof: Proof) -> None:
     """A file in netem's form; what it puts below 0 is 0."""
-    n = proof.size(50_000, 300_000)
+    n = proof.size(25_000, 300_000)
     table = " ".join(str(round(-8192 * sqrt(3) * (1 - 2 * k / 4095))) for k in range(4096))
     settings = "order: free, jitter: {{shape: table, file: uniform.dist, mean: {} ms, sd: 1 ms}}"
     drawn = {}
@@ -164,7 +164,7 @@ def test_a_constant_delay_is_exact(proof: Proof, delay_ns: int) -> None:
 
 
 def test_links_are_fifo(proof: Proof) -> None:
-    n = proof.size(50_000, 500_000)
+    n = proof.size(25_000, 500_000)
     jitter = "jitter: {shape: gamma, mean: 3 ms, sd: 3 ms}"
     dense = [f.due_ns for f in fates(fabric_of(f"delay: 1 ms, {jitter}", proof.seed), every(MS // 5, n))]
     proof.exact("T10", "fifo: packets that overtake, at 5 kHz", sum(b <= a for a, b in pairwise(dense)), 0, n)
@@ -175,7 +175,7 @@ def test_links_are_fifo(proof: Proof) -> None:
 @pytest.mark.parametrize("share", [0.25, 0.5, 0.8])
 def test_free_links_overtake_as_often_as_their_jitter_says(proof: Proof, share: float) -> None:
     """Uniform over w, packets every D: P(overtaken by the next) = (1 - D / w)^2 / 2; neighbours are correlated."""
-    n, width = proof.size(100_000, 1_000_000), 4 * MS
+    n, width = proof.size(50_000, 1_000_000), 4 * MS
     settings = "order: free, jitter: {shape: uniform, width: 4 ms}"
     period = round(share * width)
     due = [f.due_ns for f in fates(fabric_of(settings, proof.seed), every(period, n))]
@@ -194,7 +194,7 @@ def test_free_links_overtake_as_often_as_their_jitter_says(proof: Proof, share: 
 
 
 def test_explicit_reordering(proof: Proof) -> None:
-    n = proof.size(100_000, 1_000_000)
+    n = proof.size(50_000, 1_000_000)
     settings = "delay: 2 ms, reorder: {probability: 3 %, extra: 25 ms}"
     late = [f.due_ns - f.sent_ns for f in fates(fabric_of(settings, proof.seed), every(MS, n))]
     count = sum(delay != 2 * MS for delay in late)

@@ -28,7 +28,7 @@ def flipped(before: bytes, after: bytes) -> list[int]:
 @pytest.mark.parametrize(("size", "rate"), [(100, 1e-4), (1500, 1e-5), (16, 2e-3), (1, 0.1)])
 def test_packets_with_errors(proof: Proof, size: int, rate: float) -> None:
     """1 - (1 - rate)^bits of the packets, binomial counts of flipped bits in them, uniform places."""
-    n, bits = proof.size(60_000, 600_000), 8 * size
+    n, bits = proof.size(30_000, 600_000), 8 * size
     settings = f"corrupt: {{bit_error_rate: {rate:.10f} p, deliver: true}}"
     zeros = bytes(size)
     counts, places = Counter[int](), [0] * min(bits, 16)
@@ -65,7 +65,7 @@ def test_many_errors_in_long_packets(proof: Proof, size: int, rate: float) -> No
 
 def test_with_a_checksum_they_are_lost(proof: Proof) -> None:
     """The same packets: a draw says the same, whatever becomes of it."""
-    n = proof.size(30_000, 300_000)
+    n = proof.size(15_000, 300_000)
     lost = [f.cause for f in fates(fabric_of("corrupt: {bit_error_rate: 0.0001 p}", proof.seed), every(MS, n))]
     settings = "corrupt: {bit_error_rate: 0.0001 p, deliver: true}"
     spoiled = [f.bits_flipped > 0 for f in fates(fabric_of(settings, proof.seed), every(MS, n))]
@@ -84,7 +84,7 @@ def flight_of(sequence: int, sent_ns: int, size: int = 1250) -> Flight:
 
 
 def test_copies_are_as_frequent_as_configured(proof: Proof) -> None:
-    n = proof.size(50_000, 500_000)
+    n = proof.size(25_000, 500_000)
     count = sum(f.is_doubled for f in fates(fabric_of("duplicate: 7 %", proof.seed), every(MS, n)))
     proof.normal("T15", "duplication: share", binomial_z(count, n, 0.07), n)
 

@@ -50,9 +50,11 @@ def test_what_the_queue_drops_costs_no_duty_cycle(published: bool) -> None:
     assert [link.send(flight) for flight in flights] == [True] * 2 + [False] * 98
     assert {flight.cause for flight in flights} == {"", "queue_full"}
     airtime_ns = lora_airtime_ns(7, 20)
-    assert radio["a", "r"].tokens_ns == 6 * S - 2 * airtime_ns
+    assert radio["a", "r"].sent_ns == 2 * airtime_ns
     assert link.send(Flight("a", "b", "news", 101, S, 0, bytes(20), published))
-    assert radio["a", "r"].tokens_ns == 6 * S - 3 * airtime_ns + S // 10, "of a second it gets a tenth"
+    assert radio["a", "r"].sent_ns == 3 * airtime_ns, "nothing has left the window yet"
+    assert link.send(Flight("a", "b", "news", 102, 61 * S, 0, bytes(20), published))
+    assert radio["a", "r"].sent_ns == 2 * airtime_ns, "the third and the fourth"
 
 
 def test_what_waits_before_a_radio_counts_as_before_a_wire() -> None:

@@ -48,14 +48,14 @@ def exponential(counts: list[int], end: float, seed: int) -> float:
 
 def test_bad_times_are_exponential(proof: Proof) -> None:
     """Lengths of bad times, 40 ms in the mean, seen by a flow of 1 kHz."""
-    n = proof.size(100_000, 1_000_000)
+    n = proof.size(50_000, 1_000_000)
     times = bad_times("burst: {loss: 50 %, mean_bad: 40 ms}", proof.seed, MS, n)
     p = exponential([(last - first) // MS + 1 for first, last in times], ends(40, 40), proof.seed)
     proof.likely("T6", "bad times of 40 ms: Kolmogorov against exponential", p, len(times))
 
 
 def test_good_times_are_exponential(proof: Proof) -> None:
-    n = proof.size(100_000, 1_000_000)
+    n = proof.size(50_000, 1_000_000)
     flights = fates(fabric_of("outages: {mean_on: 30 ms, mean_off: 10 ms}", proof.seed), every(MS, n))
     groups = [(bad, sum(1 for _ in group)) for bad, group in groupby(bool(f.cause) for f in flights)]
     counts = [count for bad, count in groups[1:-1] if not bad]
@@ -68,7 +68,7 @@ def test_heavy_tailed_bad_times(proof: Proof) -> None:
 
     A length of x periods is met by floor(x) packets or one more; a golden sequence spreads counts over their period.
     """
-    n, step_ms = proof.size(200_000, 1_500_000), 0.1
+    n, step_ms = proof.size(100_000, 1_500_000), 0.1
     alpha, top, mean = 1.5, 400.0, 20.0
     settings = "burst: {loss: 25 %, mean_bad: 20 ms, dwell: {alpha: 1.5, max: 400 ms}}"
     times = bad_times(settings, proof.seed, MS // 10, n)
@@ -91,7 +91,7 @@ def test_heavy_tailed_bad_times(proof: Proof) -> None:
 
 def test_two_flows_see_the_same_bad_times(proof: Proof) -> None:
     """10 Hz and 1 kHz on one link: each slow packet meets what the fast one at its time meets."""
-    n = proof.size(60_000, 600_000)
+    n = proof.size(30_000, 600_000)
     settings = "burst: {loss: 20 %, mean_bad: 250 ms}"
     fabric = fabric_of(settings, proof.seed)
     fast = {f.sent_ns: f.cause for f in fates(fabric, every(MS, n), channel="fast")}

@@ -92,7 +92,7 @@ each_channel = pytest.mark.parametrize("channel", CHANNELS, ids=by_name)
 
 
 @each_channel
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_every_message_comes_back_and_is_plain_messagepack(channel: Channel, data: st.DataObject) -> None:
     message = data.draw(messages_of(channel))
@@ -103,7 +103,7 @@ def test_every_message_comes_back_and_is_plain_messagepack(channel: Channel, dat
 
 
 @each_channel
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_what_is_cut_short_or_has_a_tail_is_refused(channel: Channel, data: st.DataObject) -> None:
     payload = encode(data.draw(messages_of(channel)))
@@ -115,7 +115,7 @@ def test_what_is_cut_short_or_has_a_tail_is_refused(channel: Channel, data: st.D
 
 
 @each_channel
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(data=st.data())
 def test_whatever_comes_it_is_a_message_or_malformed(channel: Channel, data: st.DataObject) -> None:
     """Random bytes, and messages with bytes flipped, put in or taken out."""

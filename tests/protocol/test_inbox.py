@@ -12,7 +12,7 @@ import pytest
 from foosim.protocol.inbox import Inbox, InboxStatistics, Item
 
 ALL = 1000
-LONG_S = 60.0
+LONG_S = 600.0
 
 
 class QueueSource:

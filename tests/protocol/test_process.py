@@ -13,6 +13,7 @@ import pytest
 from foosim.protocol import process
 from foosim.protocol.process import new_boot, start_log
 
+LIMIT_S = 900.0
 NODE = "from foosim.node.main import main; main()"
 PLAYER = "from foosim.client.main import main; main()"
 ASLEEP = """
@@ -50,7 +51,7 @@ def test_whoever_is_to_be_told_is_told_once_also_later(number: signal.Signals, l
     assert line_of(child.stdout) == "ready"
     child.send_signal(number)
     assert line_of(child.stdout) == "told"
-    assert child.wait(100) == 0
+    assert child.wait(LIMIT_S) == 0
     child.communicate()
 
 
@@ -61,7 +62,7 @@ def test_a_second_ctrl_c_ends_a_process_at_once() -> None:
     assert line_of(child.stdout) == "told"
     child.send_signal(signal.SIGTERM)
     child.send_signal(signal.SIGINT)
-    assert child.wait(100) == 130
+    assert child.wait(LIMIT_S) == 130
     child.communicate()
 
 
@@ -76,7 +77,7 @@ def test_it_can_be_ended_while_nobody_answers(program: str) -> None:
         connection, _ = listening.accept()
         with connection:
             child.send_signal(signal.SIGTERM)
-            _, err = child.communicate(timeout=100)
+            _, err = child.communicate(timeout=LIMIT_S)
     assert (child.returncode, err) == (1, f"gave up before a router answered at tcp/127.0.0.1:{port}\n")
 
 

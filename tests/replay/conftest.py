@@ -20,6 +20,7 @@ from foosim.rehearsal.replay_command import app
 from foosim.rehearsal.system import System
 from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_file import declare_topics, write_all
+from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.rows import PROFILE
@@ -73,6 +74,8 @@ def rewritten(path: Path, out: Path, messages: Iterable[Message], chunk: int = 0
         for content in contents_of(path):
             if isinstance(content, records.Attachment):
                 mcap.add_attachment(content.name, content.media_type, content.data)
+            elif isinstance(content, records.Metadata) and content.name == CHECKS:
+                mcap.add_checks()
             elif isinstance(content, records.Metadata):
                 mcap.add_metadata(content.name, content.metadata)
         for number, message in enumerate(messages, 1):
@@ -120,7 +123,8 @@ def replay(*arguments: str | Path) -> Done:
 
 @pytest.fixture
 def bad_files(tmp_path: Path, run: Path) -> list[Path]:
-    """Files that no command takes for a capture: absent, empty, of other people, of another format, a folder."""
+    """Files that no command takes for a capture: absent, empty, of other people, of another format, with one wrong bit
+    in what describes the run, a folder."""
     files = {"empty": b"", "text": b"not a capture\n", "magic": b"\x89MCAP0\r\n"}
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
@@ -130,6 +134,11 @@ def bad_files(tmp_path: Path, run: Path) -> list[Path]:
         declare_topics(mcap)
         mcap.add_metadata("foosim", {"format": "99", "deployment": "table.yaml"})
         mcap.finish()
+    wrong = [tmp_path / f"wrong-{number}.mcap" for number in range(3)]
+    for path, text in zip(wrong, (b"loss: 0.5 %", b'"numpy"', b"fingerprint"), strict=True):
+        wrong_one = bytearray(run.read_bytes())
+        wrong_one[wrong_one.index(text) + 6] ^= 2
+        path.write_bytes(wrong_one)
     folder = tmp_path / "folder"
     folder.mkdir()
-    return [tmp_path / "absent", *(tmp_path / name for name in files), other, folder]
+    return [tmp_path / "absent", *(tmp_path / name for name in files), other, *wrong, folder]

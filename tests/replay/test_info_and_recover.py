@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections import Counter
 from pathlib import Path
 
 import msgspec
 import pytest
 
+from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.journal import Journal
 from foosim.rehearsal.diff import diff_captures
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.vhub import capture_file, capture_writer
+from foosim.vhub.branching import BadBranch, read_branch
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from tests.replay.conftest import TABLE, damaged, messages_of, replay
@@ -39,10 +43,14 @@ def test_info_of_an_unfinished_one_says_so(run: Path, tmp_path: Path) -> None:
     assert shown.code == 0 and "not finished, " in shown.out
 
 
-def test_info_refuses_what_is_no_capture(bad_files: list[Path]) -> None:
+def test_what_is_no_capture_is_refused_before_anything_is_simulated(bad_files: list[Path]) -> None:
+    deployment = load_deployment(TABLE.read_text(), TABLE.name)
     for bad in bad_files:
-        done = replay("info", bad)
-        assert done.code == 2 and done.err.startswith(f"{bad}: ") and done.err.count("\n") == 1
+        for command in ("info", "verify", "whatif"):
+            done = replay(command, bad)
+            assert done.code == 2 and done.err.startswith(f"{bad}: ") and done.err.count("\n") == 1, command
+        with pytest.raises(BadBranch, match=f"--from: {bad}: "):
+            read_branch(f"{bad}@0.1s", deployment)
 
 
 def test_a_finished_capture_is_clean(run: Path) -> None:
@@ -85,6 +93,59 @@ def test_with_its_journal_nothing_is_lost(tmp_path: Path, monkeypatch: pytest.Mo
     assert differing <= {"/tick", "/tf", "/frame"}, "the last frame was committed only"
     assert found.channels["/packets"].first is None, "each has its fate again"
     assert int(open_capture(left).ticks[-1]) == 59, "the journal ends with the last closed tick"
+
+
+def spoiled(run: Path, out: Path, place: int, bit: int = 1) -> bytes:
+    """Write a capture with one wrong bit; return what is written."""
+    content = bytearray(run.read_bytes())
+    content[place] ^= bit
+    out.write_bytes(content)
+    return bytes(content)
+
+
+def chunk_starts(path: Path) -> list[int]:
+    content = path.read_bytes()
+    starts = [found.start() - 37 for found in re.finditer(rb"\x04\x00\x00\x00zstd", content)]
+    return [start for start in starts if content[start] == 6]  # the summary names it, too
+
+
+@pytest.mark.parametrize("within", [80, 5, 0, 12, 30])
+def test_a_finished_capture_with_a_damaged_chunk_says_what_is_damaged_and_what_is_whole(
+    run: Path, tmp_path: Path, within: int
+) -> None:
+    """A wrong bit in the rows of a chunk, in its length, its kind, its times, its checksum."""
+    bad, part = tmp_path / "bad.mcap", tmp_path / "part.mcap"
+    starts = chunk_starts(run)
+    start, after = starts[len(starts) // 2 : len(starts) // 2 + 2]
+    before = spoiled(run, bad, start + within)
+    done = replay("recover", bad)
+    assert done.code == 1 and bad.read_bytes() == before, done
+    lines = done.err.splitlines()
+    assert lines[0] == f"capture {bad} is finished and damaged; it is left as it is"
+    places = [int(found[1]) for found in re.finditer(r"byte (\d+), \d+ bytes: ", done.err)]
+    assert places and all(start <= place < after for place in places), done.err
+    told = re.fullmatch(r"  ticks 0 to (\d+) and (\d+) to 300 are whole, (\d+) between them are lost", lines[-2])
+    if within == 12:  # its rows are whole
+        assert lines[-2] == "  ticks 0 to 300 are whole, 0 between them are lost"
+    else:
+        assert told is not None and 0 < int(told[3]) == int(told[2]) - int(told[1]) - 1 < 60
+    content = msgspec.json.decode(replay("recover", bad, "--json").out)
+    assert content["finished_before"] and not content["whole"] and content["broken"][0]["byte"] == places[0]
+    words = shlex.split(lines[-1].partition("foosim-replay ")[2])
+    assert replay(*words[:-1], part).code == 0
+    cut = open_capture(part)
+    assert cut.ticks.tolist() == list(range(content["until_ns"] // 2_000_000 + 1)) and len(cut.ticks) > 30
+
+
+@pytest.mark.parametrize("text", [b"loss: 0.5 %", b"fingerprint", b"/packets", b"before_crc32", b"foosim.end"])
+def test_a_finished_capture_with_a_damaged_description_or_end_says_where(
+    run: Path, tmp_path: Path, text: bytes
+) -> None:
+    bad = tmp_path / "bad.mcap"
+    before = spoiled(run, bad, run.read_bytes().index(text) + len(text) - 1, 2)
+    done = replay("recover", bad)
+    assert done.code == 1 and bad.read_bytes() == before
+    assert "\n  ticks 0 to 300 are whole, 0 between them are lost" in done.err and f"{bad}: byte " in done.err, done.err
 
 
 def test_what_cannot_be_recovered_fails_and_stays_as_it_is(run: Path, tmp_path: Path, bad_files: list[Path]) -> None:

@@ -24,7 +24,7 @@ from foosim.rehearsal.system import System
 from foosim.rehearsal.whatif import what_if
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import PACKETS, Fate, PacketRow
+from foosim.vhub.rows import PACKETS, EpochRow, Fate, PacketRow
 from tests.replay.conftest import TABLE, damaged, messages_of, replay, rewritten, with_row
 
 NETWORK: Final = (
@@ -38,8 +38,11 @@ CLOG: Final = {"clog": {"from": "player-blue", "to": "*"}, "for": "50 ms"}
 
 
 def disrupt(system: System) -> None:
+    system.at_tick(20, lambda: system.request("push", impulse=[0.02, 0.0, -0.01]))
+    system.at_tick(40, lambda: system.request("move", robot="red.goal", node="n2"))
     system.at_tick(60, lambda: system.request("network", event=CLOG))
     system.at_tick(70, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
+    system.at_tick(150, lambda: system.request("remove", name="ball2"))
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +172,29 @@ def test_events_are_bands_and_are_told(found: Report) -> None:
     assert ("partition player-red | rest, for 60 ms", False) in told
     assert ("clog from player-blue to *, for 50 ms", True) in told
     assert [rule.is_changed for rule in found.measured if rule.rule == "fast"] == [True]
+
+
+def test_what_was_asked_of_the_world_is_among_the_events(found: Report, radio_run: Path) -> None:
+    told = {event.text: event.at_ns for event in found.happenings if event.is_asked}
+    world = [text for text in told if text.split()[0] in ("push", "move", "add", "remove")]
+    assert [text.split(" from ")[0] for text in world] == [
+        "push ball by 0.02, 0, -0.01 N s",
+        "move red.goal",
+        "add ball2 (ball) at 0.2, 0.1, 0.05 m, with -1, 0, 0 m/s",
+        "remove ball2",
+    ]
+    capture = open_capture(radio_run)
+    pushed, _, added, _ = (told[text] // capture.deployment.tick_ns for text in world)
+    inputs = {tick.tick - 1: [type(edit).__name__ for edit in tick.edits] for tick in capture.captured_ticks()}
+    assert inputs[pushed] == ["Push"] and inputs[added] == ["Add"]
+    (moved,) = [epoch for epoch in capture.epochs if epoch.tick * capture.deployment.tick_ns == told[world[1]]]
+    assert world[1] == "move red.goal from n1 to n2" and dict_of(moved)["red.goal"] == "n2"
+    rows = Page(page(found)).rows
+    assert all(any(row[1:] == [text, "asked for"] for row in rows) for text in world)
+
+
+def dict_of(epoch: EpochRow) -> dict[str, str]:
+    return {owner.robot: owner.node for owner in epoch.owners}
 
 
 def test_the_page_is_whole_and_says_what_was_found(found: Report) -> None:

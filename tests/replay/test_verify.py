@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -28,7 +29,7 @@ from foosim.vhub.rows import OwnerRow
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT = TABLE.read_text()
-TICKS = 700
+TICKS = 450
 
 
 def disturb(system: System) -> None:
@@ -45,18 +46,34 @@ def capture_to(path: Path, engine: str = "pure", nodes: int = 2) -> Rehearsed:
     return result
 
 
+Captured = Callable[[str], tuple[Path, Rehearsed]]
+"""The capture of one run by an engine, not to be changed, and its result."""
+
+
+@pytest.fixture(scope="module")
+def captured(tmp_path_factory: pytest.TempPathFactory) -> Captured:
+    folder = tmp_path_factory.mktemp("verify")
+
+    @cache
+    def run(engine: str) -> tuple[Path, Rehearsed]:
+        path = folder / f"{engine}.mcap"
+        return path, capture_to(path, engine)
+
+    return run
+
+
 @pytest.mark.parametrize("engine", ["bullet", "pure"])
 @pytest.mark.parametrize("nodes", [1, 3])
-def test_a_capture_is_simulated_again_bit_for_bit(tmp_path: Path, engine: str, nodes: int) -> None:
-    result = capture_to(tmp_path / "run.mcap", engine)
-    verified = verify_capture(tmp_path / "run.mcap", nodes)
+def test_a_capture_is_simulated_again_bit_for_bit(captured: Captured, engine: str, nodes: int) -> None:
+    path, result = captured(engine)
+    verified = verify_capture(path, nodes)
     assert verified.equal and verified.ticks == TICKS
     assert verified.chain.hex() == result.json["digest"]["chain"]
-    first, second = open_capture(tmp_path / "run.mcap").epochs
+    first, second = open_capture(path).epochs
     assert first.arithmetic == second.arithmetic == verified.arithmetic != "" and verified.other_arithmetic == ()
     assert OwnerRow("red.goal", "n1") in first.owners and OwnerRow("red.goal", "n2") in second.owners
     assert first.roster == second.roster == ["n1", "n2"] and (first.tick, first.epoch, second.epoch) == (0, 1, 2)
-    digests = {tick.tick: tick.digest.hex() for tick in open_capture(tmp_path / "run.mcap").captured_ticks()}
+    digests = {tick.tick: tick.digest.hex() for tick in open_capture(path).captured_ticks()}
     assert [epoch.digest for epoch in (first, second)] == [digests[epoch.tick] for epoch in (first, second)]
 
 
@@ -74,10 +91,9 @@ def messages_of(path: Path) -> dict[str, list[tuple[int, int, bytes]]]:
     return topics
 
 
-def test_law_2_two_runs_give_equal_captures(tmp_path: Path) -> None:
-    capture_to(tmp_path / "one.mcap")
+def test_law_2_two_runs_give_equal_captures(captured: Captured, tmp_path: Path) -> None:
     capture_to(tmp_path / "two.mcap")
-    one, two = messages_of(tmp_path / "one.mcap"), messages_of(tmp_path / "two.mcap")
+    one, two = messages_of(captured("pure")[0]), messages_of(tmp_path / "two.mcap")
     assert sorted(one) == sorted(two)
     assert {"/epochs", "/tick", "/frame", "/packets", "/tf", "/scene"} <= set(one)
     for topic, messages in one.items():
@@ -95,9 +111,8 @@ def flipped(ticks: Sequence[CapturedTick], at: int) -> list[CapturedTick]:
     return changed
 
 
-def test_one_flipped_bit_of_one_command_is_found_at_its_tick(tmp_path: Path) -> None:
-    capture_to(tmp_path / "run.mcap")
-    capture = open_capture(tmp_path / "run.mcap")
+def test_one_flipped_bit_of_one_command_is_found_at_its_tick(captured: Captured) -> None:
+    capture = open_capture(captured("pure")[0])
     ticks = list(capture.captured_ticks())
     name, text = capture.about.deployment_name, capture.about.deployment_text
     with_commands = [tick.tick for tick in ticks if tick.delivered]
@@ -106,9 +121,8 @@ def test_one_flipped_bit_of_one_command_is_found_at_its_tick(tmp_path: Path) -> 
         assert (found.tick, found.entities) == (at, (ticks[at].delivered[0].destination,))
 
 
-def test_a_missing_tick_is_named(tmp_path: Path) -> None:
-    capture_to(tmp_path / "run.mcap")
-    capture = open_capture(tmp_path / "run.mcap")
+def test_a_missing_tick_is_named(captured: Captured) -> None:
+    capture = open_capture(captured("pure")[0])
     ticks = [tick for tick in capture.captured_ticks() if tick.tick != 77]
     found = verify(capture.about.deployment_text, capture.about.deployment_name, ticks)
     assert not found.equal and found.missing_tick == 77
@@ -150,9 +164,8 @@ def test_where_no_tick_differs_another_arithmetic_is_no_news(tmp_path: Path) -> 
     assert done.exit_code == 0 and done.stderr == ""
 
 
-def test_the_command_says_what_it_found(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    result = capture_to(path)
+def test_the_command_says_what_it_found(captured: Captured, tmp_path: Path) -> None:
+    path, result = captured("pure")
     runner = CliRunner()
     done = runner.invoke(app, ["verify", str(path), "--nodes", "2"])
     assert done.exit_code == 0 and result.json["digest"]["chain"] in done.output

@@ -9,8 +9,8 @@ import pytest
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.identity import identities_of
 from foosim.supervisor import cli, pki
+from foosim.supervisor.new_capture import check_capture
 from foosim.supervisor.run_folder import runs_folder
-from foosim.supervisor.up import check_capture
 from tests.supervisor.conftest import Command, Typed
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"

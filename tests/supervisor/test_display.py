@@ -10,7 +10,15 @@ from rich.console import Console
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.display import LINKS_SHOWN_MAX, Display, fitted, plain_line, recovery_text, render_text
+from foosim.supervisor.display import (
+    LINKS_SHOWN_MAX,
+    Display,
+    closing_text,
+    fitted,
+    plain_line,
+    recovery_text,
+    render_text,
+)
 from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.status import status
 
@@ -49,8 +57,8 @@ def running() -> dict[str, Any]:
             "supervisor": {"role": "supervisor", **HERE, "busy": 0.106, "tick": 6170, "waiting_for": "red"},
         },
         "links": [
-            ["player-red", "red.goal", 1234, 1220, 9, 1_302_000],
-            ["camera", "player-red", 617, 612, 4, 1_297_000],
+            ["player-red", "red.goal", 1234, 1220, 9, 1_302_000, "lan", 0, {}, []],
+            ["camera", "player-red", 617, 612, 4, 1_297_000, "lan", 0, {}, [["ball", 600, 6_000_000, 8_000_000]]],
         ],
     }
 
@@ -100,12 +108,14 @@ def test_a_row_for_each_node_with_what_it_owns_solved_and_its_load(running: dict
 def test_a_row_for_each_link_and_one_for_all(running: dict[str, Any]) -> None:
     text = render_text(running)
     assert row_of(text, "1234").split() == ["player-red", "red.goal", "1234", "1220", "9", "1.30", "ms"]
-    assert row_of(text, "617 ").split() == ["camera", "player-red", "617", "612", "4", "1.30", "ms"]
+    camera = ["camera", "player-red", "617", "612", "4", "1.30", "ms", "6.0,", "8.0", "ms"]
+    assert row_of(text, "617 ").split() == camera
     assert row_of(text, "22510").split() == ["all", "22510", "22390", "113", "7", "in", "flight"]
 
 
 def test_of_too_many_links_the_busiest_are_shown(running: dict[str, Any]) -> None:
-    running["links"] = [["camera", f"player-{number}", number, number, 0, 0] for number in range(LINKS_SHOWN_MAX + 5)]
+    rest = [0, 0, "lan", 0, {}, []]
+    running["links"] = [["camera", f"player-{n}", n, n, *rest] for n in range(LINKS_SHOWN_MAX + 5)]
     text = render_text(running)
     assert row_of(text, "player-5 ")
     assert "player-4 " not in text
@@ -183,7 +193,7 @@ def test_what_passed_before_the_first_tick_does_not_count_as_slow(running: dict[
 
 @pytest.mark.parametrize("height", [17, 18, 24])
 def test_a_low_window_shows_fewer_links_and_keeps_the_row_for_all(running: dict[str, Any], height: int) -> None:
-    running["links"] = [["camera", f"player-{number}", number, number, 0, 0] for number in range(40)]
+    running["links"] = [["camera", f"player-{number}", number, number, 0, 0, "lan", 0, {}, []] for number in range(40)]
     console = Console(width=80, height=height, file=io.StringIO(), color_system=None)
     with console.capture() as captured:
         console.print(fitted(running, console))
@@ -199,3 +209,14 @@ def test_a_capture_that_is_full_is_shown_wherever_a_run_is_looked_at(running: di
     running["recording"] = {**running["recording"], **problem}
     text = "capture ended: run.mcap: 0.1 MB left on its disk (812 rows are not in it)"
     assert f" | {text} | load" in plain_line(running) and text in render_text(running)
+
+
+def test_a_run_that_has_ended_shows_how_far_it_is_with_its_capture(running: dict[str, Any]) -> None:
+    stream = io.StringIO()
+    display = Display(stream)
+    assert closing_text(running) == ""
+    display.show_closing(running)
+    counts = {"state": "closing", "offered": 90_000, "written": 8_790, "refused": 10, "bytes": 12_345_678}
+    running["recording"] = {**running["recording"], **counts}
+    display.show_closing(running)
+    assert stream.getvalue() == "closing the capture: 81,200 rows are left, 12.3 MB are written\n"

@@ -259,8 +259,9 @@ def test_a_packet_is_parsed() -> None:
 def test_links_are_told_with_their_causes_the_busiest_first() -> None:
     deployment = load_deployment(text_of(), "demo.yaml")
     assert deployment.tick_ns == 2_000_000
-    link = ["camera", "player-red", 300, 250, 40, 1_500_000, "seen/wifi", 2_000, {"collision": 30, "snr": 10}]
-    quiet = ["a", "b", 900, 900, 0, 0, "perfect", 0, {}]
+    link = ["camera", "player-red", 300, 250, 40, 1_500_000, "seen/wifi", 2_000, {"collision": 30, "snr": 10},
+            [["ball", 250, 6_000_000, 8_000_000]]]  # fmt: skip
+    quiet = ["a", "b", 900, 900, 0, 0, "perfect", 0, {}, []]
     status = {"run": "r", "ticks": 1000, "first_tick": 0, "tick_ns": 2_000_000, "links": [quiet, link]}
     before = {**status, "ticks": 500, "links": [quiet, [*link[:2], 100, *link[3:]]]}
     assert [(one["from"], one["offered_per_s"]) for one in links_shown(status)] == [("a", 450.0), ("camera", 150.0)]
@@ -268,6 +269,6 @@ def test_links_are_told_with_their_causes_the_busiest_first() -> None:
     assert [(one["from"], one["offered_per_s"]) for one in shown] == [("camera", 200.0), ("a", 0.0)]
     assert link_line(shown[0]) == (
         "camera to player-red (seen/wifi): 200.0/s, offered 300, delivered 250, dropped 40, collision 30, snr 10,"
-        " mean delay 1.5 ms, queue 2 us"
+        " mean delay 1.5 ms, queue 2 us, age at use of ball 6 ms, p99 8 ms"
     )
     assert links_shown(status, {**before, "run": "other"}) == links_shown(status)

@@ -19,7 +19,7 @@ from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Refu
 from foosim.protocol.units import Pace
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
-from foosim.supervisor.roster import Roster
+from foosim.supervisor.roster import SILENT_NS, Roster
 from foosim.vhub.core import HubCore
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -63,6 +63,16 @@ def test_a_name_is_free_until_somebody_has_it() -> None:
     assert roster.reason_against(twin) == "a node red is already here"
     assert roster.reason_against(msgspec.structs.replace(twin, name="blue")) == ""
     assert roster.take(HELLO, 9) is roster.by_name["red"] and roster.by_name["red"].heard_ns == 5
+
+
+def test_who_has_the_name_of_a_process_that_is_silent_is_asked_to_wait() -> None:
+    """It may be its successor: a refusal would be the last word."""
+    roster, twin = Roster(DEPLOYMENT, PRINT), msgspec.structs.replace(HELLO, boot="boot-2")
+    known = roster.take(HELLO, 0)
+    assert not roster.has_silent_namesake(twin, SILENT_NS) and roster.has_silent_namesake(twin, SILENT_NS + 1)
+    assert not roster.has_silent_namesake(HELLO, 10 * SILENT_NS), "the same process"
+    known.lost = True
+    assert not roster.has_silent_namesake(twin, 10 * SILENT_NS), "it is taken"
 
 
 def test_a_deployment_may_allow_mixed_processors() -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import time
 from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Final
 
 import pytest
@@ -14,10 +16,13 @@ from foosim.protocol.session import ConnectError
 from foosim.supervisor import control
 from foosim.supervisor.display import Display
 from foosim.supervisor.launcher import Child
+from foosim.supervisor.liveness import UNANSWERED_MAX
+from foosim.supervisor.outcome import capture_lines
 from foosim.supervisor.plan import RunOptions, make_plan
 from foosim.supervisor.restarts import WAITS_S
 from foosim.supervisor.run_folder import RunInfo
-from foosim.supervisor.up import Up
+from foosim.supervisor.status import NOT_RECORDED
+from foosim.supervisor.up import END_S, Killed, Up
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -31,6 +36,7 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
     (tmp_path / "node").write_text('#!/bin/sh\necho started >>"$0.log"\nexit 1\n')
     (tmp_path / "node").chmod(0o755)
     up._launch("red", [str(tmp_path / "node")])
+    up._has_begun = True
     now_s = 0.0
 
     def ends() -> int:
@@ -57,6 +63,136 @@ def test_a_node_that_was_given_up_is_started_when_somebody_asks_for_it(
     up._launcher.close()
 
 
+@pytest.mark.parametrize(
+    ("ends", "has_begun", "starts", "ends_run"),
+    [
+        ("kill -9 $$", False, 2, False),
+        ("exit 1", False, 1, True),
+        ("exit 3", False, 1, True),
+        ("kill -9 $$", True, 2, False),
+        ("exit 1", True, 2, False),
+        ("exit 3", True, 1, False),
+    ],
+)
+def test_what_follows_when_a_node_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, has_begun: bool, starts: int, ends_run: bool
+) -> None:
+    """Before the first tick one that something else has ended is started again; one that is refused never is."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    (tmp_path / "node").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
+    (tmp_path / "node").chmod(0o755)
+    up._launch("red", [str(tmp_path / "node")])
+    up._has_begun = has_begun
+    up._launcher.children["red"].process.wait()
+    assert up._ends_run(up._launcher.children["red"]) == ends_run
+    for now_s in (0.0, 1.0, 1.0):
+        up._restart_ended(now_s, knows=True)
+        up._launcher.children["red"].process.wait()
+    assert (tmp_path / "node.log").read_text().count("started") == starts
+    is_given_up = has_begun and ends == "exit 3"
+    assert ("is given up; foosim-supervisor start red tries it again" in said.getvalue()) == is_given_up
+    up._launcher.close()
+
+
+@pytest.mark.parametrize(
+    ("ends", "listened", "comes_back", "reason"),
+    [
+        ("kill -9 $$", False, True, "lost supervisor: it was killed by SIGKILL, not by foosim"),
+        ("exit 1", False, False, "lost supervisor: it ended with exit code 1"),
+        ("exit 1", True, True, "lost supervisor: it ended with exit code 1"),
+        ("echo run mine cannot go on: no journal; exit 3", True, False, "run mine cannot go on: no journal"),
+        ("echo MemoryError; exit 1", True, True, "lost supervisor: it ended with exit code 1: too little memory"),
+    ],
+)
+def test_what_follows_when_the_supervisor_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, listened: bool, comes_back: bool, reason: str
+) -> None:
+    """Whatever becomes of it, there is a result, of the shape of any other."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up._launch(SUPERVISOR, ["sh", "-c", ends])
+    supervisor = up._launcher.children[SUPERVISOR]
+    supervisor.process.wait()
+    if listened:
+        up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
+    outcome = up._outcome()
+    assert outcome.failed and outcome.result["reason"] == reason and outcome.result["run"] == "run"
+    assert up._supervisor_comes_back(supervisor, 0.0) == comes_back
+    up._launcher.children[SUPERVISOR].process.wait()
+    up._interrupts = 2
+    with pytest.raises(Killed) as killed:
+        up._goes_on()
+    assert killed.value.result.keys() == outcome.result.keys()
+    assert killed.value.result["reason"] == "killed by a second Ctrl-C"
+    up._launcher.close()
+
+
+def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
+    up._launch(SUPERVISOR, ["sleep", "100"])
+    supervisor = up._launcher.children[SUPERVISOR]
+    for _ in range(3 * UNANSWERED_MAX):
+        up._supervisor_watch.unanswered()
+        up._end_stalled_supervisor(supervisor)
+    assert supervisor.exit_code is None, "it has not said where it listens"
+    up.folder.write_info(RunInfo("run", "table", str(TABLE), supervisor.process.pid, "", "tcp/127.0.0.1:1"))
+    up._end_stalled_supervisor(supervisor)
+    for _ in range(UNANSWERED_MAX):
+        up._supervisor_watch.unanswered()
+    up._end_stalled_supervisor(supervisor)
+    supervisor.process.wait()
+    assert said.getvalue() == (
+        "supervisor does not answer any more: it is killed (it had not answered for 5 s)\n"
+    )
+    assert up._outcome().result["reason"] == "lost supervisor: it was killed by up: it had not answered for 5 s"
+    up._launcher.close()
+
+
+@pytest.mark.parametrize(
+    ("ends", "sets", "starts", "ends_run"),
+    [
+        ("kill -9 $$", (), 2, False),
+        ("kill -9 $$", ("players.player-red.restart=false",), 1, True),
+        ("exit 1", (), 1, True),
+    ],
+)
+def test_a_player_is_started_again_when_a_signal_has_ended_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, sets: tuple[str, ...], starts: int, ends_run: bool
+) -> None:
+    """One that ends by itself has failed. The sixth time within a minute it is given up, and the run ends."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE, sets=sets)), None, Display(said), "run")
+    (tmp_path / "player").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
+    (tmp_path / "player").chmod(0o755)
+    up._launch("player-red", [str(tmp_path / "player")])
+    up._has_begun = True
+    now_s = 0.0
+
+    def ended() -> bool:
+        child: Child = up._launcher.children["player-red"]
+        child.process.wait()
+        return up._ends_run(child)
+
+    def go_on() -> int:
+        nonlocal now_s
+        up._restart_ended(now_s, knows=True)
+        now_s += max(WAITS_S)
+        up._restart_ended(now_s, knows=True)
+        up._launcher.children["player-red"].process.wait()
+        return (tmp_path / "player.log").read_text().count("started")
+
+    assert ended() == ends_run and go_on() == starts
+    if not ends_run:
+        assert [go_on() for _ in range(5)][-1] == 6 and ended()
+        assert "player-red was killed by SIGKILL" in said.getvalue() and "is given up; its log" in said.getvalue()
+    up._launcher.close()
+
+
 def test_a_supervisor_that_ends_before_the_launcher_connects_has_ended_in_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -77,8 +213,39 @@ def test_a_supervisor_that_runs_and_lets_nobody_in_is_an_error(tmp_path: Path, m
     monkeypatch.setattr(control, "CONNECT_S", 0.0)
     up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
     up._launch(SUPERVISOR, ["sleep", "100"])
-    up.folder.write_info(RunInfo("run", "table", str(TABLE), 0, "", "tcp/127.0.0.1:1"))
+    with ExitStack() as stack:
+        up.folder.write_info(RunInfo("run", "table", str(TABLE), 0, "", "tcp/127.0.0.1:1"))
+        assert up._connect(stack) is None, "the run file is that of a supervisor before, this one is only starting"
+    pid = up._launcher.children[SUPERVISOR].process.pid
+    up.folder.write_info(RunInfo("run", "table", str(TABLE), pid, "", "tcp/127.0.0.1:1"))
     with ExitStack() as stack, pytest.raises(ConnectError, match="no router answers at"):
         up._connect(stack)
+    up._launcher.kill()
+    up._launcher.close()
+
+
+def test_a_capture_that_was_cut_off_is_named_with_the_command_that_completes_it(tmp_path: Path) -> None:
+    capture, journals = tmp_path / "run.mcap", tmp_path / "journals"
+    capture.write_bytes(b"\x89MCAP0\r\n")
+    assert capture_lines(capture, {"recording": NOT_RECORDED}, journals) == [
+        f"capture {capture} (unfinished)",
+        f"complete it with: foosim-replay recover {capture} --journals {journals}",
+    ]
+    assert capture_lines(capture, None, journals) == [f"capture {capture} (unfinished)"], "the run can be resumed"
+
+
+def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says_that_it_closes_its_capture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    up._launch(SUPERVISOR, ["sleep", "100"])
+    told = {"state": "ended", "begun": True, "recoveries": [], "processes": {}, "starts": {}, "recording": NOT_RECORDED}
+    closing = SimpleNamespace(status=lambda timeout_s, give_up: told)
+    up._has_begun = up._has_ended = up._is_told = True
+    up._interrupts, up._ending_s = 1, time.monotonic() - END_S - 1
+    assert not up._goes_on(), "it would be cut off"
+    up._show(closing)  # type: ignore[arg-type]
+    assert up._goes_on()
     up._launcher.kill()
     up._launcher.close()

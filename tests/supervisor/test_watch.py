@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -198,8 +199,8 @@ class _BlindNode(NodeCore):
 def test_who_keeps_the_vhub_waiting_for_samples_is_lost_not_the_vhub() -> None:
     seen = Seen(sets=DEADLINES, ticks=300)
     seen.settings.node = _BlindNode
-    reason, tick = ended(seen.go())
-    assert reason == f"lost n2: tick {tick} is overdue by 1.0 s" and 60 <= tick <= 62
+    reason, tick = ended(seen.go())  # by its heartbeats it may be the vHub that hears nobody: that would show by then
+    assert reason == f"lost n2: tick {tick} is overdue by 1.6 s" and 60 <= tick <= 62
 
 
 class _StuckHub(HubCore):
@@ -248,7 +249,7 @@ def test_a_silent_vhub_is_lost_and_the_run_ends_without_its_farewell() -> None:
 
 @pytest.mark.parametrize("pace", [REALTIME, Pace("fast")], ids=str)
 def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
-    """The vHub has its deadline: 1 s in realtime, 10 s in fast; meanwhile it is the one that is waited for."""
+    """The vHub has its deadline: 2 s in realtime, 10 s in fast; meanwhile it is the one that is waited for."""
     waited: list[list[str]] = []
     seen = Seen(ticks=400, pace=pace, sets=())
 
@@ -262,20 +263,21 @@ def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
         def listen(process: str, level: str, text: str) -> None:
             assert say is not None
             say(process, level, text)
-            if process == VHUB and text.startswith("lost"):
+            if process == VHUB and "has not answered" in text:
                 waited.append(system.supervisor.watch.waiting_for(system.supervisor))
 
         system.settings.on_say = listen
 
     seen.prepare = prepare
     reason, tick = ended(seen.go())
-    assert reason.startswith("lost player-red: no Done of tick ") and reason.endswith(" within its deadline")
+    allowed = r"10 s \(deadlines.lockstep_fast" if pace.kind == "fast" else r"2 s \(deadlines.lockstep_realtime"
+    assert re.fullmatch(rf"player-red has not answered tick 6\d for {allowed}\)", reason)
     assert 60 <= tick <= 67 and waited == [["player-red"]]
     assert not [line for line in seen.lines if "overdue" in line or "waits for" in line], "only it can be overdue"
 
 
 def test_a_lockstep_client_whose_connection_closes_is_lost() -> None:
-    seen = Seen(ticks=400, sets=(*LONG, "deadlines.client_back=300 ms"))
+    seen = Seen(ticks=400, sets=(*LONG, "deadlines.client_back=300 ms", "players.player-blue.restart=false"))
     seen.prepare = lambda system: system.at_tick(60, lambda: system.hub.client_gone("player-blue", system.bus.now_ns))
     reason, _ = ended(seen.go())
     assert reason == "lost player-blue: its connection closed"

@@ -64,8 +64,32 @@ def test_frames_come_back_at_their_ticks_with_the_first_and_the_last(capture: Ca
         joint = block.column("red.goal", "joint_positions", 2)
         assert joint[0].tolist() == block.frame(0).vector("red.goal", "joint_positions", 2)
         assert block.column("red.attack", "down")[0] == block.frame(0).at("red.attack", "down")
-    with pytest.raises(CaptureError, match=r"frames of 3 layouts \(from 0, 30, 50\): frame_blocks"):
-        _ = capture.frames
+    for one in ("layout", "values"):
+        with pytest.raises(CaptureError, match=r"frames of 3 layouts \(from 0, 30, 50\): frame_blocks"):
+            getattr(capture.frames, one)
+
+
+def test_a_column_goes_across_layouts_with_gaps_where_the_entity_was_not_there(
+    capture: CaptureData, hub_run: HubRun
+) -> None:
+    frames = capture.frames
+    assert frames.ticks.tolist() == [0, 10, 20, 30, 40, 50, 60, 64] and len(frames) == 8
+    kept = [hub_run.closings[tick].frame for tick in frames.ticks]
+    positions = frames.column("ball", "position", 3)
+    assert positions.tolist() == [frame.vector("ball", "position", 3) for frame in kept]
+    added = frames.column("ball2", "position", 3)
+    assert np.isnan(added).all(axis=1).tolist() == [True] * 3 + [False] * 2 + [True] * 3
+    assert added[3:5].tolist() == [frame.vector("ball2", "position", 3) for frame in kept[3:5]]
+    assert np.isnan(frames.column("ball2", "contacts")).tolist() == [True] * 3 + [False] * 2 + [True] * 3
+    for index in (0, 3, 7, -1, -8):
+        assert frames.frame(index).digest == kept[index].digest
+    for index in (8, -9):
+        with pytest.raises(IndexError, match=f"frame {index} of 8"):
+            frames.frame(index)
+    with pytest.raises(CaptureError, match=r"no frame has an entity 'bal2', nearest is ball2"):
+        frames.column("bal2", "position", 3)
+    with pytest.raises(CaptureError, match=r"ball has no field 'positions', nearest is position; it has .*velocity"):
+        frames.column("ball", "positions", 3)
 
 
 def test_poses_are_those_of_the_one_forward_kinematics(capture: CaptureData, hub_run: HubRun) -> None:
@@ -85,7 +109,10 @@ def test_poses_are_those_of_the_one_forward_kinematics(capture: CaptureData, hub
 
 
 def test_packets_come_back_as_columns(capture: CaptureData, hub_run: HubRun) -> None:
-    flights = [flight for closing in hub_run.closings for flight in closing.fates]
+    """Those of one closing in the order of their log times, which is not that of their fates."""
+    in_time = [sorted(closing.fates, key=lambda flight: flight.sent_ns) for closing in hub_run.closings]
+    assert in_time != [closing.fates for closing in hub_run.closings]
+    flights = [flight for fates in in_time for flight in fates]
     packets = capture.packets
     account = hub_run.core.statistics()
     assert len(packets) == len(flights) == account.offered
@@ -109,7 +136,7 @@ def test_what_the_run_was_is_in_the_capture(capture: CaptureData, hub_run: HubRu
         "model_hash": model_hash(hub_run.deployment),
         "run": "run-1",
         "fingerprint": "00",
-        "format": "1",
+        "format": "2",
         "world": "table",
         "seed": "1",
         "tick_ns": "2000000",
@@ -164,6 +191,7 @@ def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
         "in_flight": account.in_flight,
     }
     assert info.topics == {
+        "/ages": 12,
         "/clients": 5,
         "/epochs": 2,
         "/frame": 8,
@@ -208,7 +236,7 @@ def test_the_mcap_library_reads_it_with_checksums_and_index(path: Path, hub_run:
         times = [message.log_time for _, _, message in reader.iter_messages("/tick", starting_at=50_000_000)]
         assert times == list(range(50_000_000, 130_000_000, 2_000_000))
         assert {a.name: a.data.decode() for a in reader.iter_attachments()}["deployment.yaml"] == hub_run.text
-        assert {m.name for m in reader.iter_metadata()} == {"foosim", "foosim.end"}
+        assert {m.name for m in reader.iter_metadata()} == {"foosim", "foosim.digests", "foosim.end"}
     with path.open("rb") as file:
         assert sum(1 for _ in StreamReader(file, validate_crcs=True).records) > sum(counts.values())
 

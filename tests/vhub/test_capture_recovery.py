@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import pytest
 from mcap.reader import make_reader
+from mcap.records import DataEnd
+from mcap.stream_reader import StreamReader
 
 from foosim.protocol.errors import Refused
 from foosim.protocol.journal import Journal, JournalError
@@ -76,6 +78,9 @@ def read_by_others(path: Path) -> int:
         assert {number: count for number, count in counts.items() if count} == by_channel
         assert len(summary.chunk_indexes) == summary.statistics.chunk_count
         assert len(list(reader.iter_attachments())) == 2 and len(list(reader.iter_metadata())) >= 2
+        stream.seek(0)
+        ends = [record for record in StreamReader(stream, validate_crcs=True).records if isinstance(record, DataEnd)]
+        assert [bool(end.data_section_crc) for end in ends] == [True]
         return summary.statistics.message_count
 
 

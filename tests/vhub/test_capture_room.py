@@ -6,6 +6,7 @@ import errno
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,6 +19,7 @@ from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.room_watch import RoomWatch
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -183,3 +185,30 @@ def test_on_a_disk_that_is_really_full(hub_run: HubRun, small_disk: Callable[[in
         if open_capture(writer.path).finished:
             assert_valid(writer.path)
         assert open_capture(writer.path).about.unfinished_bytes == 0
+
+
+def test_a_capture_that_takes_long_to_close_shows_how_far_it_is(
+    tmp_path: Path, hub_run: HubRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its disk takes nothing for a while: the vHub's loop goes on, and is told when it is closed."""
+    writer, write, gate, closed = new_writer(tmp_path / "c.mcap", hub_run), capture_file.write_all, Event(), Event()
+    room = RoomWatch(writer, tmp_path, 1)
+    monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 1_000_000)
+
+    def slow(file: int, content: bytes) -> None:
+        gate.wait()
+        write(file, content)
+
+    monkeypatch.setattr(capture_file, "write_all", slow)
+    writer.on_end = closed.set
+    for closing in hub_run.closings:
+        writer.keep(closing)
+    writer.begin_finish({"reason": "enough"})
+    before = room.recording
+    assert before["state"] == "closing" and before["written"] < before["offered"] and not writer.has_ended
+    gate.set()
+    assert closed.wait(100)
+    writer.finish()
+    after = room.recording
+    assert after["state"] == "on" and after["written"] == after["offered"] and after["bytes"] > before["bytes"]
+    assert open_capture(tmp_path / "c.mcap").about.end["reason"] == "enough"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -14,10 +15,11 @@ import pytest
 
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode_any, encode
+from foosim.protocol.command import FAILED
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Failed, Malformed
+from foosim.protocol.errors import Failed
 from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal
+from foosim.protocol.journal import Journal, journal_files
 from foosim.protocol.messages import Build
 from foosim.protocol.session import Session
 from foosim.vhub.capture_file import CaptureFile, Described
@@ -64,8 +66,8 @@ def leave(folder: Path, run: HubRun, without: int = -1) -> Path:
     return path
 
 
-def live(plane: Session, run: HubRun, folder: Path) -> None:
-    """Be a vHub that is started again, and whose port is in use."""
+def live(plane: Session, run: HubRun, folder: Path) -> str:
+    """Be a vHub that is started again, and whose port is in use; return what it has lost."""
 
     def is_busy(deployment: Deployment) -> Session:
         raise Failed("its port is in use")
@@ -75,7 +77,9 @@ def live(plane: Session, run: HubRun, folder: Path) -> None:
     build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, run.text, "fast", [])
     hub.core.receive(channels.BUILD, "vhub", encode(build), time.monotonic_ns())
     inbox.wake()
-    hub.run()
+    code = hub.run()
+    assert code == FAILED and hub.core.lost
+    return hub.core.lost
 
 
 def test_a_vhub_that_cannot_listen_leaves_a_capture_that_the_next_one_goes_on_with(
@@ -96,9 +100,31 @@ def test_a_vhub_whose_journal_contradicts_itself_leaves_its_capture_as_it_was(
 ) -> None:
     path = leave(tmp_path, hub_run, without=40)
     size = path.stat().st_size
-    with pytest.raises(Malformed, match="does not follow on tick"):
-        live(plane, hub_run, tmp_path)
+    assert "it cannot go on: " in (told := live(plane, hub_run, tmp_path)) and "does not follow on tick" in told
     assert path.stat().st_size == size
     found = recover_capture(path, tmp_path / "journals")
     assert found is not None and "does not follow on tick" in found.problem
     assert found.tick == 39, "what is before the gap is used"
+
+
+def test_a_vhub_whose_journal_is_damaged_goes_on_over_nothing(
+    hub_run: HubRun, plane: Session, tmp_path: Path
+) -> None:
+    """The run ends, with the place; the capture has what the journal tells up to there, and says so."""
+    path = leave(tmp_path, hub_run)
+    before = path.read_bytes()
+    (journal,) = journal_files(tmp_path / "journals", "vhub")
+    content = bytearray(journal.read_bytes())
+    content[len(content) // 2] ^= 1
+    journal.write_bytes(content)
+    text = live(plane, hub_run, tmp_path)
+    told = re.fullmatch(
+        r"lost vhub: it cannot go on: .*vhub-000001\.journal: byte \d+: record \d+ is damaged, \d+ whole .* behind it; "
+        rf"tick (\d+) is the last before it\. A new run begins with the .*up table\.yaml --from {path}@\d+ms",
+        text,
+    )
+    assert told is not None, text
+    assert path.read_bytes() == before
+    found = recover_capture(path, tmp_path / "journals")
+    assert found is not None and "its journal cannot be used to its end: " in found.problem
+    assert CAPTURED < found.tick == int(told[1]) < LAST

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import pytest
+from msgspec import structs
+
 from foosim.protocol import channels, limits
-from foosim.protocol.messages import Epoch, Want
+from foosim.protocol.deployment_file import apply_sets
+from foosim.protocol.messages import ClientHello, Epoch, Join, Subscription, Want
 from foosim.vhub.state import HubState
-from tests.vhub.test_sessions import FRAME, OWNERS, PERIODS, Hub, sent
+from tests.vhub.test_sessions import BUILD, DEPLOYMENT, FRAME, OWNERS, PERIODS, TEXT, Hub, sent
 
 W = limits.RELEASE_AHEAD
+OWNED = list(DEPLOYMENT.robots)
+BALL = Subscription("camera", "ball")
 
 
 def covered(hub: Hub) -> list[tuple[int, int]]:
@@ -95,3 +101,43 @@ def test_they_are_part_of_the_state() -> None:
     again = HubState.restore(hub.state.deployment, hub.state.snapshot())
     assert (again.final, again.was_final, again.hears_clients) == (5, True, False)
     assert again.snapshot() == hub.state.snapshot()
+
+
+def test_they_end_at_ticks_that_offsets_say_and_where_an_absent_client_may_join() -> None:
+    sets = ["clients.hand.offset=6 ms", "clients.knee.offset=14 ms", "robots.camera.sensors.ball.offset=2 ms"]
+    sets += [f"robots.{robot}.sensors.encoder.offset=2 ms" for robot in OWNED if robot != "camera"]
+    hub = Hub(structs.replace(BUILD, deployment=apply_sets(TEXT, "table.yaml", sets)))
+    for name, period, offset in (("hand", 5, 3), ("knee", 10, 7)):
+        hub.say(channels.CLIENT_HELLO, name, ClientHello(name, "one", limits.PROTOCOL_VERSION, "", 0))
+        hub.say(channels.UP, name, Join(name, "one", period, [], offset))
+    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
+    hub.said()
+    asked, reached = [], []
+    for tick in range(20):
+        hub.commit(tick)
+        while hub.core.waiting_for.startswith("Done of "):
+            name = hub.core.waiting_for.removeprefix("Done of ").partition(",")[0]
+            asked.append((tick, name))
+            hub.done(name, tick)
+        reached += covered(hub)
+    assert asked == [(3, "hand"), (7, "knee"), (8, "hand"), (13, "hand"), (17, "knee"), (18, "hand")]
+    assert reached[:7] == [(tick, tick) for tick in range(1, 8)], "one of them may join at any tick that it says"
+    assert reached[7:] == [(8, 8), (9, 11), (12, 13), (14, 16), (17, 17), (18, 18), (19, 21)]
+
+
+@pytest.mark.parametrize(
+    ("join", "what"),
+    [
+        (Join("hand", "one", 5, [], 5), "joins with an offset of 5 ticks, its period is 5"),
+        (Join("ear", "one", 0, [], 1), "joins with an offset of 1 ticks, its period is 0"),
+        (Join("hand", "one", 5, [BALL], 1, [BALL]), "an offset of 1 ticks, its period is 5, and acts at arrival"),
+        (Join("ear", "one", 0, [BALL], 0, [BALL]), "acts at arrival and joins free-running"),
+        (Join("hand", "one", 5, [], 0, [BALL]), "acts at the arrival of camera ball, which it does not hear"),
+    ],
+)
+def test_a_join_whose_times_do_not_fit_is_refused(join: Join, what: str) -> None:
+    hub = Hub()
+    hub.say(channels.CLIENT_HELLO, join.name, ClientHello(join.name, "one", limits.PROTOCOL_VERSION, "", 0))
+    hub.say(channels.UP, join.name, join)
+    assert what in hub.lines()[-1]
+    assert hub.core.statistics().malformed == 1 and not hub.core.sessions.joins

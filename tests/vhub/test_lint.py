@@ -15,6 +15,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.impairments import Impairments
+from foosim.protocol.names import LINE_NAMES
 from foosim.protocol.network import Network
 from foosim.protocol.radios import Radio
 from foosim.vhub.jitter import interpolate_ns, quantiles_ns
@@ -240,3 +241,38 @@ def test_means_of_models_of_loss_and_delay() -> None:
     assert mean_delay_ns(jitter=heavy, delay="1 ms") == pytest.approx(2e6, rel=0.01)
     reorder = {"probability": "10 %", "extra": "5 ms"}
     assert mean_delay_ns(reorder=reorder) == pytest.approx(0.5e6)
+
+
+# --- sensors and players in step -------------------------------------------------------------------------------------
+
+STEP: Final = "sensor and player are in step"
+IN_STEP: Final = (
+    "robots.camera.sensors.ball.offset=0 s",
+    *(f"robots.{team}.{line}.sensors.encoder.offset=0 s" for team in ("red", "blue") for line in LINE_NAMES),
+    *(f"players.{name}.act=period" for name in ("player-red", "player-blue")),
+    *(f"players.{name}.arrivals={{}}" for name in ("player-red", "player-blue")),
+    *(f"players.{name}.rate=100 Hz" for name in ("player-red", "player-blue")),
+)
+
+
+@pytest.mark.parametrize(
+    ("delay", "sets", "what"),
+    [
+        ("1300 us", (), f"10 ms old, of which the delay explains 2 ms: {STEP}; an offset of 2 ms"),
+        ("7 ms", (), f"10 ms old, of which the delay explains 8 ms: {STEP}; an offset of 8 ms"),
+        ("1300 us", ("players.player-red.offset=2 ms", "players.player-blue.offset=2 ms"), ""),
+        ("10 ms", (), ""),
+        ("1300 us", ("players.player-red.rate=50 Hz", "players.player-blue.rate=50 Hz"), "10 ms old, of which"),
+        ("1300 us", tuple(f"players.player-{team}.act=arrival" for team in ("red", "blue"))
+         + tuple(f"players.player-{team}.arrivals={{camera: [ball]}}" for team in ("red", "blue")), ""),
+    ],
+)  # fmt: skip
+def test_sensor_and_player_in_step_are_told(delay: str, sets: tuple[str, ...], what: str) -> None:
+    """What tests/vhub/test_ages.py measures: 10 ms at 1.3 ms and at 7 ms of delay alike."""
+    link = f"network.links=[{{id: w, from: '*', to: '*', delay: {delay}}}]"
+    text = apply_sets(TABLE.read_text(), TABLE.name, [*IN_STEP, link, *sets])
+    (meaning,) = meanings(load_deployment(text, TABLE.name))
+    assert len(meaning.warnings) == bool(what)
+    if what:
+        (warning,) = meaning.warnings
+        assert warning.startswith("player-red and 1 more see camera ball and 8 more channels ") and what in warning

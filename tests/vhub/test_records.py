@@ -15,6 +15,7 @@ from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, chain_next
 from foosim.protocol.journal import Journal, journal_files, read_journal, read_records
+from foosim.protocol.journal_format import FRAMING_BYTES
 from foosim.protocol.messages import Deliveries, Down
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing, HeadRecord, HubRecord, InputsRecord, TickRecord, fold
@@ -106,7 +107,7 @@ def test_a_journal_torn_at_any_byte_of_its_last_records_folds_to_the_one_before(
         for record in kept:
             journal.append(record)
     content = journal.path.read_bytes()
-    last, before = len(kept[3]) + 8, len(kept[2]) + 8
+    last, before = len(kept[3]) + FRAMING_BYTES, len(kept[2]) + FRAMING_BYTES
     for cut in range(last + before + 1):
         journal.path.write_bytes(content[: len(content) - cut])
         records = list(read_records(journal.path))

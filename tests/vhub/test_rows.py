@@ -16,6 +16,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Add, Edit, Push, Remove
 from foosim.vhub.capture_columns import word_of
 from foosim.vhub.rows import (
+    AGES,
     CLIENTS,
     EPOCHS,
     FRAME,
@@ -90,7 +91,8 @@ def test_a_run_that_ends_within_a_tick_has_the_fates_of_the_half_that_was_closed
 
 def test_a_frame_that_is_known_brings_its_packets_alone(hub_run: HubRun) -> None:
     last = hub_run.closings[-1]
-    assert last.fates and not world_rows(last, plan_of(hub_run.deployment), last.frame)
+    rest = world_rows(last, plan_of(hub_run.deployment), last.frame)
+    assert last.fates and {topic for topic, *_ in rest} == {AGES}, "and ages at use since the last second"
 
 
 def test_rows_stand_at_their_simulated_times(hub_run: HubRun, entries: list[Entry]) -> None:
@@ -212,7 +214,7 @@ def test_an_edit_of_a_wrong_shape_is_refused() -> None:
 
 
 def test_topics_are_those_of_the_readme() -> None:
-    assert {EPOCHS, RECOVERIES, TICK, LAYOUT, FRAME, PACKETS, CLIENTS} == set(ROW_TYPES)
+    assert {EPOCHS, RECOVERIES, TICK, LAYOUT, FRAME, AGES, PACKETS, CLIENTS} == set(ROW_TYPES)
 
 
 def test_a_draw_is_read_or_refused() -> None:

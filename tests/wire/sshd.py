@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 PROGRAM: Final = "/usr/sbin/sshd"
-LIMIT_S: Final = 60.0
+LIMIT_S: Final = 900.0
 
 
 def missing(*further: str) -> str:

@@ -32,7 +32,7 @@ from foosim.supervisor import pki
 from tests.granted import may_be_present, may_hear, may_put, may_watch
 from tests.wire.conftest import TABLE, wait_for
 
-LONG_S: Final = 60.0
+LONG_S: Final = 900.0
 INSIDERS: Final = {
     Plane.SIMULATION: ("node.red", "node.blue", "vhub", "operator.admin"),
     Plane.RADIO: ("client.hand", "client.other"),

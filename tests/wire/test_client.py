@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 CLIENTS = "clients={hand: {lockstep: true, rate: 100 Hz}, ear: {lockstep: false}}"
 PERFECT = "network.links=[]"
 TICKS = 50
-PATIENCE_S = 30.0
+PATIENCE_S = 900.0
 
 
 def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
@@ -66,7 +66,7 @@ def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
 
 
 def test_a_free_running_client_hears_robots_and_gets_its_echo_back(house: House) -> None:
-    up = house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"), "--set", "engine=pure", "--pace", "fast")
+    up = house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"), "--set", "engine=pure")
     radio = house.info().radio
     with connect(radio, "ear") as client, connect(radio, "hand") as other:
         client.listen([("camera", "ball")])

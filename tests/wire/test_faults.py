@@ -35,7 +35,7 @@ SEED: Final = 5
 def test_a_run_disturbed_by_every_fault_is_the_run_that_would_have_been(house: House) -> None:
     """On links that delay and stall; `end` compares the digests of all ticks with an undisturbed rehearsal's."""
     nodes = dict.fromkeys(("red", "blue"), NODE)
-    with Cluster(house.folder, "faults", SETS, pace="0.2x", seed=SEED, weather=BAD, programs=nodes) as cluster:
+    with Cluster(house.folder, "faults", SETS, pace="0.1x", seed=SEED, weather=BAD, programs=nodes) as cluster:
         trial = Trial(cluster, random.Random(SEED), calm_s=(0.0, 0.05))
         for fault in (*FAULTS, twin_refused):
             fault(trial)
@@ -53,7 +53,7 @@ def test_a_run_disturbed_by_every_fault_is_the_run_that_would_have_been(house: H
 
 def test_what_comes_from_outside_costs_a_run_nothing_but_packets(house: House) -> None:
     """`end` computes the capture again: it is equal, and everything in it is finite."""
-    with Cluster(house.folder, "outside", (*SETS, *WITH_CLIENT), pace="0.5x", seed=SEED) as cluster:
+    with Cluster(house.folder, "outside", (*SETS, *WITH_CLIENT), pace="0.1x", seed=SEED) as cluster:
         for kind in OUTSIDE:
             kind.trial(Trial(cluster, random.Random(SEED), calm_s=(0.0, 0.05)))
         result = cluster.end(altered=True)

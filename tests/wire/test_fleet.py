@@ -8,14 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from foosim.rehearsal.rehearse import rehearse
+from tests.wire.conftest import LONG
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
-
-LONG = (
-    "deadlines={heartbeat: 100 s, tick_named: 50 s, tick_lost: 100 s, lockstep_fast: 100 s, lockstep_realtime: 100 s,"
-    " start: 100 s}"
-)
 
 
 def test_players_that_share_a_process_are_what_they_would_be_alone(

@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING
 
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.rows import PacketRow
+from tests.wire.test_run import assert_finished, last_json
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
 
 
 def test_a_partition_by_request_cuts_and_a_heal_joins_again(house: House) -> None:
-    up = house.up("--capture", "run.mcap", "--set", "engine=pure", players=True)
+    """A Ctrl-C then ends the run in order."""
+    up = house.up("--capture", "run.mcap", "--set", "engine=pure", "--json", players=True)
     house.ticking(50)
-    code, out, err = house.run("foosim-net", "partition", "player-red", "rest", "--json")
+    code, out, err = house.ask("foosim-net", "partition", "player-red", "rest", "--json")
     assert code == 0, err
     cut = json.loads(out)["tick"]
-    assert house.run("foosim-net", "partition", "player-rde", "rest") == (
+    assert house.ask("foosim-net", "partition", "player-rde", "rest") == (
         3,
         "",
         "partition[0][0]: a selector that matches no endpoint, 'player-rde', nearest is 'player-red'\n",
@@ -39,14 +41,17 @@ def test_a_partition_by_request_cuts_and_a_heal_joins_again(house: House) -> Non
     assert house.end(top)[0] == 0
 
     up.send_signal(signal.SIGINT)
-    assert house.end(up)[0] == 0
+    code, out, err = house.end(up)
+    assert code == 0, err
+    assert (last_json(out)["reason"], last_json(out)["failed"]) == ("stopped", False)
+    assert_finished(house, last_json(out))
     capture = open_capture(house.folder / "run.mcap")
     rows = [row for row in capture.rows("/packets") if isinstance(row, PacketRow)]
     lost = [row for row in rows if row.cause == "partition" and row.arrival_tick < 0]
     ticks = {row.sent_ns // capture.deployment.tick_ns for row in lost}
     assert ticks and min(ticks) >= cut and max(ticks) < healed
     one = next(row for row in lost if row.source == "camera")
-    code, out, err = house.run("foosim-net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
+    code, out, err = house.ask("foosim-net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
     assert code == 0, err
     assert "policy    at sending cut by request 0, from " in out and ": partition\n" in out
     assert out.endswith("dropped at sending: partition (policy)\n")

@@ -49,16 +49,16 @@ def test_a_run_survives_nodes_that_are_killed_and_one_that_hangs(house: House) -
 def test_a_node_is_stopped_and_started_from_another_terminal(house: House) -> None:
     up = house.up("--json")
     house.ticking(5)
-    code, out, err = house.run("foosim-supervisor", "stop", "red")
+    code, out, err = house.ask("foosim-supervisor", "stop", "red")
     assert (code, err) == (0, "") and out.startswith("red stopped at tick "), err
     with Control(house.info().simulation) as control:
         house.wait_for("red to be gone", lambda: not house.processes_with("--name red"))
         status = control.status()
         assert status["processes"]["red"]["stopped"] and status["nodes"]["red"]["owned"] == []
-        assert house.run("foosim-supervisor", "start", "red")[0] == 0
+        assert house.ask("foosim-supervisor", "start", "red")[0] == 0
         house.wait_for("red to come back", lambda: came(control, "red", 1))
         assert control.status()["nodes"]["red"]["owned"] != []
-    assert house.run("foosim-supervisor", "stop", "rde")[0] == 3
-    assert house.run("foosim-supervisor", "down")[0] == 0
+    assert house.ask("foosim-supervisor", "stop", "rde")[0] == 3
+    assert house.ask("foosim-supervisor", "down")[0] == 0
     code, out, err = house.end(up)
     assert code == 0 and last_json(out)["reason"] == "stopped", err

@@ -12,7 +12,7 @@ import pytest
 
 from tests.wire.proxy import Proxy, Weather
 
-LIMIT_S = 60.0
+LIMIT_S = 900.0
 
 
 @contextmanager

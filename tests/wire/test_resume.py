@@ -9,19 +9,23 @@ import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
+
 from foosim.protocol import channels
+from foosim.protocol.errors import Refused
 from foosim.protocol.journal import journal_files, read_records
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.verify import verify_capture
+from foosim.supervisor.plan import plan_again
 from foosim.supervisor.run_folder import open_run
 from foosim.vhub.capture_reader import open_capture
-from tests.wire.conftest import LONG
+from tests.wire.conftest import LONG, SLOW
 from tests.wire.test_run import last_json
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
 
-BARE = ("--set", LONG, "--set", "players={}", "--set", "engine=pure")
+BARE = ("--set", LONG, "--set", "players={}", "--set", "engine=pure", "--set", f"pace={SLOW}")
 
 
 def tear(folder: Path, stem: str, count: int) -> None:
@@ -30,6 +34,14 @@ def tear(folder: Path, stem: str, count: int) -> None:
     records = read_records(path)
     ends = [records.valid_bytes for _ in records]
     os.truncate(path, ends[-count])
+
+
+def flip(folder: Path, stem: str) -> None:
+    """Turn a bit in the midst of a journal."""
+    path = journal_files(folder, stem)[0]
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
 
 
 def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
@@ -44,11 +56,22 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     folder = open_run("far")
     house.wait_for("all to be gone with it", lambda: folder.is_left() and not house.processes_with("--run far"))
     assert folder.result() is None
+    flip(folder.journals, channels.VHUB)
+    with pytest.raises(Refused, match=r"run far cannot go on: .*vhub-0\d+\.journal: byte \d+: .* --from .*far.mcap@\d"):
+        plan_again(folder)
+    flip(folder.journals, channels.VHUB)
+    (journal,) = journal_files(folder.journals, channels.VHUB)
+    journal.rename(journal.with_suffix(".away"))
+    code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
+    why = f"run far cannot go on: the vHub's journal is gone from {folder.journals}; foosim-supervisor up {house.table}"
+    assert code == 3 and err.startswith(why) and last_json(out)["reason"] == err.strip()
+    assert last_json(out)["capture"] == str(house.folder / "far.mcap")
+    journal.with_suffix(".away").rename(journal)
     tear(folder.journals, channels.VHUB, 60)
     tear(folder.journals, channels.SUPERVISOR, 9)
     up = house.start("foosim-supervisor", "up", "--resume", "far", "--json")
     house.ticking(before + 100)
-    assert house.run("foosim-supervisor", "down")[0] == 0
+    assert house.ask("foosim-supervisor", "down")[0] == 0
     code, out, err = house.end(up)
     assert code == 0, err
     content = last_json(out)
@@ -59,8 +82,8 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     assert open_capture(house.folder / "far.mcap").about.finished
     verified = verify_capture(house.folder / "far.mcap")
     assert verified.ticks == content["ticks"]
-    code, _, err = house.run("foosim-supervisor", "up", "--resume", "far")
-    assert code == 3 and "run far has ended" in err
+    code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
+    assert (code, last_json(out)) == (0, content) and "run far has ended: stopped" in err
 
 
 def test_a_run_that_does_not_come_up_says_why(house: House) -> None:

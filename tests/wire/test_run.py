@@ -8,22 +8,22 @@ import signal
 import socket
 import subprocess
 import sys
-from typing import TYPE_CHECKING, Any
+import time
+from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
 from foosim.protocol.names import LINE_NAMES, TEAMS
 from foosim.protocol.units import parse_pace
 from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.verify import verify_capture
 from foosim.supervisor import control
 from foosim.supervisor.control import Control, RequestRefused
 from foosim.vhub.capture_reader import open_capture
+from tests.wire.conftest import LIMIT_S, LONG
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
-
-LONG = "deadlines={heartbeat: 100 s, tick_named: 50 s, tick_lost: 100 s, start: 100 s}"
-"""Nobody is given up for being slow."""
 
 KEYS = {
     *("ticks", "tick_ns", "rtf", "lag_ms", "digest", "packets", "nodes", "moves", "handovers", "score", "capture"),
@@ -45,12 +45,12 @@ def assert_finished(house: House, content: dict[str, Any]) -> None:
 
 
 def test_two_nodes_and_two_players_compute_what_a_rehearsal_computes(house: House) -> None:
-    code, out, err = house.end(house.up("--pace", "fast", "--for", "2s", "--json", players=True))
+    code, out, err = house.end(house.up("--pace", "fast", "--for", "600 ms", "--json", players=True))
     assert code == 0, err
     content = last_json(out)
     assert content.keys() >= KEYS
     assert (content["ticks"], content["tick_ns"], content["lag_ms"], content["reason"]) == (
-        *(1000, 2_000_000, None, "done"),
+        *(300, 2_000_000, None, "done"),
     )
     assert content["rtf"] > 0
     assert all(node["solved_ticks"] > 0 and node["owned"] for node in content["nodes"].values())
@@ -61,15 +61,19 @@ def test_two_nodes_and_two_players_compute_what_a_rehearsal_computes(house: Hous
     (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
     assert list((run / "journals").iterdir()) == [], "nothing is left to recover"
 
-    rehearsed = rehearse(house.table.read_text(), "table.yaml", 1000, nodes=None, pace=parse_pace("fast")).json
+    rehearsed = rehearse(house.table.read_text(), "table.yaml", 300, nodes=None, pace=parse_pace("fast")).json
     for same in ("digest", "packets", "nodes", "handovers", "score"):
         assert content[same] == rehearsed[same], same
 
 
-def test_the_processes_stand_in_groups_of_their_own_and_die_with_up(house: House) -> None:
-    up = house.up()
+def test_a_run_goes_on_whatever_is_asked_wrongly_and_dies_with_its_launcher(house: House) -> None:
+    """It listens where it is told, the radio plane one port higher; its processes stand in groups of their own."""
+    port = free_port()
+    up = house.up("--listen", f"127.0.0.1:{port}", "--set", "clients={}")
     info = house.info()
-    house.ticking()
+    assert info.simulation.endswith(f":{port}")
+    assert info.radio.endswith(f":{port + 1}")
+    before = house.ticking(5)["ticks"]
     lines = house.processes_with(info.simulation)
     assert any("foosim-node --name red --connect" in line for line in lines.values()), lines
     assert any("foosim-vhub --connect" in line for line in lines.values()), lines
@@ -77,20 +81,38 @@ def test_the_processes_stand_in_groups_of_their_own_and_die_with_up(house: House
     assert all(os.getpgid(pid) == pid for pid in pids)
     logs = {path.name for path in house.live().logs.iterdir()}
     assert logs == {"supervisor.log", "vhub.log", "red.log", "blue.log"}
+    assert_wrong_names_are_refused_with_the_nearest_one(house)
+    assert_nodes_that_do_not_fit_are_refused(house, info.simulation)
+    status = house.ticking(before + 1)
+    assert (status["state"], status["epoch"]) == ("running", 1)
     up.kill()
     house.wait_for("the end of the children", lambda: not any(os.path.exists(f"/proc/{pid}/exe") for pid in pids))
 
 
-def test_ctrl_c_ends_the_run_in_order(house: House) -> None:
-    up = house.up("--json")
-    house.ticking()
-    up.send_signal(signal.SIGINT)
-    code, out, err = house.end(up)
-    assert code == 0, err
-    content = last_json(out)
-    assert (content["reason"], content["failed"]) == ("stopped", False)
-    assert content["ticks"] >= 1
-    assert_finished(house, content)
+def assert_wrong_names_are_refused_with_the_nearest_one(house: House) -> None:
+    robots = ", ".join(sorted(["camera", *(f"{team}.{line}" for team in TEAMS for line in LINE_NAMES)]))
+    refused = (3, "", f"no robot 'red.gaol'; there are {robots}, nearest is red.goal\n")
+    assert house.ask("foosim-supervisor", "move", "red.gaol", "blue") == refused
+    code, _, err = house.ask("foosim-supervisor", "status", "--run", "tabel")
+    assert code == 1 and "no run 'tabel'" in err
+    with pytest.raises(RequestRefused, match="no node 'green'; there are blue, red"):
+        control.move("red.goal", "green")
+
+
+def assert_nodes_that_do_not_fit_are_refused(house: House, address: str) -> None:
+    def node(name: str, *arguments: str) -> tuple[int, str]:
+        code, _, err = house.run("foosim-node", "--name", name, "--connect", address, *arguments)
+        return code, err
+
+    code, err = node("red")
+    assert code == 3 and "refused by the supervisor: a node red is already here" in err
+    code, err = node("rde")
+    assert code == 3 and "no node 'rde' is declared; declared are blue, red, nearest is red" in err
+    code, err = node("red", "--world", "chess")
+    assert code == 3 and "world chess, this is table" in err
+    version_2 = "from foosim.protocol import limits; limits.PROTOCOL_VERSION = 2"
+    code, err = altered_node(house, version_2, "red", address)
+    assert code == 3 and "protocol version 2, this is 1" in err
 
 
 def test_ctrl_c_before_the_first_tick_ends_it_too(house: House) -> None:
@@ -124,16 +146,14 @@ def test_a_second_ctrl_c_kills_everything(house: House) -> None:
     assert house.processes_with(info.simulation) == {}
 
 
-@pytest.mark.parametrize("process", ["red", "player-blue"])
-def test_a_process_that_is_lost_ends_the_run_in_order_and_is_named(house: House, process: str) -> None:
-    up = house.up("--json", "--set", "nodes.red.required=true", players=process.startswith("player"))
+def test_a_required_node_that_is_lost_ends_the_run_in_order_and_is_named(house: House) -> None:
+    up = house.up("--json", "--set", "nodes.red.required=true")
     house.ticking(5)
-    house.kill(process)
+    house.kill("red")
     code, out, err = house.end(up)
     assert code == 1, err
-    assert process == "red" or f"{process} was killed by SIGKILL" in err
     content = last_json(out)
-    assert content["reason"] == f"lost {process}: its connection closed"
+    assert content["reason"] == "lost red: its connection closed"
     assert content["failed"]
     (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
     journals = {path.name for path in (run / "journals").iterdir()}
@@ -141,8 +161,53 @@ def test_a_process_that_is_lost_ends_the_run_in_order_and_is_named(house: House,
     capture = next((house.folder / "captures").iterdir())
     about = open_capture(capture).about
     assert about.finished
-    assert about.end["reason"] == f"lost {process}: its connection closed"
+    assert about.end["reason"] == "lost red: its connection closed"
     assert house.processes_with(str(house.folder)) == {}
+
+
+TRIPS = """
+from pathlib import Path
+
+from foosim.client.players import Team
+
+class Trips(Team):
+    def __init__(self, deployment, parameters):
+        super().__init__(deployment, {"team": "red"})
+        self.wire = Path(parameters["wire"])
+
+    def act(self, tick, samples):
+        if self.wire.exists():
+            raise LookupError("tripped")
+        return super().act(tick, samples)
+"""
+
+
+def test_a_player_that_is_killed_plays_again_and_one_that_raises_ends_the_run(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (house.folder / "own_trips.py").write_text(TRIPS)
+    monkeypatch.setenv("PYTHONPATH", str(house.folder))
+    wire = house.folder / "wire"
+    player = f"players.player-red.parameters={{team: red, wire: {wire}}}"
+    own = "--set", "players.player-red.class=own_trips:Trips", "--set", player
+    up = house.up("--json", "--pace", "fast", *own, players=True)
+    house.ticking(50)
+    house.kill("player-blue")
+    entry = house.wait_for("a player that is back", lambda: next(iter(house.ticking()["recoveries"]), None))
+    assert (entry["what"], entry["name"], entry["reason"]) == ("player", "player-blue", "its connection closed")
+    house.ticking(entry["tick"] + 50)
+    wire.touch()
+    code, out, err = house.end(up)
+    content = last_json(out)
+    raised = next(at for at, line in enumerate(TRIPS.splitlines(), 1) if "raise" in line)
+    place = f'({house.folder / "own_trips.py"}:{raised}: raise LookupError("tripped"))'
+    said, _, where = content["reason"].partition(": LookupError: tripped ")
+    assert (code, content["failed"], where) == (1, True, place), err
+    assert said.startswith("player-red failed at tick ") and content["reason"] in err
+    assert "player-blue was killed by SIGKILL" in err and "starts again in 0.5 s" in err
+    (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
+    assert "Traceback (most recent call last):" in (run / "logs" / "player-red.log").read_text()
+    assert verify_capture(house.folder / content["capture"]).equal
 
 
 def test_a_child_that_cannot_start_ends_the_run_and_shows_why(house: House) -> None:
@@ -178,8 +243,32 @@ def test_a_vhub_that_cannot_open_its_capture_is_gone_at_once(house: House) -> No
     assert code == 0 and "run ends at tick 0: stopped" in err
 
 
-def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(house: House) -> None:
-    up = house.up("--json")
+COUNTED: Final = """
+import os
+from foosim.protocol.loop import Loop
+
+go_round, rounds = Loop.go_round, 0
+file = os.open(os.path.join(os.path.dirname(__file__), f"{os.getpid()}.rounds"), os.O_CREAT | os.O_WRONLY)
+
+def counted(loop):
+    global rounds
+    rounds += 1
+    os.pwrite(file, b"%020d" % rounds, 0)
+    go_round(loop)
+
+Loop.go_round = counted
+"""
+"""Python reads this at its start: each process writes down how often its loop has gone round."""
+ROUNDS_PER_S: Final = 100
+
+
+def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (house.folder / "sitecustomize.py").write_text(COUNTED)
+    with monkeypatch.context() as counted:
+        counted.setenv("PYTHONPATH", str(house.folder))
+        up = house.up("--json", players=True)
     house.ticking(3)
     code, out, _ = house.run("foosim-supervisor", "pause", "--json")
     paused = json.loads(out)
@@ -187,6 +276,7 @@ def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(house
     tick = paused["tick"]
     with control.connect() as asked:
         assert_paused_at(house, asked, tick)
+        assert_it_sleeps(house)
         assert asked.ask("step", count=10).tick == tick
         assert_paused_at(house, asked, tick + 10)
         assert_the_world_changes_as_asked(house, asked, tick + 10)
@@ -200,6 +290,24 @@ def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(house
     code, out, err = house.end(up)
     assert code == 0, err
     assert (last_json(out)["ticks"], last_json(out)["moves"]) == (last, 1)
+
+
+def assert_it_sleeps(house: House) -> None:
+    """No process looks round busily: a loop goes round for messages and deadlines, which come some 10 times a second.
+
+    Rounds are counted by the clock of these deadlines, so that a slow machine makes them fewer, never more.
+    """
+    info, red = house.info(), house.pid_of("red")
+    pids = [info.pid, *house.processes_with(f"--connect {info.simulation}"), *house.processes_with(info.radio)]
+    assert len(pids) == 6
+
+    def rounds(pid: int) -> int:
+        return int((house.folder / f"{pid}.rounds").read_bytes())
+
+    begun_s, before = time.monotonic(), {pid: rounds(pid) for pid in pids}
+    house.wait_for("rounds of a node", lambda: rounds(red) >= before[red] + 40)
+    gone = {pid: rounds(pid) - before[pid] for pid in pids}
+    assert max(gone.values()) <= ROUNDS_PER_S * (time.monotonic() - begun_s), gone
 
 
 def assert_paused_at(house: House, asked: Control, tick: int) -> None:
@@ -229,40 +337,6 @@ def assert_the_world_changes_as_asked(house: House, asked: Control, tick: int) -
         asked.ask("push", impulse=(0.0, 0.0, 0.0), name="ball2")
 
 
-def test_a_wrong_name_is_refused_with_the_nearest_one(house: House) -> None:
-    house.up()
-    house.ticking()
-    robots = ", ".join(sorted(["camera", *(f"{team}.{line}" for team in TEAMS for line in LINE_NAMES)]))
-    refused = (3, "", f"no robot 'red.gaol'; there are {robots}, nearest is red.goal\n")
-    assert house.run("foosim-supervisor", "move", "red.gaol", "blue") == refused
-    code, _, err = house.run("foosim-supervisor", "status", "--run", "tabel")
-    assert code == 1 and "no run 'tabel'" in err
-    with pytest.raises(RequestRefused, match="no node 'green'; there are blue, red"):
-        control.move("red.goal", "green")
-
-
-def test_a_node_that_does_not_fit_is_refused_and_costs_the_run_nothing(house: House) -> None:
-    house.up("--set", "clients={}")
-    info = house.info()
-    before = house.ticking(5)["ticks"]
-
-    def node(name: str, *arguments: str) -> tuple[int, str]:
-        code, _, err = house.run("foosim-node", "--name", name, "--connect", info.simulation, *arguments)
-        return code, err
-
-    code, err = node("red")
-    assert code == 3 and "refused by the supervisor: a node red is already here" in err
-    code, err = node("rde")
-    assert code == 3 and "no node 'rde' is declared; declared are blue, red, nearest is red" in err
-    code, err = node("red", "--world", "chess")
-    assert code == 3 and "world chess, this is table" in err
-    version_2 = "from foosim.protocol import limits; limits.PROTOCOL_VERSION = 2"
-    code, err = altered_node(house, version_2, "red", info.simulation)
-    assert code == 3 and "protocol version 2, this is 1" in err
-    status = house.ticking(before + 1)
-    assert (status["state"], status["epoch"]) == ("running", 1)
-
-
 def altered_node(house: House, change: str, name: str, address: str) -> tuple[int, str]:
     """A node of which something was changed before it starts; return its exit code and errors."""
     program = f"{change}; from foosim.node.main import main; main()"
@@ -271,7 +345,7 @@ def altered_node(house: House, change: str, name: str, address: str) -> tuple[in
         cwd=house.folder,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=LIMIT_S,
         check=False,
     )
     return done.returncode, done.stderr
@@ -293,15 +367,6 @@ def test_the_run_waits_for_a_node_that_is_started_by_hand(house: House) -> None:
     assert "the run has ended: done" in out
 
 
-def test_it_listens_where_it_is_told_the_radio_plane_one_port_higher(house: House) -> None:
-    port = free_port()
-    house.up("--listen", f"127.0.0.1:{port}")
-    info = house.info()
-    assert info.simulation.endswith(f":{port}")
-    assert info.radio.endswith(f":{port + 1}")
-    house.ticking()
-
-
 def free_port() -> int:
     """A port that was free a moment ago, and whose next one was."""
     with socket.socket() as one, socket.socket() as other:
@@ -312,30 +377,3 @@ def free_port() -> int:
         except OSError:
             return free_port()
         return port
-
-
-def test_a_paused_run_sleeps(house: House) -> None:
-    """No process looks round busily: each uses less than 3 % of a core."""
-    house.up(players=True)
-    house.ticking()
-    info = house.info()
-    with control.connect() as asked:
-        assert_paused_at(house, asked, asked.ask("pause").tick)
-    pids = [info.pid, *house.processes_with(f"--connect {info.simulation}"), *house.processes_with(info.radio)]
-    assert len(pids) == 6
-
-    def uptime_s() -> float:
-        with open("/proc/uptime") as file:
-            return float(file.read().split()[0])
-
-    begun_s, before = uptime_s(), {pid: cpu_s(pid) for pid in pids}
-    house.wait_for("two seconds of CPU clocks", lambda: uptime_s() > begun_s + 2.0)
-    used = {pid: (cpu_s(pid) - before[pid]) / (uptime_s() - begun_s) for pid in pids}
-    assert max(used.values()) < 0.03, used
-
-
-def cpu_s(pid: int) -> float:
-    """The processor time of a process so far."""
-    with open(f"/proc/{pid}/stat") as file:
-        fields = file.read().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -20,7 +20,7 @@ import pytest
 from foosim.protocol.inbox import Inbox, Item
 from foosim.protocol.session import Publisher, Session
 
-LONG_S = 30.0
+LONG_S = 900.0
 ANY_PORT = "tcp/127.0.0.1:0"
 
 
@@ -261,13 +261,13 @@ def test_presence_is_told_to_those_who_come_later_and_ends_with_the_session(plan
 
 
 BE_PRESENT = """
-import sys, time
+import sys
 from foosim.protocol.session import Session
-session = Session.client(sys.argv[1], 30.0)
+session = Session.client(sys.argv[1], 900.0)
 session.declare_alive("w/alive/blue")
 session.publisher("w/part/blue").put(b"")
 print("present", flush=True)
-time.sleep(600)
+sys.stdin.read()
 """
 
 
@@ -279,7 +279,7 @@ def test_a_process_that_is_gone_is_told_and_the_others_go_on(plane: Plane, inbox
     plane.client().subscribe("w/part/*", "part", heard)
     publisher = plane.client().publisher("w/part/red")
     command = [sys.executable, "-c", BE_PRESENT, plane.router.locator]
-    with subprocess.Popen(command, stdout=subprocess.PIPE) as child:
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
         try:
             assert inbox.take(LONG_S) == [("alive", "blue", b"+")]
             assert child.stdout is not None
@@ -312,11 +312,11 @@ def test_garbage_on_the_port_harms_nobody(plane: Plane, inbox: Inbox) -> None:
 
 
 RUN_A_ROUTER = """
-import sys, time
+import sys
 from foosim.protocol.session import Session
 session = Session.router(sys.argv[1])
 print("listening", flush=True)
-time.sleep(600)
+sys.stdin.read()
 """
 
 
@@ -324,7 +324,8 @@ def test_links_presence_and_subscriptions_come_back_with_the_router(inbox: Inbox
     locator = f"tcp/127.0.0.1:{free_port()}"
 
     def start() -> subprocess.Popen[bytes]:
-        router = subprocess.Popen([sys.executable, "-c", RUN_A_ROUTER, locator], stdout=subprocess.PIPE)
+        command = [sys.executable, "-c", RUN_A_ROUTER, locator]
+        router = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         assert router.stdout is not None
         assert router.stdout.readline() == b"listening\n"
         return router

@@ -15,7 +15,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.inbox import Inbox, Item
 from foosim.protocol.session import ConnectError, ListenError, Session
 
-LONG_S = 30.0
+LONG_S = 900.0
 ANY_PORT = "tcp/127.0.0.1:0"
 
 
@@ -119,7 +119,7 @@ LEAVE_IT_OPEN = """
 import sys, time
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.session import Session
-session = Session.client(sys.argv[1], 30.0)
+session = Session.client(sys.argv[1], 900.0)
 inbox = Inbox(10)
 session.subscribe("w/*", "w", inbox)
 session.receive("n/*", "n", lambda key: ("n", key), inbox)
@@ -174,7 +174,7 @@ import os, sys, time
 from foosim.protocol.session import CLIENT_RUNTIME, ROUTER_RUNTIME, Session, use_client_runtime
 if sys.argv[1] == "client":
     use_client_runtime()
-with Session.router("tcp/127.0.0.1:0") as router, Session.client(router.locator, 30.0) as client:
+with Session.router("tcp/127.0.0.1:0") as router, Session.client(router.locator, 900.0) as client:
     assert client.alive("nobody/*") == set()
     wanted = [f"rx-{number}" for number in range(int(sys.argv[2]))]
     while True:  # a thread gives itself its name when it first runs

@@ -12,6 +12,8 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor.control import Control
 from foosim.supervisor.run_folder import open_run
 from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.capture_recovery import recover_capture
+from tests.wire.conftest import LIMIT_S, LONG
 from tests.wire.test_run import last_json
 
 if TYPE_CHECKING:
@@ -43,7 +45,7 @@ def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: Ho
         for answer in (moved, paused):  # the same request, the same answer, by whoever gives it
             again = Request(answer.sender, answer.id, "status", encode_json({}))
             control._wire.put(channels.REQUEST, answer.sender, encode(again))
-            assert control._wait(answer.id, 100.0) == answer
+            assert control._wait(answer.id, LIMIT_S) == answer
         control.ask("resume")
         house.ticking(paused.tick + 100)
         control.ask("down")
@@ -62,26 +64,32 @@ def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: Ho
 
 
 def test_who_is_left_alone_holds_and_ends(house: House) -> None:
-    """Without a launcher nobody starts the supervisor again."""
-    run = ["--set", "players={}", "--set", "engine=pure", "--set", "deadlines={start: 100 s, orphan: 1 s}"]
+    """Without a launcher nobody starts the supervisor again. The run has not ended, and it can be gone on with: the
+    vHub leaves its capture as a kill would."""
+    run = ["--set", "players={}", "--set", "engine=pure", "--set", LONG, "--set", "deadlines.orphan=1 s"]
     supervisor = house.start("foosim-supervisor", "run", house.table, *run)
     info = house.wait_for("the run file", house.live().info)
     connect = ["--connect", info.simulation]
     others = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
-    others.append(house.start("foosim-vhub", *connect, "--no-capture", "--run-folder", house.folder / "hub"))
+    capture = house.folder / "alone.mcap"
+    others.append(house.start("foosim-vhub", *connect, "--capture", capture, "--run-folder", house.folder / "hub"))
     house.ticking(5)
     supervisor.kill()
     for other in others:
         code, _, err = house.end(other)
         assert code == 1 and "lost the supervisor, and it has not come back" in err, err
-    other_file = [*run[:-1], "deadlines={start: 99 s}", "--run", info.run]
+    assert f"leaves its capture {capture} without an end: the run can go on with it" in err
+    assert not open_capture(capture).about.finished
+    recovered = recover_capture(capture, house.folder / "hub" / "journals")
+    assert recovered is not None and recovered.is_whole and recovered.tick >= 5, "its journal is there, and fits"
+    other_file = [*run[:-1], "deadlines.orphan=2 s", "--run", info.run]
     again = house.start("foosim-supervisor", "run", house.table, *other_file)
     code, _, err = house.end(again)
     assert code == 3 and f"run {info.run} was started with another deployment" in err
 
 
 def test_a_supervisor_that_is_started_again_by_hand_goes_on(house: House) -> None:
-    run = ["--set", "players={}", "--set", "engine=pure", "--for", "2 s", "--pace", "fast"]
+    run = ["--set", "players={}", "--set", "engine=pure", "--set", LONG, "--for", "2 s", "--pace", "fast"]
     first = house.start("foosim-supervisor", "run", house.table, *run)
     info = house.wait_for("the run file", house.live().info)
     connect = ["--connect", info.simulation]

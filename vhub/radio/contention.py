@@ -1,14 +1,14 @@
 """Who gets the channel, and what it costs: Bianchi's analysis for 802.11, carrier sensing for 802.15.4.
 
-The medium of a collision domain is one server. Its user keeps a horizon F, until which the domain is taken, and counts
-the contenders n: the stations, this one included, that have a frame queued or on the air. A transmission sent at t gets
-its turn at s = max(t, F); its frame arrives at s + `delay_ns`; the horizon moves to s + `occupancy_ns`. So a station's
-backoff is lengthened by other stations' transmissions as the horizon moves on, and a domain never carries more than its
-capacity, whatever arrives at once.
+A packet's attempts are drawn with the contenders n: the stations, its own included, that have a frame queued or on air.
+On 802.11 its station counts down `backoff_ns`, all attempts together, while the channel is idle (`turns`). Then its
+turn begins, at a time s: the frame arrives at s + `delay_ns`, and the channel is free again at s + `occupancy_ns`. On
+802.15.4 the medium of a collision domain is one server with a horizon, at which the turn begins, and backoff is in it.
+So a domain never carries more than its capacity, whatever arrives at once.
 
-What a packet occupies is its own exchange, plus its share of what contenders spend together: a slot of backoff passes
-for all n at once, and a collision is one busy time for all that collide. With the shares of Bianchi's fixed point the
-mean is one over the saturation throughput S(n): n stations that always have a frame get S(n) in all, and wait n / S(n).
+What a packet occupies is its own exchange, plus its share of what contenders spend together: a collision is one busy
+time for all that collide. With the share of Bianchi's fixed point, and since a slot of backoff passes for all stations
+at once, n stations that always have a frame get the saturation throughput S(n) in all.
 
 Source: Bianchi, "Performance analysis of the IEEE 802.11 distributed coordination function" (2000).
 """
@@ -35,9 +35,11 @@ Outcome = Literal["ok", "collision", "error", "busy"]
 class Access:
     """What became of one transmission on a shared medium."""
 
-    __slots__ = ("airtime_ns", "delay_ns", "occupancy_ns", "outcome", "retries")
+    __slots__ = ("airtime_ns", "backoff_ns", "delay_ns", "occupancy_ns", "outcome", "retries")
 
-    def __init__(self, delay_ns: int, occupancy_ns: int, retries: int, airtime_ns: int, outcome: Outcome) -> None:
+    def __init__(
+        self, delay_ns: int, occupancy_ns: int, retries: int, airtime_ns: int, outcome: Outcome, backoff_ns: int = 0
+    ) -> None:
         self.delay_ns = delay_ns
         """From its turn until the frame is whole at the receiver, or is given up."""
         self.occupancy_ns = occupancy_ns
@@ -48,6 +50,8 @@ class Access:
         """For which its own frames were on the air, all attempts together, without acknowledgements."""
         self.outcome = outcome
         """`ok`, or why the last attempt failed; `busy`: the channel was never free."""
+        self.backoff_ns = backoff_ns
+        """What its station counts down, all attempts together, before its turn begins: 802.11 alone."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +64,6 @@ class Contention:
     """The probability that an attempt collides."""
     threshold: int
     """An attempt collides when its word is below this."""
-    idle_share: float
-    """Of a slot of one's own backoff: the channel is idle in it with 1 - p, and it passes for n stations at once."""
     collision_share: float
     """Of a collision that one has part in: one over the mean number of those that share it, weighted by part."""
 
@@ -106,7 +108,7 @@ def contention(contenders: int, window: int, doublings: int) -> Contention:
     idle = _power(1.0 - tau, n)
     one = n * tau * _power(1.0 - tau, n - 1)
     share = (1.0 - idle - one) / (n * tau * p) if n > 1 else 0.0
-    return Contention(tau, p, chance_threshold(p), (1.0 - p) / n, share)
+    return Contention(tau, p, chance_threshold(p), share)
 
 
 def _doublings(cw_min: int, cw_max: int) -> int:
@@ -142,17 +144,15 @@ def wifi_access(
     attempts = timing.retries + 1 if unicast else 1
     tail_ns = timing.sifs_ns + ack_ns if unicast else 0
     exchange_ns = timing.difs_ns + airtime_ns + tail_ns
-    slot_share_ns = timing.slot_ns * point.idle_share
     collision_ns = round(exchange_ns * point.collision_share)
     outcome: Outcome = "ok"
-    spent_ns = 0
+    spent_ns = slots = 0
     block: Sequence[int] = ()
     for attempt in range(attempts):
         if attempt & 1 == 0:
             block = words(attempt >> 1)
         at = (attempt & 1) << 2
-        slots = block[at] * (window << (attempt if attempt < doublings else doublings)) >> 64
-        spent_ns += round(slots * slot_share_ns)
+        slots += block[at] * (window << (attempt if attempt < doublings else doublings)) >> 64
         if block[at + 1] < point.threshold:
             outcome = "collision"
             spent_ns += collision_ns
@@ -161,8 +161,9 @@ def wifi_access(
             spent_ns += exchange_ns
         else:
             spent_ns += exchange_ns
-            return Access(spent_ns - tail_ns, spent_ns, attempt, (attempt + 1) * airtime_ns, "ok")
-    return Access(spent_ns, spent_ns, attempts - 1, attempts * airtime_ns, outcome)
+            backoff_ns = slots * timing.slot_ns
+            return Access(spent_ns - tail_ns, spent_ns, attempt, (attempt + 1) * airtime_ns, "ok", backoff_ns)
+    return Access(spent_ns, spent_ns, attempts - 1, attempts * airtime_ns, outcome, slots * timing.slot_ns)
 
 
 def saturation_rate_hz(contenders: int, airtime_ns: int, ack_ns: int, timing: WifiTiming) -> float:

@@ -41,6 +41,8 @@ class Channel(Stage):
         return cause
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:
+        if self._air is not None:
+            self._air.settle(flight.due_ns)
         return self._judge(flight) if flight.interference and not flight.is_settled else ""
 
     def _judge(self, flight: Flight) -> str:

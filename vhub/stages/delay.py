@@ -33,6 +33,8 @@ class Delay(Stage):
         reorder = settings.reorder
         self._reordered = 0 if reorder is None else chance_threshold(reorder.probability)
         self._extra_ns = 0 if reorder is None else reorder.extra_ns
+        self._air = setup.air if settings.medium == "wifi" else None
+        self._budget = setup.budget
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Delay | None:
@@ -64,7 +66,32 @@ class Delay(Stage):
         flight.due_ns = held_ns
         if self._holds:
             flight.held_ns = held_ns - due_ns
+        if self._air is not None:
+            self.plan(flight)
         return ""
+
+    def plan(self, flight: Flight) -> None:
+        """Have a packet come later where its turn on the air is put off."""
+        if self._air is not None and self._budget is not None:
+            self._air.plan(flight, self._budget.propagation, self)
+
+    def put_off(self, flight: Flight, by_ns: int, last_ns: dict[int, int]) -> None:
+        """Have a packet come so much later; `last_ns` are the due times of those before it that were put off, by link.
+
+        It is called in the order of sending, also of those behind them that are not.
+        """
+        free_ns = flight.due_ns - flight.held_ns + by_ns
+        due_ns = self._held_ns(free_ns) if self._holds else free_ns
+        if self._fifo and not (self._extra_ns and self.is_late(flight)):
+            memory = self._memory
+            link = id(memory)
+            due_ns = max(due_ns, last_ns.get(link, -1) + 1)
+            last_ns[link] = due_ns
+            memory.last_due_ns = max(memory.last_due_ns, due_ns)
+        flight.put_off_ns += due_ns - flight.due_ns
+        flight.due_ns = due_ns
+        if self._holds:
+            flight.held_ns = due_ns - free_ns
 
     def retime(self, flights: Iterable[tuple[Flight, bool]], now_ns: int) -> None:
         """Give packets on their way, in the order of sending, the due times that the present clogs leave them.

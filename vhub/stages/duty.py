@@ -1,5 +1,8 @@
-"""Duty cycle: how much of the time a radio may send, by law; a bucket of airtime that fills up again.
+"""Duty cycle: how much of the time a radio may send, by law; a window of time that slides.
 
+In no window of the given length, wherever it begins, is the radio on air for more than its share; of what is on air at
+the window's edge the part within counts. Source: ETSI EN 300 220-1, where the duty cycle is the time on air in an
+observation interval over that interval's length, one hour unless said otherwise (recalled, unverified).
 It is for media on which a packet is sent once, for a time that is known before: LoRa, and a radio with a rate.
 """
 
@@ -7,22 +10,39 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.vhub.memory import Sending
+from foosim.vhub.memory import RadioState, Sending
 from foosim.vhub.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.stage import Stage
 
 DUTY_CYCLE: Final = "duty_cycle"
+RUNS_MAX: Final = 1_024
+"""As many transmissions are remembered one by one; of more, neighbours are taken together."""
+GRAINS: Final = 256
+"""What is taken together is no longer than this part of a window: so much later at most it stops counting."""
+
+
+def allowed_ns(share: float, window_ns: int) -> int:
+    """Return the airtime that a window leaves."""
+    return int(share * window_ns)
+
+
+def packets_an_hour(share: float, window_ns: int, airtime_ns: int) -> int:
+    """Return how many packets an hour a radio can send on and on: as many whole ones as each window has room for."""
+    return allowed_ns(share, window_ns) // airtime_ns * 3_600_000_000_000 // window_ns
 
 
 class Duty(Stage):
-    """Drops a packet for which its sender's bucket has too little; the medium takes out what is sent of the others."""
+    """Drops a packet for which the window that ends with it has too little left; the medium notes what is sent.
+
+    Transmissions of a radio come one after the other, so no window has more on air than the one that ends with one.
+    """
 
     def __init__(self, setup: LinkSetup) -> None:
         self._settings, self._shared, self._sender = setup.settings, setup.shared, setup.sender
-        self._share = setup.settings.duty_cycle
-        self._size_ns = int(self._share * setup.settings.duty_window_ns)
+        self._window_ns = setup.settings.duty_window_ns
+        self._allowed_ns = allowed_ns(setup.settings.duty_cycle, self._window_ns)
         self._broadcasts = setup.sends_once
 
     @classmethod
@@ -37,14 +57,12 @@ class Duty(Stage):
             if shared is not None:
                 flight.decided_by = shared.decided_by
                 return DUTY_CYCLE if shared.cause == DUTY_CYCLE else ""
-        if sender.tokens_ns < 0:
-            sender.tokens_ns = self._size_ns
-        filled_ns = int((flight.sent_ns - sender.tokens_at_ns) * self._share)
-        sender.tokens_ns = min(self._size_ns, sender.tokens_ns + filled_ns)
-        sender.tokens_at_ns = flight.sent_ns
+        _forget(sender, flight.sent_ns - self._window_ns)
         airtime_ns = self.airtime_ns(len(flight.payload), flight.published)
-        if airtime_ns > sender.tokens_ns:
-            flight.decided_by = (sender.tokens_ns,)
+        end_ns = max(flight.sent_ns + flight.phase_ns, sender.free_ns) + airtime_ns
+        left_ns = max(0, self._allowed_ns - _sent_since(sender, end_ns - self._window_ns))
+        if airtime_ns > left_ns:
+            flight.decided_by = (left_ns,)
             if broadcast:
                 sender.last = Sending(flight.sequence, flight.copy, DUTY_CYCLE, decided_by=flight.decided_by)
             return DUTY_CYCLE
@@ -58,3 +76,39 @@ class Duty(Stage):
             return lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
         rate_bps = settings.rate_bps
         return 0 if rate_bps is None else serialisation_ns(size + settings.overhead_bytes, rate_bps)
+
+
+def note_sent(sender: RadioState, start_ns: int, end_ns: int, window_ns: int) -> None:
+    """Remember a transmission of a radio, behind all before it."""
+    runs = sender.sent
+    runs.append((start_ns, end_ns, end_ns - start_ns))
+    sender.sent_ns += end_ns - start_ns
+    if len(runs) < RUNS_MAX or len(runs) % (RUNS_MAX // 2):
+        return
+    together: list[tuple[int, int, int]] = []
+    for run in runs:
+        if together and run[1] - together[-1][0] <= window_ns // GRAINS:
+            start_ns, _, airtime_ns = together[-1]
+            together[-1] = start_ns, run[1], airtime_ns + run[2]
+        else:
+            together.append(run)
+    runs[:] = together
+
+
+def _forget(sender: RadioState, before_ns: int) -> None:
+    """Forget what was over before a time."""
+    runs, over = sender.sent, 0
+    while over < len(runs) and runs[over][1] <= before_ns:
+        sender.sent_ns -= runs[over][2]
+        over += 1
+    del runs[:over]
+
+
+def _sent_since(sender: RadioState, since_ns: int) -> int:
+    """Return the airtime since a time; of several transmissions that were taken together the most that can be so."""
+    found_ns = sender.sent_ns
+    for start_ns, end_ns, airtime_ns in sender.sent:
+        if start_ns >= since_ns:
+            break
+        found_ns -= airtime_ns - min(airtime_ns, max(0, end_ns - since_ns))
+    return found_ns

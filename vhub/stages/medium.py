@@ -1,8 +1,8 @@
 """The medium: when a packet gets its turn, how long it takes, and what happens on the way, medium by medium.
 
-A wire serialises. On Wi-Fi a station waits for those that it hears, contends with them, and repeats what is not
-acknowledged: others appear as delay to unicasts, and as loss to broadcasts, which are sent once. IEEE 802.15.4 looks
-before it sends. LoRa sends at once. What is out of range is on air all the same.
+A wire serialises. On Wi-Fi a station freezes its backoff while those that it hears send, contends with them, and
+repeats what is not acknowledged: others appear as delay to unicasts, and as loss to broadcasts, which are sent once.
+IEEE 802.15.4 looks before it sends. LoRa sends at once. What is out of range is on air all the same.
 Neighbours: `queue` (what waits before), `air` (who is on air), `radio` (the formulas), `channel` (what gets through).
 """
 
@@ -40,7 +40,9 @@ from foosim.vhub.radio.timings import (
     with_category,
 )
 from foosim.vhub.setup import BLOCK_SHIFT, LinkSetup
+from foosim.vhub.stages.duty import note_sent
 from foosim.vhub.stages.stage import Stage
+from foosim.vhub.turns import Contest
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
@@ -116,7 +118,7 @@ class OnAir(Stage):
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
         self._once, self._factor = setup.sends_once, setup.settings.spreading_factor
-        self._is_limited = setup.settings.duty_cycle < 1.0
+        self._window_ns = setup.settings.duty_window_ns if setup.settings.duty_cycle < 1.0 else 0
 
     def at_sending(self, flight: Flight) -> str:
         cause = self._budget.measure(flight)
@@ -155,6 +157,7 @@ class OnAir(Stage):
         start_ns, flight.contenders = self.turn(ready_ns)
         access, air_ns = self.access(flight, broadcast, UNIT if cause else None)
         delay_ns, outcome = access.delay_ns, access.outcome
+        start_ns = self.after_backoff(start_ns, access)
         end_ns, until_ns = start_ns + delay_ns, start_ns + access.occupancy_ns
         flight.airtime_ns = airtime_ns = air_ns if air_ns < delay_ns else delay_ns  # never on air before its turn
         flight.air_start_ns, flight.air_end_ns = end_ns - airtime_ns, end_ns
@@ -167,15 +170,25 @@ class OnAir(Stage):
         sender.free_ns = until_ns
         settings = self._shared if broadcast else self._settings
         sender.waiting.append((until_ns, len(flight.payload) + settings.overhead_bytes))
-        if self._is_limited:
-            sender.tokens_ns = max(0, sender.tokens_ns - access.airtime_ns)
+        if self._window_ns:
+            note_sent(sender, end_ns - airtime_ns, end_ns, self._window_ns)
         of = self._budget.propagation
         what = source, flight.sequence, flight.copy, end_ns - airtime_ns, end_ns, until_ns
-        air.register(Transmission(*what, of.place(source).at, of.power_cdbm, self._factor))
+        known = Transmission(*what, of.place(source).at, of.power_cdbm, self._factor)
+        if start_ns > flight.sent_ns:
+            self.expect(known, ready_ns, start_ns)
+        air.register(known)
 
     # --- what media differ in ----------------------------------------------------------------------------------------
 
     is_acknowledged = False
+
+    def after_backoff(self, start_ns: int, access: Access) -> int:
+        """Return when the sender's turn begins, from when it could if it had not to back off."""
+        return start_ns
+
+    def expect(self, known: Transmission, ready_ns: int, turn_ns: int) -> None:
+        """Note of a turn that has not begun what has to be known where others may put it off."""
 
     def turn(self, ready_ns: int) -> tuple[int, int]:
         """Return when the sender gets its turn, and how many contend."""
@@ -257,12 +270,26 @@ class WiFi(OnAir):
 
     def __init__(self, setup: LinkSetup) -> None:
         super().__init__(setup)
+        self._contest: Contest | None = None
         modes, self._timing = wifi_modes(setup.settings), wifi_timing(setup.settings)
         fixed = mode_of(modes, setup.settings.fixed_rate_bps) if setup.settings.rates == "fixed" else None
         self._frames = _wifi_frames(modes, self._timing, fixed)
 
     def turn(self, ready_ns: int) -> tuple[int, int]:
-        return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
+        contest = self._contest = self._air.contest(self._setup.source, ready_ns, self._budget.propagation)
+        return ready_ns, contest.contenders
+
+    def after_backoff(self, start_ns: int, access: Access) -> int:
+        contest, slot_ns = self._contest, self._timing.slot_ns
+        assert contest is not None, "who becomes ready meets others first"
+        turn_ns = contest.turn_ns(access.backoff_ns, slot_ns)
+        self._air.take_turn(contest, turn_ns, access.occupancy_ns, slot_ns)
+        return turn_ns
+
+    def expect(self, known: Transmission, ready_ns: int, turn_ns: int) -> None:
+        assert self._contest is not None
+        known.ready_ns, known.turn_ns = ready_ns, turn_ns
+        known.radio, known.hears = self._setup.radio, self._contest.hears
 
     def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
         """At the fixed rate; else a broadcast goes at the lowest, a unicast at the highest with few errors."""

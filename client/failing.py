@@ -1,0 +1,86 @@
+"""What is said of a player whose own code raised: who, when, what, and where in the user's own files.
+
+Neighbours: `player` calls that code, `main` and the rehearsal end the process.
+"""
+
+from __future__ import annotations
+
+import site
+import sysconfig
+import traceback
+from contextlib import suppress
+from functools import cache
+from types import FrameType
+from typing import Final
+
+from foosim.client.core import ClientCore
+from foosim.client.errors import PlayerError
+
+OURS: Final = "foosim"
+TEXT_LENGTH_MAX: Final = 500
+"""A longer text of an error is cut: its whole is in the traceback."""
+
+
+class PlayerFailed(PlayerError):
+    """A player's own code raised. `trace` is the whole traceback, for the log."""
+
+    def __init__(self, what: str, trace: str) -> None:
+        super().__init__(what)
+        self.trace = trace
+
+
+class Unanswered(BaseException):
+    """Raised in a player that does not return, to end it; the text says how long it was waited for."""
+
+
+def failed(where: str, error: BaseException, module: str) -> PlayerFailed:
+    """Return what ends a player of the class of `module`; `where` says who failed and when."""
+    return PlayerFailed(f"{where}: {describe(error)}{_place(error, module)}", _trace_of(error))
+
+
+def tell_failure(core: ClientCore, error: PlayerError | Unanswered) -> None:
+    """Have a player's core say why its process ends."""
+    trace = error.trace if isinstance(error, PlayerFailed) else ""
+    core.fail(str(error), _trace_of(error) if isinstance(error, Unanswered) else trace)
+
+
+def _trace_of(error: BaseException) -> str:
+    return "".join(traceback.format_exception(error)).rstrip()
+
+
+def describe(error: BaseException) -> str:
+    """An error of somebody's own code on one line, bounded."""
+    kind, text = type(error).__name__, "its text cannot be made"
+    with suppress(Exception):  # the user's own code, too
+        text = " ".join(str(error).split())
+    text = text if len(text) <= TEXT_LENGTH_MAX else f"{text[: TEXT_LENGTH_MAX - 3]}..."
+    return f"{kind}: {text}" if text else kind
+
+
+def _place(error: BaseException, module: str) -> str:
+    """Return ` (file:line: code)` of the last frame in the user's own files; of the last one at all where none is."""
+    frames = [(frame, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    found = next((at for at in reversed(frames) if _is_own(at[0], module)), frames[-1] if frames else None)
+    if found is None:
+        return ""
+    (summary,) = traceback.StackSummary.extract([found])
+    code = f": {summary.line}" if summary.line else ""
+    return f" ({summary.filename}:{summary.lineno}{code})"
+
+
+def _is_own(frame: FrameType, module: str) -> bool:
+    """Whether a frame is in the package of the player's class, or in no library and not in foosim."""
+    name = str(frame.f_globals.get("__name__", ""))
+    package = name.partition(".")[0]
+    if package == module.partition(".")[0]:
+        return True
+    file = frame.f_code.co_filename
+    return package != OURS and not file.startswith(("<", *_libraries()))
+
+
+@cache
+def _libraries() -> tuple[str, ...]:
+    """Where Python's own modules and installed ones are."""
+    paths = sysconfig.get_paths()
+    own = {paths[key] for key in ("stdlib", "platstdlib", "purelib", "platlib")}
+    return tuple(f"{folder}/" for folder in sorted({*own, *site.getsitepackages(), site.getusersitepackages()}))

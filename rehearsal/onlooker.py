@@ -1,0 +1,77 @@
+"""What one sees who looks on a rehearsal: a line of progress each second, and a player that does not return.
+
+A rehearsal is one process on virtual time, so who has the turn is who is waited for, and no deadline of its cores can
+pass meanwhile. Pure: the caller tells what time it is. Neighbours: `attendant` looks, from a thread of its own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Final
+
+from foosim.protocol.frame import Frame
+from foosim.protocol.names import TEAMS
+from foosim.rehearsal.settings import AtWork
+from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.display import score_text
+
+LINE_S: Final = 1.0
+LOOK_S: Final = 0.05
+"""How often it is looked."""
+STOOD_S: Final = 4 * LOOK_S
+"""A longer time between two looks is one in which this process was not given the processor: it counts for no player."""
+
+
+def reached(core: SupervisorCore) -> str:
+    """How far a run is: `3.20 s of 20.00 s`."""
+    tick_s = core.deployment.tick_ns / 1e9
+    last = core.settings.last_tick
+    return f"{(core.frame.tick - core.first_tick) * tick_s:.2f} s of {(last - core.first_tick) * tick_s:.2f} s"
+
+
+class Onlooker:
+    """Looks on one rehearsal."""
+
+    def __init__(self, core: SupervisorCore, now_s: float) -> None:
+        self._core = core
+        self._line_s = self._looked_s = now_s
+        self._line_tick = core.frame.tick
+        self._turns: Counter[str] = Counter()
+        """Whose turn it was how often when it was looked, since the last line."""
+        self._turn = -1
+        self._in_turn_s = 0.0
+
+    def look(self, now_s: float, at_work: AtWork) -> str:
+        """Note who is at work; return a line when it is time for one, else an empty string."""
+        elapsed_s, self._looked_s = now_s - self._looked_s, now_s
+        is_same = at_work.acts and at_work.turns == self._turn
+        self._in_turn_s = self._in_turn_s + min(elapsed_s, STOOD_S) if is_same else 0.0
+        self._turn = at_work.turns
+        self._turns[at_work.name] += 1
+        if now_s < self._line_s + LINE_S:
+            return ""
+        frame = self._core.frame
+        line = self._line(now_s - self._line_s, frame)
+        self._line_s, self._line_tick = now_s, frame.tick
+        self._turns.clear()
+        return line
+
+    def overdue(self, at_work: AtWork) -> str:
+        """Return what is said of a player that has not returned within its deadline; empty when none is overdue."""
+        deadlines = self._core.deployment.deadlines
+        is_first = at_work.tick < 0
+        allowed_ns = deadlines.start_ns if is_first else deadlines.lockstep_fast_ns
+        if not at_work.acts or at_work.turns != self._turn or self._in_turn_s < allowed_ns / 1e9:
+            return ""
+        what = "has not joined" if is_first else f"has not answered tick {at_work.tick}"
+        which = "start" if is_first else "lockstep_fast"
+        return f"{at_work.name} {what} for {allowed_ns / 1e9:g} s (deadlines.{which})"
+
+    def _line(self, elapsed_s: float, frame: Frame) -> str:
+        speed = (frame.tick - self._line_tick) * self._core.deployment.tick_ns / 1e9 / elapsed_s
+        parts = [f"{reached(self._core)} simulated, {speed:.2f}x"]
+        if frame.score is not None:
+            parts.append(score_text({"score": dict(zip(TEAMS, frame.score, strict=True))}))
+        name, count = max(sorted(self._turns.items()), key=lambda item: item[1])
+        parts.append(f"waits for {name or 'start'} ({100 * count / self._turns.total():.0f} %)")
+        return ", ".join(parts)

@@ -1,0 +1,55 @@
+"""Who asks the supervisor of a rehearsal for something, once or again until it is answered.
+
+Neighbours: `system` brings the answers, `bus` carries both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from foosim.protocol import channels
+from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.messages import Answer, Request
+from foosim.rehearsal.bus import Bus
+
+OPERATOR: Final = "operator"
+
+
+class People:
+    """What was asked for. `later(after_ns, action)` is for asking again."""
+
+    def __init__(self, bus: Bus, later: Callable[[int, Callable[[], object]], None]) -> None:
+        self.answers: dict[str, Answer] = {}
+        self.asked: dict[str, str] = {}
+        """The verb of what was requested and not given up, by id."""
+        self._bus = bus
+        self._later = later
+        self._requests = 0
+        bus.subscribe(OPERATOR, channels.OPERATOR_READS)
+
+    def request(self, verb: str, again_ns: int, arguments: dict[str, Any]) -> str:
+        """Ask for something, every `again_ns` until it is answered (0: once); return the request's id."""
+        self._requests += 1
+        identity = f"request-{self._requests}"
+        self.asked[identity] = verb
+        payload = encode(Request(OPERATOR, identity, verb, encode_json(arguments)))
+        self._ask(identity, payload, again_ns)
+        return identity
+
+    def give_up(self, verb: str) -> None:
+        """Ask no more for what is not answered yet."""
+        for identity in [known for known, what in self.asked.items() if what == verb and known not in self.answers]:
+            self.asked.pop(identity)
+
+    def answered(self, payload: bytes) -> None:
+        """Take an answer."""
+        answer = decode(Answer, payload)
+        self.answers[answer.id] = answer
+
+    def _ask(self, identity: str, payload: bytes, again_ns: int) -> None:
+        if identity in self.answers or identity not in self.asked:
+            return
+        self._bus.put(OPERATOR, channels.REQUEST, OPERATOR, payload, self._bus.now_ns)
+        if again_ns:
+            self._later(again_ns, lambda: self._ask(identity, payload, again_ns))

@@ -1,0 +1,37 @@
+"""What people asked of a run's world, in words: balls and robots that were added, removed, pushed, moved.
+
+Neighbours: `report` lists it among the events.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from foosim.vhub.rows import EditRow, EpochRow
+
+
+def edit_text(edit: EditRow) -> str:
+    """Return what an edit of the world does, empty where nobody asked for it."""
+    if edit.kind == "push":
+        return f"push {edit.name} by {_vector(edit.impulse)} N s"
+    if edit.kind == "add":
+        return f"add {edit.name} ({edit.model}) at {_vector(edit.position)} m, with {_vector(edit.velocity)} m/s"
+    return f"remove {edit.name}" if edit.kind == "remove" else ""
+
+
+def _vector(numbers: Sequence[float]) -> str:
+    return ", ".join(f"{number:g}" for number in numbers)
+
+
+def moves(epochs: Sequence[EpochRow]) -> Iterator[tuple[int, str]]:
+    """Yield (tick, text) of each robot that was moved from one node to another while both took part.
+
+    What another node adopts when its own is lost, and what goes back, is told by the recoveries.
+    """
+    for before, epoch in pairwise(epochs):
+        owned = {owner.robot: owner.node for owner in before.owners}
+        for owner in epoch.owners:
+            node = owned.get(owner.robot, owner.node)
+            if node != owner.node and node in epoch.roster and owner.node in before.roster:
+                yield epoch.tick, f"move {owner.robot} from {node} to {owner.node}"

@@ -1,0 +1,57 @@
+"""Players whose process was lost: the vHub waits for them or goes on without them, and the account says so.
+
+The vHub tells in its heartbeats who is away, and what is over of it, numbered. Neighbours: `vhub.absences` tells,
+`recovery` has the account, `absence` is the same of the vHub itself.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from foosim.supervisor.account import Recovered
+from foosim.supervisor.roster import Process
+
+if TYPE_CHECKING:
+    from foosim.supervisor.core import SupervisorCore
+
+
+class Departures:
+    """Takes what the vHub tells of players that were away."""
+
+    def __init__(self, core: SupervisorCore) -> None:
+        self._core = core
+        self._boot = ""
+        """The start of the vHub that has told last."""
+        self._heard = 0
+        """The number of what it told last."""
+        self._known: set[tuple[str, str, str, int]] = set()
+        """What the account had when this supervisor heard of the vHub first: a supervisor before it has noted that."""
+        self._gaps_ns: dict[str, int] = {}
+        """Of those that are away: the longest time between two commits since."""
+        self._open: list[tuple[Recovered, int]] = []
+
+    def hear(self, hub: Process) -> None:
+        """Note what is new in a report of the vHub; what the journal of a supervisor before has is not."""
+        core, told = self._core, hub.report.get("absences")
+        if told is None or not core.is_open or core.end is not None:
+            return
+        if told["boot"] != hub.boot:
+            return  # it comes late, of a vHub before this one
+        if not self._boot:
+            self._known = {(entry.what, entry.name, entry.reason, entry.tick) for entry in core.recovery.recovered}
+        if hub.boot != self._boot:
+            self._boot, self._heard = hub.boot, 0
+        gaps_ns, self._gaps_ns = self._gaps_ns, {name: self._gaps_ns.get(name, 0) for name in told["away"]}
+        for number, what, name, reason, tick in told["over"]:
+            if number > self._heard and (what, name, reason, tick) not in self._known:
+                entry = core.recovery.note(what, name, reason, core.epoch, tick)
+                self._open.append((entry, gaps_ns.get(name, 0)))
+            self._heard = max(self._heard, number)
+
+    def committed(self, before_ns: int, now_ns: int) -> None:
+        """A frame is committed, the one before it was at `before_ns`."""
+        for name, gap_ns in self._gaps_ns.items():
+            self._gaps_ns[name] = max(gap_ns, now_ns - before_ns)
+        for entry, gap_ns in self._open:
+            entry.outage_ns = max(gap_ns, now_ns - before_ns)
+        self._open.clear()

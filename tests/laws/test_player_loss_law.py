@@ -1,0 +1,127 @@
+"""Players whose process is lost and started again: what follows from it is in journals and capture, to the last bit.
+
+In fast the run waits for the new process, which answers the Go that is open. In realtime it goes on without the player
+after `client_back`: it leaves at the tick whose Done it owes, and comes back at a later one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from foosim.protocol.codec import decode_any
+from foosim.protocol.units import Pace
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings, System
+from foosim.rehearsal.verify import verify_capture
+from foosim.rehearsal.whatif import what_if
+from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.records import HubRecord, InputsRecord, TickRecord, fold
+from foosim.vhub.rows import CLIENTS, ClientRow
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+RED: Final = "player-red"
+SETS: Final = ("engine=pure", "substeps=1", "table.rules.kickoff_delay=20 ms")
+SOON: Final = ("deadlines.client_back=200 ms", "deadlines.lockstep_realtime=100 ms", "deadlines.tick_lost=5 s")
+MS: Final = 1_000_000
+TICKS: Final = 400
+
+
+class Run:
+    """A rehearsal in which a player is killed at a tick, and started again after some virtual time."""
+
+    def __init__(
+        self, path: Path, pace: str, back_ms: int, *sets: str, also: Callable[[System], None] | None = None
+    ) -> None:
+        self.records: list[bytes] = []
+        self.path = path
+
+        def prepare(system: System) -> None:
+            self.system = system
+
+            def kill() -> None:
+                system.kill(RED)
+                if back_ms:
+                    system.later(back_ms * MS, lambda: system.start(RED))
+
+            system.at_tick(100, kill)
+            if also is not None:
+                also(system)
+
+        settings = Settings(on_journal=lambda name, record: self.records.append(record) if name == "vhub" else None)
+        kind = Pace("fast") if pace == "fast" else Pace("realtime", Fraction(1))
+        told: dict[str, Any] = {"prepare": prepare, "capture": path, "pace": kind}
+        self.json = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, (*SETS, *sets), settings, **told).json
+
+    def comings(self) -> list[tuple[int, str]]:
+        rows = [row for row in open_capture(self.path).rows(CLIENTS) if isinstance(row, ClientRow)]
+        return [(row.tick, row.event) for row in rows if row.client == RED]
+
+    def check(self) -> None:
+        """The run is whole: it verifies, its journal gives its state, and its network judged again is the same."""
+        assert (self.json["reason"], self.json["ticks"]) == ("done", TICKS)
+        assert verify_capture(self.path, 3).equal
+        state = self.system.hub.state
+        assert state is not None
+        *_, (folded, _) = fold(state.deployment, self.records)
+        assert folded.snapshot() == state.snapshot()
+        assert what_if(open_capture(self.path)).changed == 0
+        assert state.packets.refused == 0, state.refusals
+
+
+def test_in_fast_the_run_waits_and_the_new_process_answers_the_open_go(tmp_path: Path) -> None:
+    run = Run(tmp_path / "run.mcap", "fast", 5_000)
+    run.check()
+    assert run.comings() == [(0, "joins")], "to the run it was never away"
+    (entry,) = run.json["recoveries"]
+    assert (entry["what"], entry["name"], entry["reason"]) == ("player", RED, "its connection closed")
+    assert entry["tick"] == 100 and entry["outage_ms"] == pytest.approx(5_000, rel=0.01)
+    statistics = run.system.players[RED].core.statistics()
+    assert statistics.missing == 0 and statistics.answered == (TICKS - 100) // 5, "with new memory"
+
+
+def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_later_one(tmp_path: Path) -> None:
+    run = Run(tmp_path / "run.mcap", "realtime", 500, *SOON)
+    run.check()
+    (joined, left, back) = run.comings()
+    assert joined == (0, "joins") and left[1] == "leaves_owing" and back[1] == "joins"
+    assert left[0] % 5 == back[0] % 5 == 0 and 100 <= left[0] <= 105 and left[0] < back[0]
+    lost, came = run.json["recoveries"]
+    assert lost["reason"] == "its connection closed; the run goes on without it"
+    assert (lost["what"], lost["tick"], came["what"], came["tick"]) == ("player", left[0], "return", back[0])
+    found = [decode_any(HubRecord, raw) for raw in run.records]
+    ticks = {record.tick: record for record in found if isinstance(record, TickRecord)}
+    assert ticks[left[0]].owing == [RED]
+    meanwhile = [ticks[tick] for tick in range(left[0], back[0])]
+    assert not any(dict(record.admitted).get(RED) for record in meanwhile), "it is closed without its packets"
+    joins = [record for record in found if isinstance(record, InputsRecord) and record.tick == back[0]]
+    assert [joining.name for record in joins for joining in record.joins] == [RED]
+
+
+def test_a_vhub_that_dies_before_the_record_gives_the_player_its_time_again(tmp_path: Path) -> None:
+    """And one that dies behind it goes on without the player, whose return is as it would have been."""
+    for ending in ("torn", "unsaid"):
+        def also(system: System, ending: Any = ending) -> None:
+            system.at_tick(100, lambda: system.later(190 * MS, lambda: system.kill_hub(ending, 50 * MS)))
+
+        run = Run(tmp_path / f"{ending}.mcap", "realtime", 500, *SOON, also=also)
+        run.check()
+        (_, left, back) = run.comings()
+        assert (left[1], back[1]) == ("leaves_owing", "joins") and left[0] < back[0]
+
+
+@pytest.mark.parametrize(
+    ("sets", "reason"),
+    [
+        (("players.player-red.restart=false", "deadlines.client_back=200 ms"), f"lost {RED}: its connection closed"),
+        (("deadlines.start=3 s", "deadlines.client_back=200 ms"),
+         f"lost {RED}: it was not started again within 3 s (deadlines.start)"),
+    ],
+)  # fmt: skip
+def test_one_that_is_not_started_again_ends_the_run(sets: tuple[str, ...], reason: str, tmp_path: Path) -> None:
+    run = Run(tmp_path / "run.mcap", "fast", 0, *sets)
+    assert run.json["failed"] and run.json["reason"] == reason

@@ -1,0 +1,155 @@
+"""What a rehearsal shows while it runs, a player that does not return, and a Ctrl-C."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import signal
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+import pytest
+from typer.testing import CliRunner
+
+from foosim.client.player import Commands, Samples
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.units import Pace
+from foosim.rehearsal.attendant import INTERRUPTS_MAX
+from foosim.rehearsal.onlooker import LOOK_S, STOOD_S, Onlooker
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.rehearse_command import app
+from foosim.rehearsal.replay_command import app as replay_app
+from foosim.rehearsal.settings import AtWork
+from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.plan import RunSettings
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+HANGS_AT: Final = 30
+SETS: Final = ("engine=pure", "substeps=1", "players.player-red.class=tests.rehearsal.test_onlooker:Hangs")
+
+
+def looks_on() -> tuple[Onlooker, SupervisorCore]:
+    run = RunSettings("run", TABLE.name, TABLE.read_text(), Pace("fast"), 10_000)
+    core = SupervisorCore(run, bytes(32), 0)
+    return Onlooker(core, 0.0), core
+
+
+def test_a_line_each_second_tells_time_speed_score_and_who_is_waited_for() -> None:
+    onlooker, core = looks_on()
+    lines = []
+    for look in range(1, 101):  # five seconds
+        core.frame.tick = 10 * look
+        name = "n1" if look % 4 else "player-red"
+        lines.append(onlooker.look(look * LOOK_S, AtWork(name, turns=look)))
+    assert [at for at, line in enumerate(lines, 1) if line] == [20, 40, 60, 80, 100]
+    assert lines[39] == "0.80 s of 20.00 s simulated, 0.40x, red 0 : 0 blue, waits for n1 (75 %)"
+
+
+def test_a_player_is_overdue_by_the_time_of_one_turn_in_which_this_process_ran() -> None:
+    onlooker, _ = looks_on()
+    now_s, acts = 0.0, AtWork("player-red", 105, acts=True, turns=7)
+
+    def hangs(seconds: float, every_s: float = LOOK_S) -> str:
+        nonlocal now_s
+        for _ in range(round(seconds / every_s)):
+            now_s += every_s
+            onlooker.look(now_s, acts)
+        return onlooker.overdue(acts)
+
+    assert hangs(9.9) == ""
+    assert hangs(0.2) == "player-red has not answered tick 105 for 10 s (deadlines.lockstep_fast)"
+    acts.turns += 1
+    assert onlooker.overdue(acts) == "" and hangs(9.9) == "", "another turn has its own time"
+    acts.turns += 1
+    assert hangs(600.0, every_s=60.0) == "", "this process was stopped: ten looks at it"
+    assert hangs(10.0 - 9 * STOOD_S - LOOK_S) == "" and hangs(2 * LOOK_S) != ""
+    acts.acts = False
+    assert onlooker.overdue(acts) == "", "a node takes as long as it takes"
+    acts.turns, acts.acts, acts.tick = 20, True, -1
+    assert hangs(59.9) == ""
+    assert hangs(0.2) == "player-red has not joined for 60 s (deadlines.start)"
+
+
+class Hangs:
+    """A player that does not return from one tick."""
+
+    how: ClassVar[Any]
+
+    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+        pass
+
+    def act(self, tick: int, samples: Samples) -> Commands:
+        if tick == HANGS_AT:
+            Hangs.how()
+        return {}
+
+
+def rehearsed(*options: str) -> Any:
+    return CliRunner().invoke(app, [str(TABLE), *options, *(word for setting in SETS for word in ("--set", setting))])
+
+
+def loops() -> None:
+    """A loop in Python."""
+    while True:
+        try:
+            raise KeyError("never")
+        except KeyError:
+            continue
+
+
+@pytest.mark.parametrize("how", [loops, threading.Event().wait], ids=["loops", "waits"])
+def test_a_player_that_hangs_ends_the_run_in_order(how: Any, tmp_path: Path) -> None:
+    Hangs.how, capture = how, tmp_path / "run.mcap"
+    ran = rehearsed("--for", "0.2 s", "--json", "--capture", str(capture), "--set", "deadlines.lockstep_fast=0.2 s")
+    reason = f"player-red has not answered tick {HANGS_AT} for 0.2 s (deadlines.lockstep_fast)"
+    result = json.loads(ran.stdout)
+    assert (ran.exit_code, result["reason"], result["ticks"]) == (1, reason, HANGS_AT + 1)
+    assert "in act" in ran.stderr and "Hangs.how()" in ran.stderr, "the stack where it hangs"
+    assert f"reason: {reason}" in CliRunner().invoke(replay_app, ["info", str(capture)]).stdout
+
+
+def test_one_that_cannot_be_interrupted_is_given_up(capfd: pytest.CaptureFixture[str]) -> None:
+    """A mutex that is locked twice is waited for in C, whatever signals come."""
+    library, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(64)
+
+    def locks_twice() -> None:
+        library.pthread_mutex_lock(mutex)
+        library.pthread_mutex_lock(mutex)
+
+    given_up: list[dict[str, Any]] = []
+
+    def stuck(result: dict[str, Any]) -> None:
+        given_up.append(result)
+        library.pthread_mutex_unlock(mutex)
+
+    Hangs.how = locks_twice
+    sets = (*SETS, "deadlines.lockstep_fast=0.1 s")
+    run = rehearse(TABLE.read_text(), TABLE.name, 60, 1, sets, on_stuck=stuck).json
+    (result,) = given_up
+    reason = f"player-red has not answered tick {HANGS_AT} for 0.1 s (deadlines.lockstep_fast)"
+    assert (result["reason"], result["failed"], result["ticks"]) == (reason, True, HANGS_AT + 1)
+    assert "locks_twice" in capfd.readouterr().err, f"after {INTERRUPTS_MAX} interrupts its stack is shown"
+    assert run["reason"] == reason, "by the interrupts that waited for it"
+
+
+def test_a_ctrl_c_ends_in_order_and_the_last_line_says_how_far_it_came(tmp_path: Path) -> None:
+    Hangs.how, capture = lambda: signal.raise_signal(signal.SIGINT), tmp_path / "run.mcap"
+    ran = rehearsed("--for", "60 s", "--json", "--capture", str(capture))
+    result = json.loads(ran.stdout)
+    assert (ran.exit_code, result["reason"]) == (0, "stopped") and HANGS_AT < result["ticks"] < HANGS_AT + 10
+    assert "a second Ctrl-C ends it at once" in ran.stderr
+    last = f"interrupted at {result['ticks'] * 0.002:.2f} s of 60.00 s, capture {capture}"
+    assert ran.stderr.splitlines()[-1] == last
+
+
+def test_a_second_ctrl_c_ends_it_at_once(tmp_path: Path) -> None:
+    def twice() -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    Hangs.how, capture = twice, tmp_path / "run.mcap"
+    ran = rehearsed("--for", "60 s", "--capture", str(capture))
+    assert ran.exit_code == 130 or isinstance(ran.exception, KeyboardInterrupt) or "Aborted" in ran.stderr
+    assert f"interrupted at 0.06 s of 60.00 s, capture {capture} (unfinished)" in ran.stderr

@@ -1,0 +1,136 @@
+"""Journals that are damaged: nobody goes on over them, and what is said has the place and the command that helps."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from foosim.protocol import channels
+from foosim.protocol import journal as journal_module
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import Refused
+from foosim.protocol.journal import Journal, journal_files, read_records
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings
+from foosim.supervisor.journal_check import check_journals
+from foosim.supervisor.main import serve
+from foosim.supervisor.plan import RunOptions, launch_of, make_plan, plan_again
+from foosim.supervisor.run_folder import LAUNCHER_FILE, RunFolder, create_run
+from foosim.vhub.branching import read_branch
+from foosim.vhub.capture_reader import open_capture
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TICKS: Final = 60
+SETS: Final = ("engine=pure", "players={}")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, dict[str, list[bytes]]]:
+    """A capture without its end, and the records of both journals."""
+    records: dict[str, list[bytes]] = {}
+    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    settings = Settings(on_journal=lambda process, record: records.setdefault(process, []).append(record))
+    rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, [*SETS, "capture.frames_every=4 ticks"], settings, capture=path)
+    return path.read_bytes()[:-2000], records
+
+
+@pytest.fixture
+def folder(
+    run: tuple[bytes, dict[str, list[bytes]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> RunFolder:
+    """The folder of a run whose launcher was killed with everything."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    folder = create_run("table", "rehearsal")
+    capture = tmp_path / "a run.mcap"
+    capture.write_bytes(run[0])
+    folder.write_launch(launch_of(RunOptions(TABLE, sets=SETS), capture))
+    (folder.path / LAUNCHER_FILE).touch()
+    for stem, records in run[1].items():
+        with Journal(folder.journals, stem) as journal:
+            for record in records:
+                journal.append(record)
+    return folder
+
+
+def damage(folder: RunFolder, stem: str, record: int) -> str:
+    """Flip a bit in the midst of a record; return where it stands."""
+    (path,) = journal_files(folder.journals, stem)
+    records = read_records(path)
+    starts = [records.valid_bytes, *(records.valid_bytes for _ in records)]
+    content = bytearray(path.read_bytes())
+    content[(starts[record] + starts[record + 1]) // 2] ^= 1
+    path.write_bytes(content)
+    return f"{path}: byte {starts[record]}: record {record + 1} is damaged, {len(starts) - record - 2} whole records"
+
+
+def refused(folder: RunFolder) -> str:
+    with pytest.raises(Refused) as caught:
+        plan_again(folder)
+    assert caught.value.exit_code == 3
+    return str(caught.value)
+
+
+def test_a_whole_journal_is_gone_on_from(folder: RunFolder) -> None:
+    plan, capture = plan_again(folder)
+    assert capture is not None and plan.options.sets == SETS
+
+
+@pytest.mark.parametrize("stem", [channels.SUPERVISOR, channels.VHUB])
+def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
+    folder: RunFolder, stem: str, tmp_path: Path
+) -> None:
+    where = damage(folder, stem, 30)
+    text = refused(folder)
+    assert text.startswith(f"run rehearsal cannot go on: {where} behind it; tick "), text
+    told = re.search(r"; tick (\d+) is the last before it\. A new run begins with the last captured frame: (.*)", text)
+    assert told is not None and 10 < int(told[1]) <= 30
+    words = shlex.split(told[2])
+    assert words[:3] == ["foosim-supervisor", "up", str(TABLE)] and words[-2] == "--from"
+    assert words[3:7] == ["--set", SETS[0], "--set", SETS[1]]
+    branch = read_branch(words[-1], load_deployment(TABLE.read_text(), TABLE.name))
+    assert branch.start.origin.tick == open_capture(tmp_path / "a run.mcap").frame_ticks[-1] > 40
+    assert make_plan(RunOptions(TABLE, sets=SETS, branch=words[-1])).start == branch.start
+
+
+def test_a_supervisor_that_is_started_again_does_not_go_on_over_it(folder: RunFolder) -> None:
+    where = damage(folder, channels.SUPERVISOR, 30)
+    with pytest.raises(Refused, match=re.escape(where)):
+        serve(make_plan(RunOptions(TABLE, sets=SETS)), folder)
+    assert len(journal_files(folder.journals, channels.SUPERVISOR)) == 1, "nothing was begun"
+
+
+def test_a_journal_whose_only_record_is_damaged_is_said_to_have_none(folder: RunFolder) -> None:
+    (path,) = journal_files(folder.journals, channels.SUPERVISOR)
+    records = read_records(path)
+    next(records)
+    path.write_bytes(path.read_bytes()[: records.valid_bytes - 1])
+    assert refused(folder).startswith(f"run rehearsal cannot go on: {path}: its first record is damaged; foosim-")
+    with pytest.raises(Refused, match=r"no file of the journal of supervisor in .* has a whole record\. A new"):
+        check_journals(folder, RunOptions(TABLE))
+
+
+def test_what_helps_is_said_where_there_is_no_capture(folder: RunFolder, tmp_path: Path) -> None:
+    damage(folder, channels.SUPERVISOR, 30)
+    (tmp_path / "a run.mcap").write_bytes(b"nonsense")
+    assert "No new run can begin with its capture: " in refused(folder) and "no MCAP file" in refused(folder)
+    (tmp_path / "a run.mcap").unlink()
+    assert "a run.mcap: cannot be read, No such file" in refused(folder)
+    folder.write_launch(launch_of(RunOptions(TABLE, sets=SETS), None))
+    assert refused(folder).endswith("The run has no capture to begin a new one with")
+
+
+def test_a_torn_end_is_gone_on_from(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also a hole amid what was not synced, when the machine was started again."""
+    options = RunOptions(TABLE, sets=SETS)
+    for stem in (channels.SUPERVISOR, channels.VHUB):
+        (path,) = journal_files(folder.journals, stem)
+        path.write_bytes(path.read_bytes()[:-7] + bytes(4096))
+    check_journals(folder, options)
+    monkeypatch.setattr(journal_module, "machine_start", lambda: "another start")
+    for stem in (channels.SUPERVISOR, channels.VHUB):
+        damage(folder, stem, 50)
+    check_journals(folder, options)

@@ -1,0 +1,185 @@
+"""The result of a run, whoever is left to tell it: always of one shape, with the capture that is there."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Final
+
+import msgspec
+import pytest
+
+from foosim.protocol.actions import Journal as JournalAction
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.errors import Refused
+from foosim.protocol.journal import Journal, journal_files
+from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.cli import main
+from foosim.supervisor.main import _history as history_of
+from foosim.supervisor.outcome import plan_facts, result_without_supervisor, with_capture
+from foosim.supervisor.plan import RunOptions, launch_of, make_plan, plan_again
+from foosim.supervisor.run_folder import RunFolder, create_run
+from foosim.supervisor.status import UNFINISHED, status
+from foosim.vhub.capture_parts import FOOTER
+from tests.supervisor.conftest import Typed
+
+TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+TICKS: Final = 60
+
+
+class Run:
+    """A rehearsed run, its capture, and both journals, as processes leave them in a run's folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.capture = folder / "run.mcap"
+        settings = Settings(run="mine", keeps_journals=True)
+        systems: list[System] = []
+        sets = ["engine=pure"]
+        self.result = rehearse(
+            TABLE.read_text(), TABLE.name, TICKS, None, sets, settings, prepare=systems.append, capture=self.capture
+        ).json
+        self.system = systems[0]
+        self.cut = folder / "cut.mcap"
+        self.cut.write_bytes(self.capture.read_bytes()[: -FOOTER.size])
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return Run(tmp_path_factory.mktemp("outcome"))
+
+
+def test_a_result_without_a_supervisor_has_the_keys_of_any_other(run: Run) -> None:
+    plan = make_plan(RunOptions(TABLE))
+    blank = result_without_supervisor({"run": "mine", **plan_facts(plan.deployment)}, "lost supervisor: it is gone")
+    assert blank.keys() == run.result.keys()
+    assert (blank["world"], blank["ticks"], blank["failed"]) == ("table", None, True)
+    seen = result_without_supervisor(status(run.system.supervisor, 0), "lost supervisor: it is gone")
+    assert seen.keys() == blank.keys() and seen["ticks"] == TICKS and seen["digest"] == run.result["digest"]
+    assert (seen["reason"], seen["failed"]) == ("lost supervisor: it is gone", True)
+
+
+def test_a_capture_is_named_where_there_is_one_with_the_final_count_of_its_rows(run: Run) -> None:
+    told = result_without_supervisor({}, "lost supervisor")
+    assert with_capture(told, None)["capture"] is None
+    assert with_capture(told, run.capture.with_name("none.mcap"))["capture"] is None
+    found = with_capture(told, run.capture)
+    assert found["capture"] == str(run.capture) and found["recording"]["state"] == "on"
+    rows = found["recording"]["written"]
+    assert rows >= TICKS + run.result["packets"]["offered"] and found["recording"]["offered"] == rows
+    stale = {**told, "recording": {**found["recording"], "state": UNFINISHED, "written": 7, "offered": 9}}
+    cut = with_capture(stale, run.cut)["recording"]
+    assert (cut["state"], cut["written"], cut["offered"]) == (UNFINISHED, rows, rows)
+    closed = {**told, "recording": {"state": "on", "problem": "", "offered": 5, "written": 5, "refused": 0}}
+    assert with_capture(closed, run.capture)["recording"] == closed["recording"], "its writer has told it"
+
+
+# --- runs that cannot go on ------------------------------------------------------------------------------------------
+
+
+class Left:
+    """The folder of a run whose launcher was killed with everything else."""
+
+    def __init__(self, run: Run, capture: Path) -> None:
+        self.folder: RunFolder = create_run("table", "mine")
+        options = RunOptions(TABLE, duration="120 ms", sets=("engine=pure",))
+        self.folder.write_launch(launch_of(options, capture))
+        (self.folder.path / "launcher").touch()
+        with Journal(self.folder.journals, SUPERVISOR) as journal:
+            for record in run.system.journal:
+                journal.append(record)
+        core = run.system.hub
+        core.capture_file = str(capture)
+        with Journal(self.folder.journals, VHUB) as journal:
+            journal.append(JournalAction(core.head()).record)
+
+    def journal(self, stem: str) -> Path:
+        return journal_files(self.folder.journals, stem)[-1]
+
+
+@pytest.fixture
+def left(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Left:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    capture = tmp_path / "run.mcap"
+    capture.write_bytes(run.cut.read_bytes())
+    return Left(run, capture)
+
+
+def damage(path: Path) -> None:
+    """Flip a bit of the first record."""
+    content = bytearray(path.read_bytes())
+    content[40] ^= 1
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("what", ["whole", "supervisor gone", "supervisor", "vhub gone", "vhub", "capture", "finished"])
+def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: Left, what: str) -> None:
+    folder, capture = left.folder, left.folder.path.parents[3] / "run.mcap"
+    problems = {
+        "whole": "",
+        "supervisor gone": f"run mine has no journal to go on from in {folder.journals}",
+        "supervisor": f"{left.journal(SUPERVISOR)}: byte ",
+        "vhub gone": f"the vHub's journal is gone from {folder.journals}",
+        "vhub": f"{left.journal(VHUB)}: ",
+        "capture": f"{capture}: no MCAP file",
+        "finished": f"{capture}: is finished, and a capture is never overwritten",
+    }
+    if what == "capture":
+        capture.write_bytes(b"something else that is not a capture")
+    elif what == "finished":
+        capture.write_bytes(run.capture.read_bytes())
+    elif what.endswith(" gone"):
+        left.journal(what.removesuffix(" gone")).unlink()
+    elif what != "whole":
+        damage(left.journal(what))
+    if what == "whole":
+        plan, path = plan_again(folder)
+        assert path == capture and plan.ticks == TICKS
+        return
+    with pytest.raises(Refused) as refused:
+        plan_again(folder)
+    assert problems[what] in str(refused.value), refused.value
+    assert f"foosim-supervisor up {TABLE}" in str(refused.value) and "begins a new run" in str(refused.value)
+
+
+def test_a_supervisor_goes_on_from_no_journal_that_has_nothing_and_from_none_that_is_damaged(left: Left) -> None:
+    plan, folder = make_plan(RunOptions(TABLE, sets=("engine=pure",))), left.folder
+    damage(left.journal(SUPERVISOR))
+    with pytest.raises(Refused, match=r"run mine cannot go on: .*head of the file is damaged"):
+        history_of(plan, folder)
+    left.journal(SUPERVISOR).write_bytes(b"")
+    assert history_of(plan, folder) is None, "the one before was killed when it had made the file: the run begins"
+
+
+def test_a_resume_of_a_run_that_has_ended_reports_its_result(run: Run, left: Left, typed: Typed) -> None:
+    os.rename(left.folder.path.parents[3] / "run.mcap", "run.mcap")
+    again = create_run("table", "over")
+    again.write_launch(launch_of(RunOptions(TABLE), Path("run.mcap")))
+    again.write_result({**run.result, "run": "over", "reason": "done"})
+    supervisor = typed("foosim-supervisor", main)
+    code, out, err = supervisor("up", "--resume", "over", "--json")
+    assert code == 0 and '"reason":"done"' in out and out.count("\n") == 1 and '"capture":"' in out
+    assert "run over has ended: done" in err
+    again.write_result({**run.result, "run": "over", "reason": "lost red", "failed": True})
+    assert supervisor("up", "--resume", "over").code == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("up", "none.yaml"), 2),
+        (("up", TABLE, "--set", "seed=dragon"), 2),
+        (("up", TABLE, "--capture", TABLE), 3),
+        (("up", "--resume", "nobody"), 1),
+        (("up", "--resume", "nobody", "--pace", "fast"), 2),
+        (("up",), 2),
+    ],
+)
+def test_json_is_one_object_whatever_is_refused(
+    arguments: tuple[str | Path, ...], code: int, typed: Typed, run: Run
+) -> None:
+    done = typed("foosim-supervisor", main)(*arguments, "--json")
+    (line,) = done.out.splitlines()
+    content = msgspec.json.decode(line)
+    assert done.code == code and content.keys() == run.result.keys()
+    assert content["failed"] and content["reason"] == done.err.rstrip("\n")

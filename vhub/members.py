@@ -1,0 +1,107 @@
+"""A client that takes part, as the vHub's state knows it: in ticks and numbers, without its session.
+
+Neighbours: `state`, which holds them; `sessions` is about their processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from msgspec import convert
+
+from foosim.protocol.deployment import Deployment
+from foosim.vhub.memory import Joining, MemberState
+from foosim.vhub.packet import Flight
+
+
+def may_lockstep(deployment: Deployment, name: str) -> bool:
+    """Whether the run waits for this client: no other can hold it up."""
+    declared = deployment.players.get(name) or deployment.clients.get(name)
+    return declared is not None and declared.lockstep
+
+
+def may_restart(deployment: Deployment, name: str) -> bool:
+    """Whether a client's process is started again when it has ended."""
+    return name in deployment.players and deployment.players[name].restart
+
+
+class Member:
+    """One client. In lockstep its ticks are those that leave the remainder `offset` by `period`; with `arrivals` those
+    at which a packet of such an (endpoint, channel) reaches it, or at which it has not been called for a period.
+    """
+
+    def __init__(self, state: MemberState) -> None:
+        self.period = state.period
+        self.subscriptions = state.subscriptions
+        self.joined_tick = state.joined_tick
+        self.sequence = state.sequence
+        """Greatest sequence number that was admitted."""
+        self.downlink = state.downlink
+        """Number of the last message to the client."""
+        self.active = state.active
+        self.branched = state.branched
+        """The number of that message when the last branch began: what was said then behind it is void."""
+        self.offset = state.offset
+        self.arrivals = state.arrivals
+        self.called_tick = state.called_tick
+        """Of one that acts at arrival: the last tick at which it was called, -1 before the first."""
+
+    @classmethod
+    def of(cls, joining: Joining, tick: int) -> Member:
+        """Return the client that joins at a tick."""
+        arrivals = tuple((source, channel) for source, channel in joining.arrivals)
+        subscriptions = tuple((source, channel) for source, channel in joining.subscriptions)
+        return cls(MemberState(joining.period, subscriptions, tick, offset=joining.offset, arrivals=arrivals))
+
+    def state(self) -> MemberState:
+        """Return it as it is written down."""
+        return convert(self, MemberState, from_attributes=True)
+
+    def is_due(self, tick: int) -> bool:
+        """Whether it is asked at a tick: of one that acts at arrival known once the tick's packets are there."""
+        if self.arrivals:
+            return self.active and tick == self.called_tick
+        return self.active and self.period > 0 and tick % self.period == self.offset
+
+    def may_be_due(self, tick: int) -> bool:
+        """Whether it is asked at a later tick, for all that is known without what arrives."""
+        return self.is_over(tick) if self.arrivals else self.is_due(tick)
+
+    def is_over(self, tick: int) -> bool:
+        """Whether a period has passed since one that acts at arrival was called, or joined."""
+        return self.active and tick >= max(self.called_tick, self.joined_tick) + self.period
+
+    def release_tick(self, tick: int) -> int:
+        """Return the first tick, from `tick` on, at which something can be released to the client, as far as its period
+        says."""
+        return tick if self.period == 0 or self.arrivals else tick + (self.offset - tick) % self.period
+
+
+class Here:
+    """What follows from who takes part, found anew when somebody comes or goes."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        clients = [*deployment.players, *deployment.clients]
+        self._lockstep = tuple(name for name in clients if may_lockstep(deployment, name))
+        self.is_complete = not self._lockstep
+        """Whether all that are declared to be in lockstep take part: one that does not may join at any tick."""
+        self.on_arrival: dict[str, Member] = {}
+        """Those who act when something arrives, in name order."""
+        self.receivers: dict[tuple[str, str], tuple[str, ...]] = {}
+        """Who hears each (endpoint, channel), in name order."""
+
+    def renew(self, members: Mapping[str, Member]) -> None:
+        """Somebody came or went."""
+        here = {name: member for name, member in sorted(members.items()) if member.active}
+        self.is_complete = all(name in here for name in self._lockstep)
+        self.on_arrival = {name: member for name, member in here.items() if member.arrivals}
+        heard: dict[tuple[str, str], list[str]] = {}
+        for name, member in here.items():
+            for pair in member.subscriptions:
+                heard.setdefault(pair, []).append(name)
+        self.receivers = {pair: tuple(names) for pair, names in heard.items()}
+
+    def calls(self, flight: Flight) -> bool:
+        """Whether a packet's receiver acts when it arrives."""
+        member = self.on_arrival.get(flight.destination)
+        return member is not None and (flight.source, flight.channel) in member.arrivals
