@@ -11,6 +11,9 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
 
@@ -19,47 +22,101 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
 COMPILED: Final = {
-    "client": (
-        *("beacons", "core", "crew", "dispatch", "packets", "patrol", "payloads", "player", "players", "roadmap"),
-        *("steering", "tracking"),
-    ),
-    "node": ("core", "edits", "hall_world", "held", "inputs", "rules", "solver", "step", "table_world", "world"),
-    "node/actuators": ("__init__", "drive", "position"),
-    "node/engines": ("pure", "pure_bodies", "pure_shapes", "rovers"),
-    "node/sensors": ("__init__", "ball", "battery", "encoder", "fitting", "odometry", "pose", "proximity"),
-    "protocol": (
-        *("actions", "assign", "barrier", "channels", "codec", "draws", "frame", "layout", "limits", "member"),
-        *("obstacles", "patience", "refusals", "sampling", "scene", "standstill", "start"),
-    ),
-    "rehearsal": (
-        *("bounds", "bus", "clock", "hub_journal", "laws", "machines", "packet_laws", "people", "replica", "settings"),
-        *("system", "whatif", "whatif_reading", "world_bounds"),
-    ),
-    "supervisor": (
-        *("absence", "arrivals", "balance", "branches", "closing", "core", "handshake", "head", "issued", "pacing"),
-        *("recovery", "requests", "roster", "take_over", "watch"),
-    ),
-    "vhub": (
-        *("ages", "air", "budget", "fabric", "geometry", "jitter", "links", "mcap_writer", "members", "numbers"),
-        *("packet", "propagation", "rays", "room", "sendings", "setup", "solids", "state", "to_rows", "transit"),
-        *("turns", "world"),
-    ),
-    "vhub/radio": (
-        *("airtime", "contention", "errors", "fading", "frames", "materials", "noise", "path_loss", "shadowing"),
-        *("timings",),
-    ),
-    "vhub/stages": (
-        *("__init__", "admit", "capacity", "channel", "delay", "duty", "mangle", "medium", "own", "policy", "queue"),
-        *("receiver", "residual", "stage"),
-    ),
+    "client/beacons": "what each rover hears and tells, at each of its acts",
+    "client/patrol": "a rover's way through the hall, at each of its acts",
+    "client/payloads": "each sample is decoded here, each command encoded",
+    "client/player": "each packet of a player",
+    "client/players": "each act of the table's teams",
+    "client/steering": "a rover's wheels, at each of its acts",
+    "client/tracking": "where the ball is going, at each act of a team",
+    "node/actuators/position": "the torque of each rod, at each substep",
+    "node/core": "a node's tick: what came, what is due, what is sent",
+    "node/engines/pure": "each substep of the pure engine",
+    "node/engines/pure_bodies": "motion and contacts of each body, at each substep",
+    "node/engines/pure_shapes": "distances of each pair of shapes, at each substep",
+    "node/engines/rovers": "each rover's motion and contacts, at each substep",
+    "node/inputs": "what reaches the robots, at each tick",
+    "node/rules": "goals and the ball's return, at each tick",
+    "node/sensors/__init__": "samples that are due, at each tick; the class that sensors derive from",
+    "node/sensors/proximity": "the rays of each rover's sensors",
+    "node/solver": "the engine's turn, at each tick",
+    "node/step": "load, command, step and read of each island",
+    "node/table_world": "commands of each rod, at each tick",
+    "protocol/actions": "what a core asks for, one for each message: compiled modules read it",
+    "protocol/assign": "islands and who solves them, at each tick",
+    "protocol/barrier": "puts the parts of each frame together",
+    "protocol/channels": "the channel of each message: compiled modules read it",
+    "protocol/codec": "encodes and decodes each message",
+    "protocol/draws": "each random number",
+    "protocol/frame": "reads and digests each frame",
+    "protocol/layout": "the places in a frame of each body: compiled modules read them",
+    "protocol/obstacles": "distances from what stands in the hall",
+    "protocol/patience": "deadlines, asked at each message",
+    "protocol/refusals": "what became of each message",
+    "protocol/sampling": "which sensor is due, at each tick",
+    "protocol/scene": "where each body is, for radio and sensors",
+    "rehearsal/bounds": "what the swarm checks at each message",
+    "rehearsal/bus": "each message of a rehearsal",
+    "rehearsal/clock": "each turn of a rehearsal",
+    "rehearsal/hub_journal": "each record of a rehearsal's vHub",
+    "rehearsal/laws": "what the swarm checks at each frame",
+    "rehearsal/settings": "the processes of a rehearsal: compiled modules read them at each turn",
+    "rehearsal/system": "turns of all processes of a rehearsal",
+    "rehearsal/whatif": "judges each captured packet again",
+    "supervisor/arrivals": "each part of a frame that arrives",
+    "supervisor/core": "the supervisor's tick: orders, parts, commits",
+    "supervisor/pacing": "when the next tick may begin",
+    "vhub/ages": "how old a packet is when a client uses it, at each turn",
+    "vhub/air": "who hears whom, for each radio packet",
+    "vhub/budget": "the power that each radio packet is received with",
+    "vhub/fabric": "finds the link of each packet",
+    "vhub/geometry": "a line of sight against each surface",
+    "vhub/jitter": "the delay of each packet",
+    "vhub/links": "takes each packet through its stages",
+    "vhub/members": "a client's part of the vHub's state, at each tick",
+    "vhub/numbers": "powers and decibels of each radio packet",
+    "vhub/packet": "each packet on its way",
+    "vhub/propagation": "what is between two radios, for each packet",
+    "vhub/radio/contention": "who may send on a shared medium, for each packet",
+    "vhub/radio/errors": "the odds of each radio frame",
+    "vhub/radio/fading": "the fading of each radio packet",
+    "vhub/radio/frames": "the frames that a packet is sent in",
+    "vhub/radio/materials": "what a wall takes from each radio packet",
+    "vhub/radio/noise": "the noise at each receiver",
+    "vhub/radio/path_loss": "what distance takes from each radio packet",
+    "vhub/radio/shadowing": "the shadowing of each radio packet",
+    "vhub/rays": "lines of sight through the hall",
+    "vhub/room": "room for what is on its way, for each packet",
+    "vhub/sendings": "each broadcast's one sending",
+    "vhub/solids": "boxes and cylinders that a line of sight may meet",
+    "vhub/stages/admit": "the first stage of each packet",
+    "vhub/stages/channel": "the radio channel, for each packet",
+    "vhub/stages/delay": "the delay, for each packet",
+    "vhub/stages/medium": "the shared medium, for each radio packet",
+    "vhub/stages/queue": "the sender's queue, for each packet",
+    "vhub/stages/receiver": "the receiver, for each packet",
+    "vhub/stages/residual": "loss and bursts, for each packet",
+    "vhub/stages/stage": "the class that stages derive from",
+    "vhub/state": "the vHub's memory: each packet, each delivery",
+    "vhub/to_rows": "the row of each packet",
+    "vhub/transit": "what is on its way, by its due tick",
+    "vhub/turns": "whose turn it is on a shared medium, for each radio packet",
+    "vhub/world": "the world as a packet meets it, at each tick",
 }
-"""Modules by folder. Types of messages and rows stay as they are: those of msgspec are compiled already."""
+"""Modules by path, each with what it does so often that it is compiled.
+
+The profile of the benches says which they are: what is left out takes less than a hundredth of any bench, or is what
+msgspec and numpy have compiled already. Those that call each other at each tick are compiled together, in one library.
+"""
 PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
 TYPED: Final = Path("build", "typed")
 """Where the folders stand under the name that they are imported by, for mypyc."""
+MADE: Final = Path("build", "c")
+LIBRARY: Final = "foosim"
 CHOICES: Final = ("auto", "always", "quick", "never")
 MYPY: Final = (
     "--config-file=",
+    "--no-site-packages",  # types of numpy say nothing to the compiler, and reading them takes as long as all of ours
     "--explicit-package-bases",
     "--namespace-packages",
     "--follow-imports=silent",
@@ -70,6 +127,8 @@ EXACT: Final = (
     *(f"-fno-builtin-{name}" for name in ("exp", "log", "sin", "cos", "tan", "pow", "fmod")),
 )
 """One rounding for each operation, and no function of the mathematical library worked out by the compiler."""
+UNITS: Final = 8
+"""So many files go to the compiler, of about the same size: each reads the headers once, and cores share them."""
 
 
 class CompileOrLeave(build_ext):
@@ -88,6 +147,33 @@ class CompileOrLeave(build_ext):
                 Path(path).unlink(missing_ok=True)
             self.extensions = []
 
+    def build_extension(self, ext: Extension) -> None:
+        """Compile an extension's sources side by side, then link them."""
+        with ThreadPoolExecutor(cores()) as pool:
+            ext.extra_objects = [*pool.map(lambda source: self.object_of(ext, source), ext.sources)]
+        ext.sources = []
+        super().build_extension(ext)
+
+    def object_of(self, ext: Extension, source: str) -> str:
+        """Compile one source; return the path of the object."""
+        begun_s = time.monotonic()
+        (made,) = self.compiler.compile(
+            [source], self.build_temp, include_dirs=ext.include_dirs, extra_postargs=ext.extra_compile_args
+        )
+        if len(ext.sources) > 1:
+            say(f"{Path(source).name} is compiled, in {time.monotonic() - begun_s:.0f} s")
+        return str(made)
+
+
+def cores() -> int:
+    """Return how many cores there are for this process."""
+    return len(os.sched_getaffinity(0))
+
+
+def say(text: str) -> None:
+    """Say what goes on: pip shows it with -v, other builds at once."""
+    print(f"foosim: {text}", flush=True)
+
 
 def choice() -> str:
     """Return what is wanted of FOOSIM_COMPILE; exits where that is no choice."""
@@ -103,15 +189,36 @@ def extensions() -> list[Extension]:
         return []
     from mypyc.build import mypycify
 
+    say(f"mypyc makes C of {len(COMPILED)} modules; FOOSIM_COMPILE=never leaves that out")
+    begun_s = time.monotonic()
     shutil.rmtree(TYPED, ignore_errors=True)
     for package in PACKAGES:
         shutil.copytree(package, TYPED / "foosim" / package, ignore=shutil.ignore_patterns("__pycache__"))
     os.environ["MYPYPATH"] = str(TYPED)
-    files = [str(TYPED / "foosim" / folder / f"{name}.py") for folder, names in COMPILED.items() for name in names]
-    level = "0" if choice() == "quick" else "3"
-    made = mypycify([*MYPY, *files], opt_level=level, multi_file=True, target_dir="build/c", group_name="foosim")
-    for extension in made:
-        extension.extra_compile_args = [*extension.extra_compile_args, *EXACT]
+    files = [str(TYPED / "foosim" / f"{name}.py") for name in COMPILED]
+    library, *shims = mypycify(
+        [*MYPY, *files], multi_file=True, include_runtime_files=True, target_dir=str(MADE), group_name=LIBRARY
+    )
+    library.sources = units(library.sources)
+    level = "-O0" if choice() == "quick" else "-Og"
+    library.extra_compile_args = [*library.extra_compile_args, level, *EXACT]
+    for shim in shims:
+        shim.extra_compile_args = ["-O0", "-g0"]
+    say(f"that took {time.monotonic() - begun_s:.0f} s; the C compiler runs on {cores()} cores")
+    return [library, *shims]
+
+
+def units(sources: Sequence[str]) -> list[str]:
+    """Return a few files that include all sources but mypyc's own, about as much each."""
+    whole, *rest = sorted(sources, key=lambda source: "___" in Path(source).name)
+    shares: list[list[Path]] = [[] for _ in range(UNITS)]
+    for source in sorted(map(Path, rest), key=lambda path: -path.stat().st_size):
+        min(shares, key=lambda share: sum(path.stat().st_size for path in share)).append(source)
+    made = [whole]
+    for number, share in enumerate(shares, 1):
+        unit = MADE / f"part_{number}_of_{UNITS}.c"
+        unit.write_text("".join(f'#include "{path.name}"\n' for path in share))
+        made.append(str(unit))
     return made
 
 

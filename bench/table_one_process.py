@@ -7,6 +7,7 @@ Neighbours: `meter`, `foosim.rehearsal`.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import median
@@ -14,9 +15,15 @@ from typing import Any, Final
 
 from bench.meter import ENGINE_PARTS, Meter, metered_engine
 from bench.runs import TABLE
+from foosim.client.core import ClientCore
+from foosim.node.core import NodeCore
+from foosim.protocol import channels
+from foosim.protocol.channels import Channel
 from foosim.protocol.frame import Frame
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.core import SupervisorCore
+from foosim.vhub.core import HubCore
 
 WARM_TICKS: Final = 200
 
@@ -46,7 +53,7 @@ def _measure(engine: str, seconds: float, repeats: int) -> OneProcess:
     runs = [times["total"] for times, _ in bare]
     us, result = median(runs), bare[0][1]
     meter = Meter()
-    metered, _ = _rehearse(engine, seconds, Settings(factory=metered_engine(meter)), meter)
+    metered, _ = _rehearse(engine, seconds, _metered_settings(meter), meter)
     node = metered.pop("node") - sum(metered.get(part, 0.0) for part in ENGINE_PARTS)
     parts = {**{part: metered.pop(part) for part in ENGINE_PARTS}, "node": round(node, 1)}
     total, cpu = metered.pop("total"), metered.pop("cpu")
@@ -83,14 +90,50 @@ def _count(meter: Meter, ticks: int) -> Callable[[Frame], None]:
     return committed
 
 
+def _metered_settings(meter: Meter) -> Settings:
+    """Return settings with metered cores: one may derive from a compiled class, but not replace its methods."""
+
+    class MeteredHub(HubCore):
+        def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+            begun_ns = time.perf_counter_ns()
+            super().receive(channel, name, payload, now_ns)
+            meter.add(channels.VHUB, begun_ns)
+
+    class MeteredSupervisor(SupervisorCore):
+        def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+            begun_ns = time.perf_counter_ns()
+            super().receive(channel, name, payload, now_ns)
+            meter.add(channels.SUPERVISOR, begun_ns)
+
+    class MeteredNode(NodeCore):
+        def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+            begun_ns = time.perf_counter_ns()
+            super().receive(channel, name, payload, now_ns)
+            meter.add("node", begun_ns)
+
+    return Settings(factory=metered_engine(meter), hub=MeteredHub, supervisor=MeteredSupervisor, node=MeteredNode)
+
+
+class _MeteredPlayer:
+    """A player's core, its reading metered. No settings give its class, and nobody here asks for that."""
+
+    def __init__(self, core: ClientCore, meter: Meter) -> None:
+        self._core = core
+        self.receive = meter.metered("players", core.receive)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._core, name)
+
+
 def _metering(meter: Meter) -> Callable[[System], None]:
-    """Meter what each process does with its messages and the turns that follow."""
+    """Meter the turns of each process, and what players read."""
 
     def prepare(system: System) -> None:
         for name, process in system.processes.items():
             part = "node" if name in system.solvers else "players" if name in system.players else name
-            process.core.receive = meter.metered(part, process.core.receive)
             process.turn = meter.metered(part, process.turn)
+            if name in system.players:
+                process.core = _MeteredPlayer(process.core, meter)
 
     return prepare
 

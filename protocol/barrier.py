@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.messages import OutboxPacket, Part
 
-Indices = NDArray[np.intp]
+Indices: TypeAlias = NDArray[np.intp]
 _OUTBOX: Final[Any] = list[OutboxPacket]
 
 

@@ -160,8 +160,12 @@ def read_deployment_text(path: Path) -> str:
     try:
         with path.open("rb") as file:
             raw = file.read(limits.DEPLOYMENT_BYTES_MAX + 1)
+    except FileNotFoundError:
+        raise DeploymentError([f"{path}: there is no such file"]) from None
+    except IsADirectoryError:
+        raise DeploymentError([f"{path}: a folder, where a deployment file is needed"]) from None
     except OSError as error:
-        raise DeploymentError([f"{place}: cannot be read, {error.strerror or error}"]) from None
+        raise DeploymentError([f"{path}: cannot be read, {error.strerror or error}"]) from None
     if len(raw) > limits.DEPLOYMENT_BYTES_MAX:
         raise DeploymentError([f"{place}: more than {limits.DEPLOYMENT_BYTES_MAX} bytes"])
     raw = raw.removeprefix(codecs.BOM_UTF8)

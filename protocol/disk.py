@@ -10,6 +10,9 @@ import os
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from typing import Final
+
+MIB: Final = 1 << 20
 
 
 class Level(IntEnum):
@@ -53,5 +56,7 @@ def room_on_disk(place: int | Path, reserve: int) -> Room:
 
 
 def megabytes(count: int) -> str:
-    """Return a size for people."""
+    """Return a size for people: in MiB when it is a whole number of these, as files say it."""
+    if count >= MIB and count % MIB == 0:
+        return f"{count // MIB} MiB"
     return f"{count / 1e6:.1f} MB" if count < 1e10 else f"{count / 1e9:.1f} GB"

@@ -6,7 +6,10 @@ choices, so that it can be shown to a person as it is. Each part of the project 
 """
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, Final
+
+ABSENT: Final = object()
+"""Stands for a value that was not given, so that there is none to show."""
 
 
 class Refused(Exception):
@@ -31,7 +34,7 @@ class BadValue(Refused):
 
     exit_code = 2
 
-    def __init__(self, what: str, value: object, nearest: str | None = None) -> None:
+    def __init__(self, what: str, value: object = ABSENT, nearest: str | None = None) -> None:
         super().__init__(describe(what, value, nearest))
         self.problem = what
         self.value = value
@@ -51,7 +54,7 @@ class DeploymentError(Refused):
 
 def describe(what: str, value: object, nearest: str | None = None) -> str:
     """`what, value, nearest is X` on one line, whatever the value holds."""
-    text = f"{what}, {show(value)}"
+    text = what if value is ABSENT else f"{what}, {show(value)}"
     return text if nearest is None else f"{text}, nearest is {nearest}"
 
 

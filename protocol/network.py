@@ -93,7 +93,7 @@ def _lasting(value: object) -> Lasting:
     if isinstance(value, dict) and set(value) == {"exponential"}:
         return Lasting(int(_DURATION.read(value["exponential"])), is_random=True)
     if isinstance(value, dict):
-        raise custom_error(BadValue("not a time or {exponential: MEAN}", next(iter(value), "")))
+        raise custom_error(BadValue("not a time or {exponential: MEAN}", next(iter(value), value)))
     return Lasting(int(_DURATION.read(value)))
 
 

@@ -321,11 +321,16 @@ def _shapes(view: View) -> Iterator[Finding]:
         (("rod", "figure_com_below_axis"), ("rod", "foot_radius"), "not below rod.foot_radius"),
         (("goal", "width"), ("field", "width"), "not below the field's width"),
         (("goal", "height"), ("walls", "height"), "not below the walls' height"),
-        (("ball", "radius"), ("goal", "depth"), "not below the goal's depth: the ball would not fit"),
     ):
         least, most = view.length(*small), view.length(*big)
         if least is not None and most is not None and least >= most:
             yield Finding(("table", *small), what, view.get("table", *small))
+    radius = view.length("ball", "radius")
+    for side in ("depth", "width", "height"):
+        most = view.length("goal", side)
+        if radius is not None and most is not None and 2 * radius >= most:
+            what = f"twice that is not below the goal's {side}: the ball would not fit, valid is below {_mm(most / 2)}"
+            yield Finding(("table", "ball", "radius"), what, view.get("table", "ball", "radius"))
 
 
 def _hall(view: View) -> Iterator[Finding]:
@@ -373,4 +378,8 @@ def _radio(view: View, radio: Location) -> Iterator[Finding]:
 
 
 def _millimetres(length: Fraction) -> str | None:
-    return None if length <= 0 else f"'{float(length * 1000):g} mm'"
+    return None if length <= 0 else f"'{_mm(length)}'"
+
+
+def _mm(length: Fraction) -> str:
+    return f"{float(length * 1000):g} mm"

@@ -73,9 +73,9 @@ def _finding(detail: ErrorDetails, under: Location) -> Finding:
 def _bounds(kind: str, context: Mapping[str, Any]) -> str | None:
     match kind:
         case "greater_than_equal":
-            return f"less than {context['ge']}"
+            return f"less than the least that is valid, {context['ge']}"
         case "less_than_equal":
-            return f"more than {context['le']}"
+            return f"more than the most that is valid, {context['le']}"
         case "string_too_long":
             return f"longer than {context['max_length']} characters"
         case "too_long":

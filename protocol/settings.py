@@ -15,6 +15,7 @@ from foosim.protocol.errors import DeploymentError, describe, show
 from foosim.protocol.names import nearest_name
 from foosim.protocol.yaml_tree import Fields, Items, Leaf, Place, Problem, Tree, plain, read_tree
 
+ENTRIES_SHOWN_MAX: Final = 8
 SETS_MAX: Final = 256
 SET_LENGTH_MAX: Final = 4096
 
@@ -169,5 +170,8 @@ def _entry(node: Items, step: str, column: int) -> int:
             ids.setdefault(name.value, index)
     if step in ids:
         return ids[step]
-    choices = ", ".join([*ids, *(str(index) for index in range(len(node.items)))][:8])
-    raise _Misplaced(column, f"no such entry, {show(step)}, valid are {choices or 'none'}")
+    named = {index: name for name, index in ids.items()}
+    entries = [f"{index} (id {named[index]})" if index in named else str(index) for index in range(len(node.items))]
+    more = ", ..." if len(entries) > ENTRIES_SHOWN_MAX else ""
+    choices = f"the list has {', '.join(entries[:ENTRIES_SHOWN_MAX])}{more}" if entries else "the list is empty"
+    raise _Misplaced(column, f"no such entry, {show(step)}: {choices}")

@@ -38,6 +38,8 @@ class Dimension:
     name: str
     units: Mapping[str, Fraction]
     kind: Literal["float", "int", "fraction"] = "float"
+    usual: str = ""
+    """The unit that people mean who write none; empty where that is the one that values are shown in."""
 
     @property
     def base(self) -> str:
@@ -60,14 +62,14 @@ def _sizes(**units: str) -> dict[str, Fraction]:
     return {unit: Fraction(size) for unit, size in units.items()}
 
 
-TIME: Final = Dimension("time", _sizes(ns="1", us="1e3", ms="1e6", s="1e9", min="60e9", h="3600e9"), "int")
+TIME: Final = Dimension("time", _sizes(ns="1", us="1e3", ms="1e6", s="1e9", min="60e9", h="3600e9"), "int", "s")
 TICKS: Final = Dimension("number of ticks", _sizes(ticks="1", tick="1"), "int")
 _BINARY: Final = _sizes(KiB="1024", MiB="1048576", GiB="1073741824", TiB="1099511627776")
 SIZE: Final = Dimension("size", _sizes(B="1", kB="1e3", MB="1e6", GB="1e9", TB="1e12") | _BINARY, "int")
 RATE: Final = Dimension("rate", _sizes(Hz="1", kHz="1e3", mHz="1e-3"), "fraction")
 LENGTH: Final = Dimension("length", _sizes(m="1", cm="1e-2", mm="1e-3", um="1e-6", km="1e3"))
 MASS: Final = Dimension("mass", _sizes(kg="1", g="1e-3", mg="1e-6"))
-ANGLE: Final = Dimension("angle", {"rad": Fraction(1), "mrad": Fraction(1, 1000), "deg": _DEGREE})
+ANGLE: Final = Dimension("angle", {"rad": Fraction(1), "mrad": Fraction(1, 1000), "deg": _DEGREE}, usual="deg")
 SPEED: Final = Dimension("speed", {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "km/h": Fraction(5, 18)})
 SPIN: Final = Dimension("rotational speed", {"rad/s": Fraction(1), "deg/s": _DEGREE, "rpm": Fraction(math.pi) / 30})
 ACCELERATION: Final = Dimension("acceleration", {"m/s2": Fraction(1), "mm/s2": Fraction(1, 1000)})
@@ -78,7 +80,7 @@ LEVEL: Final = Dimension("level", _sizes(dB="1"))
 ENERGY: Final = Dimension("energy", _sizes(J="1", kJ="1e3", Wh="3600", kWh="3.6e6"))
 POWER: Final = Dimension("power", _sizes(W="1", mW="1e-3", kW="1e3"))
 VOLTAGE: Final = Dimension("voltage", _sizes(V="1", mV="1e-3", kV="1e3"))
-PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)})
+PROBABILITY: Final = Dimension("probability", {"p": Fraction(1), "%": Fraction(1, 100)}, usual="%")
 FREQUENCY: Final = Dimension("frequency", _sizes(Hz="1", kHz="1e3", MHz="1e6", GHz="1e9"))
 BITRATE: Final = Dimension(
     "bit rate", _sizes(**{"bit/s": "1", "kbit/s": "1e3", "Mbit/s": "1e6", "Gbit/s": "1e9"}), "int"
@@ -96,7 +98,7 @@ def parse(text: object, dimension: Dimension) -> Fraction:
         raise BadValue(dimension.refusal, text)
     number, unit = match[1], match[2]
     if unit not in dimension.units:
-        close = None if unit is None else _nearest_unit(unit, dimension)
+        close = (dimension.usual or dimension.base) if unit is None else _nearest_unit(unit, dimension)
         nearest = None if close is None else repr(f"{number} {close}")
         raise BadValue(dimension.refusal, text, nearest)
     return Fraction(number) * dimension.units[unit]

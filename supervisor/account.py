@@ -18,6 +18,8 @@ class Account:
 
     solved_ticks: dict[str, int] = field(default_factory=dict)
     """By node: the ticks in which it solved a body."""
+    ball_ticks: dict[str, int] = field(default_factory=dict)
+    """By node: the ticks in which it solved the ball."""
     handovers: int = 0
     moves: int = 0
     ball_solver: str = ""
@@ -29,6 +31,8 @@ class Account:
         if self.ball_solver and ball_solver != self.ball_solver:
             self.handovers += 1
         self.ball_solver = ball_solver
+        if ball_solver:
+            self.ball_ticks[ball_solver] = self.ball_ticks.get(ball_solver, 0) + 1
 
 
 @dataclass(slots=True)

@@ -54,9 +54,7 @@ From = Annotated[
     str | None,
     typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
 ]
-OptionalFile = Annotated[
-    Path | None, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)
-]
+OptionalFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
 Balance = Annotated[bool, typer.Option("--balance", help="Move robots from busy nodes to idle ones.")]
 RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
 
@@ -114,7 +112,7 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
                 raise BadValue("--resume takes FILE and its options from the run", resumed)
             begun = _go_on(open_run(resumed), display)
         elif file is None:
-            raise BadValue("a deployment FILE is needed, or --resume RUN", "")
+            raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
         elif no_capture and capture is not None:
             raise BadValue("--capture and --no-capture exclude each other", str(capture))
         else:
@@ -234,7 +232,7 @@ def resume(run: Run = None, json: Json = False) -> None:
     _show(control.resume(run), json)
 
 
-@app.command()
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
 def step(
     count: Annotated[int, typer.Argument(help="How many ticks.", min=1)] = 1, run: Run = None, json: Json = False
 ) -> None:
@@ -307,7 +305,9 @@ def start(node: Node, run: Run = None, json: Json = False) -> None:
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
 def push(
-    impulse: Annotated[Numbers, typer.Argument(help="Impulse in N s: X Y Z.", show_default=False)],
+    impulse: Annotated[
+        list[str], typer.Argument(metavar="X Y Z", help="Impulse in N s along x, y and z.", show_default=False)
+    ],
     name: Annotated[str, typer.Option(help="Which ball.")] = "ball",
     run: Run = None,
     json: Json = False,
@@ -316,7 +316,19 @@ def push(
 
     On a ball of 21 g, 0.021 N s are 1 m/s.
     """
-    _show(control.push(impulse, name, run), json)
+    _show(control.push(_three("impulse", "N s", impulse), name, run), json)
+
+
+def _three(what: str, unit: str, words: list[str]) -> Numbers:
+    """Return three numbers; raises BadValue, since typer does not say which ones are needed."""
+    needed = f"{what}: three numbers are needed, X Y Z in {unit}"
+    if len(words) != 3:
+        raise BadValue(f"{needed}; here are {len(words)}", " ".join(words))
+    try:
+        x, y, z = map(float, words)
+    except ValueError:
+        raise BadValue(f"{needed}; not all of these are numbers", " ".join(words)) from None
+    return x, y, z
 
 
 @app.command()

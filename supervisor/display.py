@@ -40,12 +40,12 @@ def lag_text(status: dict[str, Any]) -> str:
 
 
 def pace_text(status: dict[str, Any]) -> str:
-    """`realtime 1.00x`, or what it is doing instead of running."""
+    """`0.32x (wanted 2x)`, or what it is doing instead of running."""
     pace = str(status["pace"])
     if status["state"] != "running":
         return f"{pace}, {status['state']}"
     rate = status.get("speed", status["rtf"])
-    return pace if rate is None else f"{pace} {rate:.2f}x"
+    return f"wanted {pace}" if rate is None else f"{rate:.2f}x (wanted {pace})"
 
 
 def world_texts(status: dict[str, Any]) -> list[str]:
@@ -154,13 +154,18 @@ def _head(status: dict[str, Any]) -> Text:
 
 
 def _processes(status: dict[str, Any]) -> Table:
-    """Nodes with their hosts, where there are any, what they own, solve and how busy they are; then the others."""
+    """Nodes with their hosts, where there are any, what they own, solve and how busy they are; then the others.
+
+    Of a table it is the share of the ball's ticks, of a hall the ticks in which a node solved a rover.
+    """
     table = Table(title="processes", title_justify="left", box=None, pad_edge=False)
     processes = status["processes"]
     nodes = status["nodes"]
     hosts = any(process["host"] for process in processes.values())
     columns = [("name", "left"), *([("host", "left")] if hosts else []), ("owns", "left")]
-    for column, justify in (*columns, ("solved ticks", "right"), ("load", "right")):
+    balls = sum(node["ball_ticks"] for node in nodes.values())
+    solved = "ball ticks" if balls else "solved ticks"
+    for column, justify in (*columns, (solved, "right"), ("load", "right")):
         table.add_column(column, justify=justify)  # type: ignore[arg-type]
     table.add_column("waits for", no_wrap=True)
     for name in [*nodes, *(other for other in processes if other not in nodes)]:
@@ -169,7 +174,7 @@ def _processes(status: dict[str, Any]) -> Table:
             name,
             *([process["host"] if process else ""] if hosts else []),
             "" if node is None else _listed(node["owned"]),
-            "" if node is None else str(node["solved_ticks"]),
+            "" if node is None else f"{node['ball_ticks'] / balls:.0%}" if balls else str(node["solved_ticks"]),
             "-" if process is None else f"{process['busy']:.0%}",
             _doing(process),
         )

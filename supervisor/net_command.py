@@ -215,7 +215,8 @@ def _show_links(
     if json:
         print(encode_json({"run": status["run"], "tick": status["ticks"], "links": links}).decode(), flush=True)
         return
-    told = f"{status['links_in_all']} links" if len(links) == status["links_in_all"] else f"{len(links)} of the links"
+    used = sum(link[2] > 0 for link in status["links"])
+    told = f"{used} of {status['links_in_all']} links used"
     title = f"run {status['run']} · tick {status['ticks']} · {told}"
     if live is not None:
         live.update(link_table(links[: max(1, console.height - 4)], title), refresh=True)

@@ -90,7 +90,7 @@ def issue(
                 print(path)
         wanted += [identity for identity in everybody if identity not in [*there, *wanted]]
     elif not wanted:
-        raise BadValue(f"nobody to issue to: name identities ({FORMS}) or a --deployment", "")
+        raise BadValue(f"nobody to issue to: name identities ({FORMS}) or a --deployment")
     for path in pki.issue(folder, wanted, host or (), days):
         print(path)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from math import hypot
 from typing import TYPE_CHECKING, Any
 
 from foosim.protocol import channels, limits
@@ -38,8 +39,6 @@ TEXT_MAX = 4000
 """Characters of a refusal."""
 NUMBER_MAX = 1e100
 """More than anybody means, less than what overflows when squared."""
-IMPULSE_MAX = 10.0
-"""N s on a free body: more than any kick, less than what leaves the world at once."""
 
 
 @dataclass
@@ -262,7 +261,8 @@ class Requests:
         going = {waiting.edit.name for waiting in self._pending}
         added = [entity.name for entity in self._core.added_to(self._next_layout()) if entity.name not in going]
         if name not in added:
-            raise Refused(f"{show(name)} was not added; added are {', '.join(added) or 'none'}")
+            balls = f"those are {', '.join(added)}" if added else "none was"
+            raise Refused(f"{show(name)} cannot be removed: only a ball that was added can, and {balls}")
         self._wait_for_engines(request, Remove(name))
 
     def _wait_for_engines(self, request: Request, edit: Add | Remove) -> None:
@@ -296,8 +296,11 @@ class Requests:
     def _push(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         name = _chosen("free body", _name(arguments, "name", BALL), [ball.name for ball in self._next_layout().balls])
         impulse = _vector(arguments, "impulse", None)
-        if sum(value * value for value in impulse) > IMPULSE_MAX**2:
-            raise Refused(f"impulse {impulse} is above {IMPULSE_MAX} N s")
+        ball = self._core.deployment.table.ball
+        size, most = hypot(*impulse), ball.mass * ball.speed_limit
+        if size > most:
+            limit = f"at most {most:g} N s, which are the ball's limit of {ball.speed_limit:g} m/s at {ball.mass:g} kg"
+            raise Refused(f"impulse: {size:g} N s in all are too much, valid are {limit}")
         tick = self._tick_for_edit()
         return self._accept(request, tick, f"{name} pushed at tick {tick}", [Push(name, impulse)])
 

@@ -66,6 +66,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
             name: {
                 "owned": sorted(robot for robot, owner in core.owners.items() if owner == name),
                 "solved_ticks": core.account.solved_ticks.get(name, 0),
+                "ball_ticks": core.account.ball_ticks.get(name, 0),
             }
             for name in sorted(core.deployment.nodes)
         },

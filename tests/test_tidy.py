@@ -310,10 +310,13 @@ def compiled() -> dict[str, ast.Module]:
         for node in tree_of(ROOT / "setup.py").body
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "COMPILED" and node.value is not None
     )
-    named: dict[str, tuple[str, ...]] = eval(ast.unparse(value))
-    assert all(list(names) == sorted(set(names)) for names in (*named.values(), named)), "in order, each once"
-    paths = [ROOT / folder / f"{name}.py" for folder, names in named.items() for name in names]
-    return {".".join(("foosim", *path.relative_to(ROOT).with_suffix("").parts)): tree_of(path) for path in paths}
+    named: dict[str, str] = eval(ast.unparse(value))
+    assert list(named) == sorted(named), "in order"
+    paths = [ROOT / f"{name}.py" for name in named]
+    return {
+        ".".join(("foosim", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__"): tree_of(path)
+        for path in paths
+    }
 
 
 def test_what_derives_from_a_compiled_class_is_compiled() -> None:

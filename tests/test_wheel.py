@@ -102,12 +102,22 @@ def test_compiled_and_interpreted_are_one_world(installed: Installed, tmp_path: 
     run(INTERPRETED / "foosim-replay", "diff", *sorted(tmp_path.glob("*.mcap")), cwd=tmp_path)
 
 
+@pytest.mark.skipif(not HAS_COMPILER, reason="no C compiler here")
+def test_benches_measure_what_is_compiled(installed: Installed) -> None:
+    """Methods of a compiled class cannot be replaced, and not every one may be derived from."""
+    program = "from bench import hub, metered_node, packets, rays, table_one_process as table, verdict, whatif;"
+    program += "rows = table.table_one_process(0.1, 1); print(*table.lines(rows), is_compiled());"
+    program = f"from foosim.protocol.fingerprint import is_compiled; {program}"
+    shown = run(installed.commands / "python", "-c", program, cwd=ROOT)
+    assert "players" in shown and "supervisor" in shown and shown.endswith("True\n")
+
+
 def test_without_a_c_compiler_the_source_is_installed_alone(tmp_path: Path) -> None:
     """Half of the compiled modules would not import. Few are tried here, so that mypyc is done soon."""
     source = tmp_path / "source"
     copy_source(source)
     setup = source / "setup.py"
-    few = 'COMPILED = {"protocol": ("draws",)}\n'
+    few = 'COMPILED = {"protocol/draws": ""}\n'
     text, count = re.subn(r"(?s)COMPILED: Final = \{.*?\n\}\n", few, setup.read_text())
     assert count == 1
     setup.write_text(text)

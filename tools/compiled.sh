@@ -18,22 +18,31 @@ if [ -x .venv-compiled/bin/python ] && [ "$(key)" = "$(cat .venv-compiled/key 2>
     exit 0
 fi
 
-echo "Compiling the hot path into .venv-compiled; this takes some minutes, once for each change."
+echo "Compiling the hot path into .venv-compiled; this takes a minute or some, once for each change."
 rm -rf .venv-compiled
 "$python" -m venv --without-pip .venv-compiled
 # In a copy: what an earlier build left would be shipped, and nothing is left in this folder.
 mkdir .venv-compiled/source
 # shellcheck disable=SC2086
 cp -R $folders $files .venv-compiled/source
-(cd .venv-compiled/source && FOOSIM_COMPILE=always "$python" -m build --no-isolation --wheel --outdir .. >../build.log 2>&1) || {
+# How far it is goes to the terminal, all else to the log.
+(
+    cd .venv-compiled/source
+    FOOSIM_COMPILE=always "$python" -m build --no-isolation --wheel --outdir .. 2>&1 && touch ../built
+) | tee .venv-compiled/build.log | while IFS= read -r line; do
+    case $line in
+    "foosim: "*) echo "    ${line#foosim: }" ;;
+    esac
+done
+if [ ! -e .venv-compiled/built ]; then
     tail -n 20 .venv-compiled/build.log >&2
     exit 1
-}
+fi
 "$python" -m pip --python .venv-compiled/bin/python install --quiet --no-deps --no-index .venv-compiled/*.whl
 # Our dependencies, by a path file: it adds a folder without running what the folder's own path files ask for, so the
 # editable install beside them stays out of sight.
 packages=$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 echo "$packages" >"$(.venv-compiled/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/dependencies.pth"
-rm -rf .venv-compiled/source .venv-compiled/*.whl
+rm -rf .venv-compiled/source .venv-compiled/built .venv-compiled/*.whl
 # Last, so that an environment that was interrupted half-way is made anew.
 key >.venv-compiled/key

@@ -72,9 +72,38 @@ MESSAGE
     exit 1
 }
 
-echo "Setting up .venv with $("$python" --version) ($python); this takes about a minute, once."
+begun=$(date +%s)
+step() {
+    echo "    [$(($(date +%s) - begun)) s] $1"
+}
+
+echo "Setting up .venv with $("$python" --version) ($python); this takes one to three minutes, once."
 rm -rf .venv
+step "making the environment"
 "$python" -m venv .venv
-.venv/bin/python -m pip install --quiet --editable '.[dev]'
+# What pip is at, with or without a terminal; all that it says is in .venv/setup.log.
+step "finding out which packages are needed"
+(
+    .venv/bin/python -m pip install --progress-bar off --editable '.[dev]' 2>&1 && touch .venv/installed
+) | tee .venv/setup.log | {
+    found=0
+    while IFS= read -r line; do
+        case $line in
+        Collecting*)
+            found=$((found + 1))
+            [ $((found % 5)) -ne 0 ] || step "$found packages found, the last one is ${line#Collecting }"
+            ;;
+        "Installing collected packages"*) step "installing them" ;;
+        *"Building editable for foosim (pyproject.toml): started"*) step "building foosim" ;;
+        ERROR*) echo "    $line" >&2 ;;
+        esac
+    done
+}
+if [ ! -e .venv/installed ]; then
+    tail -n 20 .venv/setup.log >&2
+    exit 1
+fi
+rm .venv/installed
+step "done"
 # Last, so that an environment that was interrupted half-way is made anew.
 key >.venv/key

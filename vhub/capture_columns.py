@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from sys import intern
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,9 @@ from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body, forward_kinematics
 from foosim.vhub.rows import CaptureError, FrameRow, PacketRow
 
-Integers = NDArray[np.int64]
-Numbers = NDArray[np.float64]
-Objects = NDArray[np.object_]
+Integers: TypeAlias = NDArray[np.int64]
+Numbers: TypeAlias = NDArray[np.float64]
+Objects: TypeAlias = NDArray[np.object_]
 
 
 @dataclass(frozen=True, slots=True)

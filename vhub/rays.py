@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf, sqrt
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from foosim.protocol.scene import Vector
 
 Span = tuple[float, float]
 """Where a line enters something and where it leaves it (m)."""
-Floats = NDArray[np.float64]
+Floats: TypeAlias = NDArray[np.float64]
 
 BLOCK: Final = 32
 """Triangles that are looked at together."""

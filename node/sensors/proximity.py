@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, pi, sin
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from foosim.protocol.draws import draw_words, gaussian
 from foosim.protocol.obstacles import Circle, Rectangle, obstacles_of
 from foosim.protocol.rovers import ProximitySensor
 
-Numbers = NDArray[np.float64]
+Numbers: TypeAlias = NDArray[np.float64]
 TINY: Final = 1e-300
 """Stands for 0 in a ray's direction, so that a quotient is never 0 / 0."""
 WORDS: Final = 8

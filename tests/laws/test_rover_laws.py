@@ -165,7 +165,7 @@ def test_what_is_of_a_table_is_refused_in_a_hall(text: str) -> None:
     assert [answer.text for answer in refused] == [
         "this world is a hall: balls are added to a table",
         "no free body 'ball'; there are none",
-        "'rover01' was not added; added are none",
+        "'rover01' cannot be removed: only a ball that was added can, and none was",
     ]
 
 

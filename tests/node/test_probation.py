@@ -18,7 +18,7 @@ TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SHARD: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"
 THINGS: Final = (
     "{a: {shape: mesh, file: a.obj, scale: 0.02, surface: walls}, z: {shape: mesh, file: z.obj, surface: walls}, "
-    "block: {shape: box, length: 1 cm, width: 2 cm, height: 3 cm, surface: goal}}"
+    "block: {shape: box, x: 1 m, length: 1 cm, width: 2 cm, height: 3 cm, surface: goal}}"
 )
 TEXT: Final = apply_sets(TABLE.read_text(), "t", [f"scenery={THINGS}"])
 FILES: Final = {"a.obj": SHARD, "z.obj": SHARD + b"v 9 9 9\n"}

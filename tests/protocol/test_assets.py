@@ -26,7 +26,7 @@ SHARD: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"
 THINGS: Final = (
     "{shard: {shape: mesh, file: parts/shard.obj, scale: 0.02, z: 5 mm, surface: walls}, "
     "again: {shape: mesh, file: parts/shard.obj, x: 10 cm, surface: floor}, "
-    "block: {shape: box, length: 1 cm, width: 2 cm, height: 3 cm, yaw: 90 deg, surface: goal}}"
+    "block: {shape: box, x: 1 m, length: 1 cm, width: 2 cm, height: 3 cm, yaw: 90 deg, surface: goal}}"
 )
 
 
@@ -66,7 +66,7 @@ def test_a_file_that_changed_since_it_was_pinned_is_refused(folder: Path) -> Non
 
 
 def test_a_deployment_without_meshes_reads_nothing(tmp_path: Path) -> None:
-    text = with_scenery("{block: {shape: box, length: 1 cm, width: 2 cm, height: 3 cm, surface: goal}}")
+    text = with_scenery("{block: {shape: box, x: 1 m, length: 1 cm, width: 2 cm, height: 3 cm, surface: goal}}")
     assert pin_assets(text, "table.yaml", tmp_path / "absent") == (text, {})
 
 

@@ -60,7 +60,9 @@ def test_a_time_is_a_whole_number_of_nanoseconds(text: str, time_ns: int) -> Non
     ("text", "dimension", "message"),
     [
         (17.5, units.LENGTH, "not a length (a number and one of m, cm, mm, um, km), 17.5"),
-        ("17.5", units.LENGTH, "not a length (a number and one of m, cm, mm, um, km), '17.5'"),
+        ("17.5", units.LENGTH, "not a length (a number and one of m, cm, mm, um, km), '17.5', nearest is '17.5 m'"),
+        ("5", units.TIME, "not a time (a number and one of ns, us, ms, s, min, h), '5', nearest is '5 s'"),
+        ("5", units.PROBABILITY, "not a probability (a number and one of p, %), '5', nearest is '5 %'"),
         (
             "17.5 ms",
             units.LENGTH,

@@ -67,7 +67,7 @@ def test_all_problems_of_a_file_are_shown_with_their_places(command: Command, tm
 
 def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
     done = command("up", "nowhere.yaml")
-    assert (done.code, done.err) == (2, "nowhere.yaml:1:1: cannot be read, No such file or directory\n")
+    assert (done.code, done.err) == (2, "nowhere.yaml: there is no such file\n")
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--set", "seed=2", "--set", "engine=bulet"), 2, "--set:2:8: engine: "),
         (("--engine", "bulet"), 2, "nearest is 'bullet'"),
         (("--pace", "quick"), 2, "not a pace (realtime, fast or a factor such as 2x), 'quick'"),
-        (("--for", "20"), 2, "not a time"),
+        (("--for", "20"), 2, "'20', nearest is '20 s'"),
         (("--for", "0 s"), 2, "a run has at least one tick"),
         (("--seed", "-1"), 2, "seed: "),
         (("--listen", "nowhere:x"), 2, "not an address (HOST, HOST:PORT, tcp/HOST:PORT or tls/HOST:PORT), 'nowhere:x'"),
@@ -131,7 +131,8 @@ def test_without_a_live_run_there_is_nobody_to_control(command: Command, argumen
 def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
     assert command("step", "many").code == 2
     assert command("step", "0").code == 2
-    assert command("push", "0", "0").code == 2
+    done = command("step", "-3")
+    assert done.code == 2 and "'count': Input should be greater than or equal to 1" in done.err
 
 
 @pytest.mark.parametrize(
@@ -140,6 +141,9 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
         (("rate", "quick"), "not a pace (realtime, fast or a factor such as 2x), 'quick'"),
         (("rate", "0x"), "out of range 0.001x to 1000x, '0x'"),
         (("push", "0", "nan", "0"), "impulse: not a finite number, nan"),
+        (("push", "0", "-1"), "impulse: three numbers are needed, X Y Z in N s; here are 2, '0 -1'"),
+        (("push", "0", "1", "x"), "impulse: three numbers are needed, X Y Z in N s; not all of these are numbers, '0 1 x'"),  # noqa: E501
+        (("up",), "a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN"),
         (("add", "--position", "0", "0", "inf"), "position: not a finite number, inf"),
         (("add", "--velocity", "nan", "0", "0"), "velocity: not a finite number, nan"),
     ],

@@ -471,9 +471,8 @@ def test_on_the_table_rods_and_figures_stand_between_and_follow_the_frame() -> N
 
 
 def test_a_frame_is_looked_at_once_and_a_new_layout_has_its_bodies() -> None:
-    deployment = load_deployment(
-        apply_sets(TEXT, "t", ["scenery={pole: {shape: cylinder, radius: 1 cm, length: 1 m, surface: walls}}"]), "t"
-    )
+    thing = "{shape: cylinder, radius: 1 cm, length: 1 m, z: 70 cm, surface: walls}"
+    deployment = load_deployment(apply_sets(TEXT, "t", [f"scenery={{pole: {thing}}}"]), "t")
     rays = LineOfSight(deployment)
     layout = build_layout(deployment)
     frame = Frame(0, layout, np.array(initial_numbers(deployment, layout)))

@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from mypy_extensions import mypyc_attr
+
 from foosim.vhub.packet import Flight
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Stage:
     """One step of the pipeline on one link."""
 
