@@ -139,7 +139,7 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
     with pytest.raises(Refused) as refused:
         plan_again(folder)
     assert problems[what] in str(refused.value), refused.value
-    begins = "A new run begins with the last captured frame: " if what in ("supervisor", "vhub") else " begins a new run"
+    begins = "A new run begins with the last captured frame" if what in ("supervisor", "vhub") else " begins a new run"
     assert f"foosim-supervisor up {TABLE}" in str(refused.value) and begins in str(refused.value)
 
 
