@@ -28,6 +28,7 @@ from foosim.protocol.radio_references import place_findings, rule_findings
 from foosim.protocol.references import Finding, check_references, path_text
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.settings import place_sets
+from foosim.protocol.table_clearance import clearance_findings
 from foosim.protocol.timing_references import check_timing
 from foosim.protocol.yaml_tree import (
     DEPTH_MAX,
@@ -191,7 +192,8 @@ def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
             findings += islice(schema_findings(error), PROBLEMS_MAX + 1)
         if deployment is not None and not findings:
             rules = rule_findings(deployment.network, deployment.endpoints(), deployment.carriers())
-            found_later = chain(start_findings(deployment), rules, place_findings(deployment))
+            in_the_way = chain(start_findings(deployment), clearance_findings(deployment))
+            found_later = chain(in_the_way, rules, place_findings(deployment))
             findings = list(islice(found_later, PROBLEMS_MAX + 1))
         found += [_problem(tree, finding) for finding in findings]
     if found or deployment is None:

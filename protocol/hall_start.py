@@ -1,4 +1,4 @@
-"""Where rovers start: in the hall, and not in anything else.
+"""Where rovers start and stations stand: in the hall, and not in anything else.
 
 That takes geometry, so it is looked at when all single fields are right. Neighbours: `deployment_file` (which asks),
 `references` (everything else between the parts of a deployment), `obstacles`.
@@ -8,22 +8,44 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from foosim.protocol.deployment import Deployment, RoverRobot
-from foosim.protocol.obstacles import Circle, named_obstacles
+from foosim.protocol.deployment import Deployment, RoverRobot, StationRobot
+from foosim.protocol.obstacles import Circle, Obstacle, named_obstacles
 from foosim.protocol.references import Finding
 
 
 def start_findings(deployment: Deployment) -> Iterator[Finding]:
-    """Yield the rovers that start in an obstacle or in one another; meshes count once their files are there."""
+    """Yield the rovers and stations that are in an obstacle, in one another or outside of the hall.
+
+    Meshes count once their files are there.
+    """
     if not deployment.is_hall:
         return
-    radius = deployment.hall.rover.radius
+    hall = deployment.hall
     taken = list(named_obstacles(deployment))
     for name, robot in deployment.robots.items():
-        if not isinstance(robot, RoverRobot):
-            continue
-        for what, thing in taken:
-            if not thing.is_clear(robot.x, robot.y, radius):
-                yield Finding(("robots", name, "x"), f"the rover starts in {what}", f"{robot.x:g} m, {robot.y:g} m")
-                break
-        taken.append((f"the rover {name}", Circle(robot.x, robot.y, radius)))
+        if isinstance(robot, StationRobot):
+            circle = robot.x, robot.y, hall.station.radius
+            others = [entry for entry in taken if entry[0] != f"the station {name}"]
+            yield from _misplaced(deployment, name, "the station stands", circle, others)
+    for name, robot in deployment.robots.items():
+        if isinstance(robot, RoverRobot):
+            circle = robot.x, robot.y, hall.rover.radius
+            yield from _misplaced(deployment, name, "the rover starts", circle, taken)
+            taken.append((f"the rover {name}", Circle(*circle)))
+
+
+def _misplaced(
+    deployment: Deployment,
+    name: str,
+    subject: str,
+    circle: tuple[float, float, float],
+    taken: list[tuple[str, Obstacle]],
+) -> Iterator[Finding]:
+    """Yield what is wrong with the place of a robot, as a circle (m): the first thing that it is in."""
+    x, y, _ = circle
+    half_x, half_y = deployment.hall.length / 2, deployment.hall.width / 2
+    met = next((f"in {what}" for what, thing in taken if not thing.is_clear(*circle)), None)
+    if met is None and (abs(x) > half_x or abs(y) > half_y):
+        met = f"outside of the hall: valid are x from {-half_x:g} to {half_x:g} m, y from {-half_y:g} to {half_y:g} m"
+    if met is not None:
+        yield Finding(("robots", name, "x"), f"{subject} {met}", f"{x:g} m, {y:g} m")

@@ -16,12 +16,13 @@ from foosim.protocol.assets import pin_assets
 from foosim.protocol.certificates import load_credentials, operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text
+from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text, refuse_findings
 from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.hall_start import start_findings
 from foosim.protocol.hosts import places
 from foosim.protocol.messages import Origin
 from foosim.protocol.start import Start
+from foosim.protocol.table_clearance import clearance_findings
 from foosim.protocol.units import Pace, parse_ns, parse_pace
 from foosim.supervisor.resumable import check_resumable
 from foosim.supervisor.run_folder import Launch, RunFolder
@@ -147,10 +148,11 @@ def check_models_here(plan: Plan) -> None:
         check_link_models(network, read_deployment_text(file), str(file), plan.options.all_sets)
 
 
-def check_starts(deployment: Deployment) -> None:
-    """Raise BadValue for a rover that starts in a mesh, whose file has been read by now."""
-    for finding in start_findings(deployment):
-        raise BadValue(f"{'.'.join(map(str, finding.location))}: {finding.what}", finding.value)
+def check_meshes(deployment: Deployment, options: RunOptions) -> None:
+    """Raise DeploymentError for meshes, whose files have been read by now, that bodies start in or pass through."""
+    findings = [*start_findings(deployment), *clearance_findings(deployment)]
+    if findings:
+        refuse_findings(read_deployment_text(options.file), str(options.file), findings, options.all_sets)
 
 
 def make_plan(options: RunOptions) -> Plan:
@@ -160,7 +162,7 @@ def make_plan(options: RunOptions) -> Plan:
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
     check_models(deployment, name, text)
-    check_starts(deployment)
+    check_meshes(deployment, options)
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
     pace = deployment.pace if options.pace is None else parse_pace(options.pace)

@@ -204,7 +204,7 @@ FILES = {"dome.obj": dome()}
 DOMES = (
     "scenery={"
     + ", ".join(
-        f"d{x}{y}: {{shape: mesh, file: dome.obj, x: {x * 149 - 75} mm, y: {y * 180} mm, yaw: {17 * x} deg, "
+        f"d{x}{y}: {{shape: mesh, file: dome.obj, x: {x * 149 - 149} mm, y: {y * 180 + 90} mm, yaw: {17 * x} deg, "
         "scale: 0.05, surface: walls}"
         for x, y in product(range(-1, 3), range(-1, 2))
     )
@@ -216,8 +216,8 @@ DOMES = (
 POSTS = (
     "scenery={"
     + ", ".join(
-        f"p{x}{y}: {{shape: cylinder, radius: 2 cm, length: 8 cm, x: {x * 149 - 75} mm, y: {y * 180} mm, z: 1 cm, "
-        f"roll: {20 * y} deg, pitch: {15 * x} deg, surface: walls}}"
+        f"p{x}{y}: {{shape: cylinder, radius: 2 cm, length: 8 cm, x: {x * 149 - 149} mm, "
+        f"y: {y * 180 + 90} mm, z: -1 cm, roll: {20 * y} deg, pitch: {15 * x} deg, surface: walls}}"
         for x, y in product(range(-1, 3), range(-1, 2))
     )
     + "}"

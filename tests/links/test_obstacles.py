@@ -65,7 +65,7 @@ def loss_cdb(deployment: Deployment, ball: Vector = AWAY, ends: tuple[str, str] 
 
 def wall(radio: str, thickness: str = "20 cm", at: str = "0 m") -> str:
     size = f"length: {thickness}, width: 3 m, height: 3 m"
-    return f"wall: {{shape: box, {size}, x: {at}, z: 2 m, surface: walls, radio: {radio}}}"
+    return f"wall: {{shape: box, {size}, x: {at}, z: 1.8 m, surface: walls, radio: {radio}}}"
 
 
 @pytest.mark.parametrize(

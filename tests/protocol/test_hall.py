@@ -13,6 +13,7 @@ from foosim.protocol.assign import Assignment, reach_of
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.frame import fitting_edits
+from foosim.protocol.hall_start import start_findings
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Add, Edit, Freeze, Push, Remove, Thaw
 from foosim.protocol.obstacles import Circle, Rectangle, obstacle, obstacles_of
@@ -71,6 +72,33 @@ def test_what_does_not_fit_is_refused_with_its_place(
     more = [f"robots.rover01.{y}" for end, y in elsewhere.items() if problem.endswith(end)]
     more += ["robots.rover03.y=6.5 m", "robots.rover01.x=4.2 m"] if "rover03" in setting else []
     assert problems(fleet_text(3), setting, *more)[:1] == [problem]
+
+
+@pytest.mark.parametrize(
+    ("sets", "problem"),
+    [
+        (["robots.rover01.x=30 m"], "robots.rover01.x: the rover starts outside of the hall: "
+         "valid are x from -20 to 20 m, y from -12.5 to 12.5 m, '30 m, 11.25 m'"),
+        (["robots.base.y=20 m"], "robots.base.x: the station stands outside of the hall: "
+         "valid are x from -20 to 20 m, y from -12.5 to 12.5 m, '-17.5 m, 20 m'"),
+        (["robots.base.x=-19.9 m"], "robots.base.x: the station stands in a wall of the hall, '-19.9 m, 0 m'"),
+        (["scenery.pallet={shape: box, x: -17 m, z: 1 m, length: 1 m, width: 1 m, height: 2 m}"],
+         "robots.base.x: the station stands in scenery.pallet, '-17.5 m, 0 m'"),
+    ],
+)  # fmt: skip
+def test_who_stands_in_something_or_outside_is_refused(
+    fleet_text: Callable[..., str], sets: list[str], problem: str
+) -> None:
+    assert problems(fleet_text(2), *sets)[0] == problem
+
+
+def test_stations_do_not_stand_in_one_another() -> None:
+    second = DEPLOYMENT.robots["base"].model_copy(update={"x": -17.2})
+    deployment = DEPLOYMENT.model_copy(update={"robots": {**DEPLOYMENT.robots, "second": second}})
+    assert [(finding.location[1], finding.what) for finding in start_findings(deployment)] == [
+        ("base", "the station stands in the station second"),
+        ("second", "the station stands in the station base"),
+    ]
 
 
 def test_a_process_has_its_players_on_one_host() -> None:

@@ -19,7 +19,7 @@ from foosim.protocol.scene import Cylinder
 from foosim.protocol.scenes import build_scene
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
-POST: Final = "shape: cylinder, radius: 1 cm, length: 20 cm, surface: walls"
+POST: Final = "shape: cylinder, radius: 1 cm, length: 20 cm, z: 1 m, surface: walls"
 NAMES: Final = "concrete, brick, plasterboard, wood, glass, chipboard, metal"
 SIMPLEX: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n"
 LAST_FACE: Final = b"f 3 1 4\n"

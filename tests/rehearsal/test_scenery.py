@@ -21,12 +21,12 @@ TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
 TICKS: Final = 100
 WEDGE: Final = b"""# A wedge: a ball that rolls along x goes up.
-v -2 -3 0
-v 2 -3 0
-v 2 3 0
-v -2 3 0
-v 2 -3 2
-v 2 3 2
+v -2 -9 0
+v 2 -9 0
+v 2 9 0
+v -2 9 0
+v 2 -9 2
+v 2 9 2
 f 1 4 3 2
 f 1 2 5
 f 4 6 3
@@ -37,8 +37,8 @@ SETS: Final = (
     "table.rules.kickoff_delay=2 ms",
     "table.rules.kickoff_speed=3 m/s",
     "players={}",
-    "scenery={left: {shape: mesh, file: wedge.obj, scale: 0.02, x: -6 cm, yaw: 180 deg, surface: walls}, "
-    "right: {shape: mesh, file: wedge.obj, scale: 0.02, x: 6 cm, surface: walls, material: {red: 1}}}",
+    "scenery={left: {shape: mesh, file: wedge.obj, scale: 0.007, x: -3.2 cm, yaw: 180 deg, surface: walls}, "
+    "right: {shape: mesh, file: wedge.obj, scale: 0.007, x: 3.2 cm, surface: walls, material: {red: 1}}}",
 )
 
 
@@ -98,7 +98,7 @@ SOLIDS: Final = {
 @pytest.mark.parametrize("drawn_as", SOLIDS)
 def test_boxes_and_cylinders_are_scenery_on_both_engines(folder: Path, drawn_as: str) -> None:
     """A wall, or a tube that lies across, on either side; a viewer is told of both."""
-    walls = f"scenery={{left: {{{SOLIDS[drawn_as]}, x: -20 cm}}, right: {{{SOLIDS[drawn_as]}, x: 20 cm}}}}"
+    walls = f"scenery={{left: {{{SOLIDS[drawn_as]}, x: -15 cm}}, right: {{{SOLIDS[drawn_as]}, x: 15 cm}}}}"
     for engine in ("bullet", "pure"):
         path = folder / f"{engine}.mcap"
         rehearse(TEXT, "table.yaml", TICKS, 1, (*SETS[:-1], walls, f"engine={engine}"), capture=path)
