@@ -12,7 +12,8 @@ from collections.abc import Callable, Sequence
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.failing import tell_failure
-from foosim.client.player import PlayerFactory, PlayerLoop, load_player
+from foosim.client.loading import load_player
+from foosim.client.player import PlayerFactory, PlayerLoop
 from foosim.protocol.actions import Action, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.command import DONE, FAILED, REFUSED

@@ -1,6 +1,6 @@
 """What is said of a player whose own code raised: who, when, what, and where in the user's own files.
 
-Neighbours: `player` calls that code, `main` and the rehearsal end the process.
+Neighbours: `player` calls that code, `loading` imports it, `main` and the rehearsal end the process.
 """
 
 from __future__ import annotations
@@ -11,10 +11,12 @@ import traceback
 from contextlib import suppress
 from functools import cache
 from types import FrameType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
+
+if TYPE_CHECKING:
+    from foosim.client.core import ClientCore
 
 OURS: Final = "foosim"
 TEXT_LENGTH_MAX: Final = 500
@@ -35,7 +37,7 @@ class Unanswered(BaseException):
 
 def failed(where: str, error: BaseException, module: str) -> PlayerFailed:
     """Return what ends a player of the class of `module`; `where` says who failed and when."""
-    return PlayerFailed(f"{where}: {describe(error)}{_place(error, module)}", _trace_of(error))
+    return PlayerFailed(f"{where}: {describe(error)}{place_of(error, module)}", _trace_of(error))
 
 
 def tell_failure(core: ClientCore, error: PlayerError | Unanswered) -> None:
@@ -52,13 +54,20 @@ def describe(error: BaseException) -> str:
     """An error of somebody's own code on one line, bounded."""
     kind, text = type(error).__name__, "its text cannot be made"
     with suppress(Exception):  # the user's own code, too
-        text = " ".join(str(error).split())
+        said = error.msg if isinstance(error, SyntaxError) else str(error)  # which has its place behind it
+        text = " ".join(said.split())
     text = text if len(text) <= TEXT_LENGTH_MAX else f"{text[: TEXT_LENGTH_MAX - 3]}..."
     return f"{kind}: {text}" if text else kind
 
 
-def _place(error: BaseException, module: str) -> str:
-    """Return ` (file:line: code)` of the last frame in the user's own files; of the last one at all where none is."""
+def place_of(error: BaseException, module: str) -> str:
+    """Return ` (file:line: code)` of the last frame in the user's own files; of the last one at all where none is.
+
+    Of code that cannot be compiled it is that code's.
+    """
+    if isinstance(error, SyntaxError) and error.filename:
+        code = f": {error.text.strip()}" if error.text else ""
+        return f" ({error.filename}:{error.lineno}{code})"
     frames = [(frame, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     found = next((at for at in reversed(frames) if _is_own(at[0], module)), frames[-1] if frames else None)
     if found is None:
@@ -75,7 +84,12 @@ def _is_own(frame: FrameType, module: str) -> bool:
     if package == module.partition(".")[0]:
         return True
     file = frame.f_code.co_filename
-    return package != OURS and not file.startswith(("<", *_libraries()))
+    return package != OURS and not file.startswith("<") and not in_library(file)
+
+
+def in_library(file: str) -> bool:
+    """Whether a file is one of Python's own modules or of an installed package."""
+    return file.startswith(_libraries())
 
 
 @cache

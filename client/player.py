@@ -1,21 +1,21 @@
-"""Players: what a controller's class looks like, how it is loaded, and the loop that runs it.
+"""Players: what a controller's class looks like, and the loop that runs it.
 
 A player is a class with `act(tick, samples) -> commands`; the deployment names it as `module:Class`, with a rate, the
 robots it may command and hear, and parameters. The loop turns each Go into samples, calls `act`, and answers. The
-process `foosim-player` and the rehearsal run this same loop. Neighbours: `core`, `payloads`; `players` has a team.
+process `foosim-player` and the rehearsal run this same loop. Neighbours: `core`, `payloads`, `loading`
+(finds the class); `players` has a team.
 """
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any, Final, NamedTuple, Protocol, cast
+from typing import Any, Final, NamedTuple, Protocol
 
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PacketError, PlayerError, UnknownName
-from foosim.client.failing import Unanswered, describe, failed
+from foosim.client.failing import Unanswered, failed
+from foosim.client.loading import load_player
 from foosim.client.packets import Outgoing, check_packet
 from foosim.client.payloads import Command, Drive, Value, channel_kind, command_channel, decode_payload, encode_command
 from foosim.protocol.deployment import Deployment
@@ -68,28 +68,6 @@ class Player(Protocol):
 
 PlayerFactory = Callable[[Deployment, Mapping[str, Any]], Player]
 """Makes a player from the deployment and its own parameters; usually the player's class."""
-
-
-def load_player(path: str) -> PlayerFactory:
-    """Return the class that `module:Class` names. Raises PlayerError, which says what is missing."""
-    module_name, colon, class_name = path.partition(":")
-    if not (module_name and colon and class_name):
-        raise PlayerError(f"player {path!r}: not of the form module:Class")
-    try:
-        module = import_module(module_name)
-    except ModuleNotFoundError as error:
-        missing = "" if error.name == module_name else f" (it imports {error.name})"
-        raise PlayerError(f"player {path}: there is no module {error.name}{missing}") from error
-    except Exception as error:
-        raise PlayerError(f"player {path}: importing {module_name} failed: {describe(error)}") from error
-    made: Any = getattr(module, class_name, None)
-    if made is None:
-        classes = [name for name, value in vars(module).items() if inspect.isclass(value) and hasattr(value, "act")]
-        unknown = UnknownName(f"player {path}: no such class in {module_name}", class_name, classes)
-        raise PlayerError(unknown.what)
-    if not inspect.isclass(made) or not callable(getattr(made, "act", None)):
-        raise PlayerError(f"player {path}: {class_name} is no class with a method act(tick, samples)")
-    return cast(PlayerFactory, made)
 
 
 class Newest:

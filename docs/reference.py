@@ -56,7 +56,8 @@ DEADLINES: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "start": (
         "supervisor, `up`",
-        "processes and players of a run that is started or resumed; until its first commit nothing else counts",
+        "processes and players of a run that is started or resumed, until its first commit nothing else counts; "
+        "before that, the import of players' modules",
     ),
     "orphan": ("nodes, vHub", "a supervisor that is gone; then they end, and the run can be resumed"),
     "vhub_back": ("supervisor, clients", "a vHub that is gone; then the run ends, or the client does"),

@@ -60,6 +60,13 @@ def is_selector(text: str) -> bool:
     return len(text) <= SELECTOR_LENGTH_MAX and _SELECTOR.fullmatch(text) is not None
 
 
+def class_path_of(text: str) -> str | None:
+    """Return the class path that `module.Class` was meant to be; None where it names no class: those have capitals."""
+    module, _, name = text.rpartition(".")
+    path = f"{module}:{name}"
+    return path if name[:1].isupper() and re.fullmatch(CLASS_PATTERN, path) else None
+
+
 def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR) -> str | None:
     """The choice that looks most like the value; None when none does.
 

@@ -28,11 +28,16 @@ def die_with_parent() -> None:
     parent, _, pipe = os.environ.pop(PARENT_VARIABLE, "").partition(":")
     if not parent:
         return
+    end_with(int(parent))
+    threading.Thread(target=_watch, args=(int(pipe),), name="parent", daemon=True).start()
+
+
+def end_with(parent: int) -> None:
+    """Have the kernel kill this process when its parent ends, where the kernel can be asked."""
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != int(parent):  # it ended before the kernel was asked
+    if os.getppid() != parent:  # it ended before the kernel was asked
         os._exit(1)
-    threading.Thread(target=_watch, args=(int(pipe),), name="parent", daemon=True).start()
 
 
 def _watch(pipe: int) -> None:

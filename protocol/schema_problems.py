@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from foosim.protocol import hosts, names
 from foosim.protocol.deployment import deployment_schema
 from foosim.protocol.names import nearest_name
-from foosim.protocol.references import Finding, Location
+from foosim.protocol.references import Finding, Location, quoted
 
 _NAME = "lower case letters, digits, - and _, a letter first"
 _PATTERNS: Final = {
@@ -66,6 +66,8 @@ def _finding(detail: ErrorDetails, under: Location) -> Finding:
     nearest = context.get("nearest")
     if kind == "bool_type" and isinstance(value, str):
         nearest = _BOOLEANS.get(value.lower())
+    if context.get("pattern") == names.CLASS_PATTERN:
+        nearest = quoted(names.class_path_of(str(value)))
     what = _PATTERNS.get(context.get("pattern", "")) or _KINDS.get(kind) or _bounds(kind, context) or detail["msg"]
     return Finding(location, what, location[-1] if is_key else value, nearest, "key" if is_key else "value")
 

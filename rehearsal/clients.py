@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.failing import Unanswered, tell_failure
-from foosim.client.player import PlayerLoop, load_player
+from foosim.client.loading import load_player
+from foosim.client.player import PlayerLoop
 from foosim.protocol import channels
 from foosim.rehearsal.settings import Process
 

@@ -25,7 +25,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.swarm import Flown, fly
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.display import score_text
-from foosim.supervisor.plan import Plan, RunOptions, check_models_here, make_plan
+from foosim.supervisor.plan import Plan, RunOptions, check_models_here, check_players_here, make_plan
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 
@@ -81,6 +81,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     if free:
         raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))
 
+    check_players_here(plan)
     if not json:
         for line in (*([plan.branch.text] if plan.branch else []), *start_lines(meanings(plan.deployment), str(file))):
             typer.echo(line)

@@ -26,7 +26,15 @@ from foosim.supervisor.main import serve
 from foosim.supervisor.new_capture import check_capture, default_capture
 from foosim.supervisor.outcome import Outcome, detached_outcome, ended_outcome, refused_result
 from foosim.supervisor.pki_hosts import files_for, send_files
-from foosim.supervisor.plan import Plan, RunOptions, check_certificates, check_models_here, make_plan, plan_again
+from foosim.supervisor.plan import (
+    Plan,
+    RunOptions,
+    check_certificates,
+    check_models_here,
+    check_players_here,
+    make_plan,
+    plan_again,
+)
 from foosim.supervisor.remote import Remote, unit_name
 from foosim.supervisor.run_folder import RunFolder, create_run, open_run, run_exists
 from foosim.supervisor.units import units_of
@@ -146,6 +154,7 @@ def _begin(
     default, where any is wanted (`captures`)."""
     plan = make_plan(options)
     check_models_here(plan)
+    check_players_here(plan)
     found = capture or default_capture(plan.deployment.world)
     path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
     _prepare(plan, display, None)
@@ -160,6 +169,7 @@ def _go_on(folder: RunFolder, display: Display) -> Up | Outcome:
         recover_leftovers(display.say)
         return ended_outcome(folder)
     plan, path = plan_again(folder)
+    check_players_here(plan)
     _prepare(plan, display, folder.name)
     return Up(plan, path, display, None, folder)
 
@@ -346,9 +356,11 @@ def _show(answer: Answer, json: bool) -> None:
 def validate(file: File, json: Json = False) -> None:
     """Check a deployment file.
 
-    All problems are shown at once, one a line: file:line:column: what, value, nearest valid name.
+    All problems are shown at once, one a line: file:line:column: what, value, nearest valid name. Of a file without
+    any the classes of the players that run here are imported, in a process of its own.
     """
     plan = make_plan(RunOptions(file))
+    check_players_here(plan)
     deployment = plan.deployment
     content = {
         "world": deployment.world,

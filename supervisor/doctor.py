@@ -24,6 +24,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from packaging.requirements import Requirement
 
+from foosim.client.class_check import player_findings
 from foosim.protocol import limits, wall
 from foosim.protocol.addresses import Address, check_listen
 from foosim.protocol.certificates import (
@@ -44,7 +45,7 @@ from foosim.protocol.certificates import (
 )
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Refused
+from foosim.protocol.errors import Refused, describe
 from foosim.protocol.fingerprint import is_compiled, library_fingerprint
 from foosim.protocol.hosts import places
 from foosim.supervisor.guard import hosted_folder
@@ -64,6 +65,8 @@ HERE: Final = "here"
 TIME_ERROR: Final = 5
 """What `adjtimex` returns of a clock that nothing keeps in time."""
 PYTHON_TESTED: Final = (3, 11)
+IMPORT_S: Final = 20.0
+"""How long the players' modules may take: half of what a host may take for all its answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -354,10 +357,26 @@ def _units(case: Case) -> Iterator[_Said]:
         yield (name, "fine", "", "") if is_same else (name, "warning", "is not as it would be written now", remedy)
 
 
+def _players(case: Case) -> Iterator[_Said]:
+    """Whether the classes of the players that are to run on this machine can be imported here."""
+    deployment, elsewhere = case.deployment, places(case.deployment)
+    here = [name for name in sorted(deployment.players) if elsewhere.get(name) == case.host]
+    wrong = {finding.location[1]: finding for finding in player_findings(deployment, here, IMPORT_S)}
+    for name in here:
+        found, path = wrong.get(name), deployment.players[name].class_
+        if found is None:
+            yield name, "fine", path, ""
+            continue
+        text = describe(found.what, path, found.nearest)
+        where = f"as ssh to {case.host} has it: in a file that its shell reads" if case.is_there else "of `up`"
+        yield name, "problem", text, f"correct players.{name}.class, or put the module's folder on PYTHONPATH {where}"
+
+
 CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
     "versions": _versions,
     "arithmetic": _arithmetic,
     "commands": _commands,
+    "players": _players,
     "certificates": _certificates,
     "ports": _ports,
     "clock": _clock,

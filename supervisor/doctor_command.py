@@ -37,11 +37,11 @@ def doctor(
 ) -> None:
     """Look whether a deployment could run on this machine and its hosts, before it does.
 
-    Checks versions, certificates (names, dates, keys, hosts), ports, the clock and disks, here and, through ssh, on
-    each host of the deployment: also whether it answers, whether the supervisor's port is reached from there and the
-    vHub's from here, how far its clock is off, and the units of systemd. For that, foosim listens at these ports for
-    a moment. Each line says what is fine, what is not, and what to do. Exit codes: 0 nothing stands in the way, 1
-    something does, 2 bad input.
+    Checks versions, the players' classes, certificates (names, dates, keys, hosts), ports, the clock and disks, here
+    and, through ssh, on each host of the deployment: also whether it answers, whether the supervisor's port is reached
+    from there and the vHub's from here, how far its clock is off, and the units of systemd. For that, foosim imports
+    the modules of players and listens at these ports for a moment. Each line says what is fine, what is not, and what
+    to do. Exit codes: 0 nothing stands in the way, 1 something does, 2 bad input.
     """
     text = read_deployment_text(file)
     deployment = load_deployment(text, str(file))

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from foosim.client.class_check import player_findings
 from foosim.node.engines.probation import check_models
 from foosim.protocol import identity, wall
 from foosim.protocol.addresses import Address, check_listen
@@ -146,6 +147,15 @@ def check_models_here(plan: Plan) -> None:
     if VHUB not in places(plan.deployment):
         file, network = plan.options.file, plan.deployment.network
         check_link_models(network, read_deployment_text(file), str(file), plan.options.all_sets)
+
+
+def check_players_here(plan: Plan) -> None:
+    """Raise DeploymentError for players' classes that cannot be had. Those on other machines have theirs there."""
+    deployment, elsewhere = plan.deployment, places(plan.deployment)
+    findings = player_findings(deployment, [name for name in deployment.players if name not in elsewhere])
+    if findings:
+        file = plan.options.file
+        refuse_findings(read_deployment_text(file), str(file), findings, plan.options.all_sets)
 
 
 def check_meshes(deployment: Deployment, options: RunOptions) -> None:

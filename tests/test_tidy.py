@@ -38,6 +38,7 @@ ONLY_IN = {"zenoh": "protocol/session.py", "pybullet": "node/engines/bullet.py"}
 # The files that touch the world. Every other module is a core: it gets messages and the time and returns what to do,
 # which is why rehearsal can run all of them in one process on virtual time.
 SHELLS = {
+    "client/class_check.py",
     "client/client.py",
     "client/main.py",
     "client/replay.py",

@@ -1,8 +1,7 @@
-"""Loading a player and running it: what it is given, what it may do, and what is said when it does something else."""
+"""Running a player: what it is given, what it may do, and what is said when it does something else."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,8 +13,7 @@ from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.packets import Outgoing
 from foosim.client.payloads import BallPosition, Command, RodPosition
-from foosim.client.player import Commands, PlayerLoop, Samples, Turn, load_player
-from foosim.client.players import Team
+from foosim.client.player import Commands, PlayerLoop, Samples, Turn
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
@@ -212,56 +210,3 @@ def test_a_player_that_is_not_declared_is_no_player() -> None:
     sets = ("players={}", f"clients={{{NAME}: {{lockstep: false}}}}")
     with pytest.raises(PlayerError, match=r"not declared as a player \(there are: none\), 'player-red'"):
         begun(*sets)
-
-
-# --- loading ---------------------------------------------------------------------------------------------------------
-
-SOURCE = """
-class Acts:
-    def act(self, tick, samples):
-        return {}
-
-class Sits:
-    pass
-
-number = 3
-"""
-
-
-@pytest.fixture
-def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Modules of somebody's own, on the path."""
-    (tmp_path / "own_player.py").write_text(SOURCE)
-    (tmp_path / "own_broken.py").write_text("1 / 0\n")
-    (tmp_path / "own_importer.py").write_text("import own_missing\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    for name in ("own_player", "own_broken", "own_importer"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
-
-
-@pytest.mark.usefixtures("modules")
-@pytest.mark.parametrize(
-    ("path", "text"),
-    [
-        ("own_player", "player 'own_player': not of the form module:Class"),
-        (":Acts", "player ':Acts': not of the form module:Class"),
-        ("own_playr:Acts", "player own_playr:Acts: there is no module own_playr"),
-        ("own_importer:Acts", "player own_importer:Acts: there is no module own_missing (it imports own_missing)"),
-        ("own_broken:Acts",
-         "player own_broken:Acts: importing own_broken failed: ZeroDivisionError: division by zero"),
-        ("own_player:Atcs", "player own_player:Atcs: no such class in own_player (there are: Acts), 'Atcs',"
-         " nearest is 'Acts'"),
-        ("own_player:Sits", "player own_player:Sits: Sits is no class with a method act(tick, samples)"),
-        ("own_player:number", "player own_player:number: number is no class with a method act(tick, samples)"),
-    ],
-)  # fmt: skip
-def test_a_class_that_cannot_be_loaded_says_why(path: str, text: str) -> None:
-    with pytest.raises(PlayerError) as error:
-        load_player(path)
-    assert str(error.value) == text
-
-
-@pytest.mark.usefixtures("modules")
-def test_a_class_is_found_by_its_path() -> None:
-    assert load_player("foosim.client.players:Team") is Team
-    assert load_player("own_player:Acts").__name__ == "Acts"

@@ -65,6 +65,26 @@ def test_all_problems_of_a_file_are_shown_with_their_places(command: Command, tm
     assert "nearest is 'bullet'" in lines[1]
 
 
+def test_a_valid_file_whose_players_cannot_be_found_is_refused_but_for_those_on_other_machines(
+    command: Command, tmp_path: Path
+) -> None:
+    path, text = tmp_path / "own.yaml", TABLE.read_text()
+    assert text.count("class: foosim.client.players:Team") == 2
+    path.write_text(text.replace("class: foosim.client.players:Team", "class: own_team:Team"))
+    done = command("validate", path)
+    assert done.code == 2
+    whose = [line.split(": ")[1] for line in done.err.splitlines()]
+    assert whose == ["players.player-red.class", "players.player-blue.class"]
+    lines = text.splitlines()
+    number = next(at for at, line in enumerate(lines, 1) if "client.players:Team" in line)
+    place = f"{path}:{number}:{lines[number - 1].index('foosim.client') + 1}: "
+    missing = "there is no module own_team (is the folder that it is in on PYTHONPATH?), 'own_team:Team'"
+    assert done.err.splitlines()[0] == f"{place}players.player-red.class: {missing}"
+    away = path.read_text().replace("class: own_team:Team", "class: own_team:Team\n    host: arm")
+    path.write_text(f"{away}\nhosts:\n  arm:\n    address: 192.0.2.7\n")
+    assert command("validate", path).code == 0
+
+
 def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
     done = command("up", "nowhere.yaml")
     assert (done.code, done.err) == (2, "nowhere.yaml: there is no such file\n")
@@ -76,6 +96,21 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--set", "table.ball.mas=27 g"), 2, "--set:1:12: table.ball: unknown key, 'mas', nearest is 'mass'"),
         (("--set", "seed=2", "--set", "engine=bulet"), 2, "--set:2:8: engine: "),
         (("--engine", "bulet"), 2, "nearest is 'bullet'"),
+        (
+            ("--set", "players.player-red.class=foosim.client.players.Team"),
+            2,
+            "nearest is 'foosim.client.players:Team'",
+        ),
+        (
+            ("--set", "players.player-red.class=foosim.client.players:Teem"),
+            2,
+            "nearest is 'foosim.client.players:Team'",
+        ),
+        (
+            ("--set", "players.player-red.class=own:Acts"),
+            2,
+            "there is no module own (is the folder that it is in on PYTHONPATH?), 'own:Acts'",
+        ),
         (("--pace", "quick"), 2, "not a pace (realtime, fast or a factor such as 2x), 'quick'"),
         (("--for", "20"), 2, "'20', nearest is '20 s'"),
         (("--for", "0 s"), 2, "a run has at least one tick"),
@@ -142,7 +177,10 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
         (("rate", "0x"), "out of range 0.001x to 1000x, '0x'"),
         (("push", "0", "nan", "0"), "impulse: not a finite number, nan"),
         (("push", "0", "-1"), "impulse: three numbers are needed, X Y Z in N s; here are 2, '0 -1'"),
-        (("push", "0", "1", "x"), "impulse: three numbers are needed, X Y Z in N s; not all of these are numbers, '0 1 x'"),  # noqa: E501
+        (
+            ("push", "0", "1", "x"),
+            "impulse: three numbers are needed, X Y Z in N s; not all of these are numbers, '0 1 x'",
+        ),
         (("up",), "a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN"),
         (("add", "--position", "0", "0", "inf"), "position: not a finite number, inf"),
         (("add", "--velocity", "nan", "0", "0"), "velocity: not a finite number, nan"),

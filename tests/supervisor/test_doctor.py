@@ -54,6 +54,21 @@ def test_where_all_is_well_every_check_says_so(deployment: Deployment, folder: P
         assert (finding.state == "fine") == (finding.remedy == ""), finding
 
 
+def test_the_classes_of_players_are_imported_where_they_are_to_run(tmp_path: Path) -> None:
+    hosts = "\nhosts:\n  arm:\n    address: 192.0.2.7\n"
+    text = read_deployment_text(TABLE) + hosts
+    text = text.replace("class: foosim.client.players:Team", "class: own_team:Team\n    host: arm", 1)
+    text = text.replace("class: foosim.client.players:Team", "class: foosim.client.players:Teem", 1)
+    deployment = load_deployment(text, "table.yaml")
+    here, there = Case(deployment, "127.0.0.1"), Case(deployment, "127.0.0.1", host="arm")
+    (finding,) = [finding for finding in examine(here) if finding.check == "players"]
+    assert (finding.subject, finding.state) == ("player-blue", "problem") and "class Teem" in finding.text
+    assert finding.remedy.startswith("correct players.player-blue.class, or put the module's folder on PYTHONPATH")
+    (finding,) = [finding for finding in examine(there) if finding.check == "players"]
+    assert (finding.subject, finding.state, finding.host) == ("player-red", "problem", "arm")
+    assert "there is no module own_team" in finding.text and "as ssh to arm has it" in finding.remedy
+
+
 def _no_certificate(folder: Path) -> None:
     (folder / "node.red.pem").unlink()
 

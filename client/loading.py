@@ -1,0 +1,115 @@
+"""Finds the class that a deployment names as `module:Class`, and says what is wrong with it without calling it.
+
+Neighbours: `player` loads with it and runs what it finds, `class_check` looks before a run begins.
+"""
+
+from __future__ import annotations
+
+import inspect
+import pkgutil
+import sys
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from foosim.client.errors import CHOICES_MAX, PlayerError
+from foosim.client.failing import Unanswered, describe, in_library, place_of
+from foosim.protocol.names import class_path_of, nearest_name
+
+if TYPE_CHECKING:
+    from foosim.client.player import PlayerFactory
+
+MADE_WITH: Final = ("deployment", "parameters")
+CALLED_WITH: Final = ("tick", "samples")
+SHOWN_MAX: Final = 100
+"""How much of a signature is shown."""
+
+
+class ClassPathError(PlayerError):
+    """A class path that leads to no player: `problem` says why, `nearest` is one that might be meant."""
+
+    def __init__(self, path: str, problem: str, nearest: str | None = None) -> None:
+        super().__init__(f"player {path}: {problem}" + (f", nearest is {nearest!r}" if nearest else ""))
+        self.problem, self.nearest = problem, nearest
+
+
+def load_player(path: str) -> PlayerFactory:
+    """Import the class that `module:Class` names and return it. Raises ClassPathError, which says what is wrong."""
+    module_name, colon, class_name = path.partition(":")
+    if not (module_name and colon and class_name):
+        raise ClassPathError(path, "not of the form module:Class", class_path_of(path))
+    module = _import(path, module_name)
+    made: Any = getattr(module, class_name, None)
+    if made is None:
+        classes = sorted(name for name, value in vars(module).items() if _may_be_player(value))
+        nearest = nearest_name(class_name, classes)
+        shown = ", ".join(classes[:CHOICES_MAX]) + (", ..." if len(classes) > CHOICES_MAX else "")
+        problem = f"there is no class {class_name} in {module_name} (there are: {shown or 'none'})"
+        raise ClassPathError(path, problem, None if nearest is None else f"{module_name}:{nearest}")
+    problem = _unfit(made, class_name)
+    if problem:
+        raise ClassPathError(path, problem)
+    return cast("PlayerFactory", made)
+
+
+def _import(path: str, name: str) -> ModuleType:
+    try:
+        return import_module(name)
+    except (KeyboardInterrupt, Unanswered):
+        raise
+    except BaseException as error:  # SystemExit, too: a module may do anything
+        if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
+            raise _not_found(path, error.name) from error
+        what = f"importing {name} failed: {describe(error)}{place_of(error, name)}"
+        raise ClassPathError(path, what) from error
+
+
+def _not_found(path: str, missing: str) -> ClassPathError:
+    """Return what is said of a path whose module, or a package of it, cannot be found."""
+    parent, dot, last = missing.rpartition(".")
+    if dot:
+        folders: Iterable[str] | None = getattr(sys.modules.get(parent), "__path__", None)
+        hint = "" if folders is not None else f" ({parent} is a module, not a package)"
+    else:
+        folders = [folder for folder in sys.path if not in_library(f"{folder}/")]
+        hint = " (is the folder that it is in on PYTHONPATH?)"
+    nearest = nearest_name(last, [module.name for module in pkgutil.iter_modules(folders)] if folders else ())
+    found = None if nearest is None else f"{parent}{dot}{nearest}{path[len(missing) :]}"
+    return ClassPathError(path, f"there is no module {missing}{hint}", found)
+
+
+def _may_be_player(value: object) -> bool:
+    return inspect.isclass(value) and hasattr(value, "act") and not getattr(value, "_is_protocol", False)
+
+
+def _unfit(made: Any, name: str) -> str:
+    """Return why something is no player's class, as far as that shows without calling it; empty when it may be one."""
+    call: Any = getattr(made, "act", None)
+    if not inspect.isclass(made) or not callable(call):
+        return f"{name} is no class with a method act(tick, samples)"
+    if inspect.isabstract(made) or getattr(made, "_is_protocol", False):
+        return f"{name} is abstract: none can be made of it"
+    taken = _other_arguments(made, *MADE_WITH)
+    if taken:
+        return f"{name} cannot be made with ({', '.join(MADE_WITH)}): its constructor takes {taken}"
+    method: Any = inspect.getattr_static(made, "act")
+    if inspect.isfunction(method):
+        taken = _other_arguments(method, "self", *CALLED_WITH)
+    elif isinstance(method, staticmethod | classmethod):
+        taken = _other_arguments(call, *CALLED_WITH)
+    return f"{name}.act cannot be called with ({', '.join(CALLED_WITH)}): it takes {taken}" if taken else ""
+
+
+def _other_arguments(call: Callable[..., Any], *arguments: str) -> str:
+    """Return what something takes that cannot be called with these arguments; empty where it can, or may."""
+    try:
+        signature = inspect.signature(call)
+    except (ValueError, TypeError):  # of C code that does not tell
+        return ""
+    try:
+        signature.bind(*arguments)
+    except TypeError:
+        text = str(signature)
+        return text if len(text) <= SHOWN_MAX else f"{text[: SHOWN_MAX - 3]}..."
+    return ""

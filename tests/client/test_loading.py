@@ -1,0 +1,149 @@
+"""Finding a player's class: what is said of a path that leads to none, and what a module of one's own cannot hurt."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from foosim.client.class_check import class_faults
+from foosim.client.errors import PlayerError
+from foosim.client.loading import load_player
+from foosim.client.players import Team
+from foosim.protocol.errors import DeploymentError
+from foosim.rehearsal.rehearse_command import app
+
+TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
+OWN = """
+class Acts:
+    def __init__(self, deployment, parameters):
+        pass
+    def act(self, tick, samples):
+        return {}
+
+class Sits:
+    pass
+
+class Takes(Acts):
+    def __init__(self, deployment):
+        pass
+
+class Bare:
+    def act(self, tick, samples):
+        return {}
+
+class Hears(Acts):
+    def act(self, tick):
+        return {}
+
+number = 3
+"""
+MODULES = {
+    "own_player": OWN,
+    "own_broken": "def begin():\n    return 1 / 0\n\nbegin()\n",
+    "own_typo": "class Acts:\n    def act(self tick)\n",
+    "own_importer": "import own_missing\n",
+    "own_leaver": "import sys\nprint('own words')\nsys.exit(0)\n",
+    "own_crash": "import os\nos.kill(os.getpid(), 11)\n",
+    "own_exit": "import os\nos._exit(3)\n",
+    "own_hang": "import threading\nthreading.Lock().acquire()\nthreading.Event().wait()\n",
+}
+
+
+@pytest.fixture
+def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Modules of somebody's own, on the path."""
+    for name, source in MODULES.items():
+        (tmp_path / f"{name}.py").write_text(source)
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    return tmp_path
+
+
+CASES = [
+    ("own_player", "not of the form module:Class"),
+    ("own_player.Acts", "not of the form module:Class, nearest is 'own_player:Acts'"),
+    (":Acts", "not of the form module:Class"),
+    ("own_playr:Acts", "there is no module own_playr (is the folder that it is in on PYTHONPATH?),"
+     " nearest is 'own_player:Acts'"),
+    ("own_player.acts:Acts", "there is no module own_player.acts (own_player is a module, not a package)"),
+    ("foosim.client.plyers:Team", "there is no module foosim.client.plyers, nearest is 'foosim.client.players:Team'"),
+    ("own_importer:Acts", "importing own_importer failed: ModuleNotFoundError: No module named 'own_missing'"
+     " (FOLDER/own_importer.py:1: import own_missing)"),
+    ("own_broken:Acts",
+     "importing own_broken failed: ZeroDivisionError: division by zero (FOLDER/own_broken.py:2: return 1 / 0)"),
+    ("own_typo:Acts",
+     "importing own_typo failed: SyntaxError: invalid syntax (FOLDER/own_typo.py:2: def act(self tick))"),
+    ("own_leaver:Acts", "importing own_leaver failed: SystemExit: 0 (FOLDER/own_leaver.py:3: sys.exit(0))"),
+    ("own_player:Atcs", "there is no class Atcs in own_player (there are: Acts, Bare, Hears, Takes),"
+     " nearest is 'own_player:Acts'"),
+    ("own_player:Sits", "Sits is no class with a method act(tick, samples)"),
+    ("own_player:number", "number is no class with a method act(tick, samples)"),
+    ("own_player:Takes", "Takes cannot be made with (deployment, parameters): its constructor takes (deployment)"),
+    ("own_player:Bare", "Bare cannot be made with (deployment, parameters): its constructor takes ()"),
+    ("own_player:Hears", "Hears.act cannot be called with (tick, samples): it takes (self, tick)"),
+    ("foosim.client.player:Player", "Player is abstract: none can be made of it"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("path", "text"), CASES)
+def test_a_class_that_cannot_be_loaded_says_why(modules: Path, path: str, text: str) -> None:
+    with pytest.raises(PlayerError) as error:
+        load_player(path)
+    assert str(error.value).replace(str(modules), "FOLDER") == f"player {path}: {text}"
+
+
+@pytest.mark.usefixtures("modules")
+def test_a_class_is_found_by_its_path() -> None:
+    assert load_player("foosim.client.players:Team") is Team
+    assert load_player("own_player:Acts").__name__ == "Acts"
+
+
+# --- before a run begins ---------------------------------------------------------------------------------------------
+
+
+def test_whatever_a_module_does_when_it_is_imported_stays_in_the_process_that_tries_it(
+    modules: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    paths = ("own_crash:A", "own_exit:A", "own_leaver:A", "own_player:Acts", "own_player:Atcs", "own_player:Sits")
+    faults = class_faults((*paths, "foosim.client.players:Team", "foosim.client.players:Teem"), 60.0)
+    assert {path: fault.problem.partition(" (")[0] for path, fault in faults.items()} == {
+        "own_crash:A": "importing it ends the interpreter with SIGSEGV",
+        "own_exit:A": "importing it ends the interpreter, code 3",
+        "own_leaver:A": "importing own_leaver failed: SystemExit: 0",
+        "own_player:Atcs": "there is no class Atcs in own_player",
+        "own_player:Sits": "Sits is no class with a method act(tick, samples)",
+        "foosim.client.players:Teem": "there is no class Teem in foosim.client.players",
+    }
+    assert [name for name in MODULES if name in sys.modules] == [], "nothing of it is imported here"
+    printed = capfd.readouterr()
+    assert (printed.out, "own words" in printed.err) == ("", True)
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@pytest.mark.usefixtures("modules")
+def test_a_module_that_hangs_is_given_up_and_shows_where(capfd: pytest.CaptureFixture[str]) -> None:
+    ((path, fault),) = class_faults(["own_hang:Acts", "own_player:Acts"], 1.0, " (deadlines.start)").items()
+    where = "where it hangs is on standard error"
+    assert (path, fault.problem) == ("own_hang:Acts", f"importing it has not ended for 1 s (deadlines.start); {where}")
+    assert 'own_hang.py", line 3 in <module>' in capfd.readouterr().err
+
+
+def test_a_rehearsal_refuses_all_that_cannot_play_before_it_begins(modules: Path) -> None:
+    capture = modules / "run.mcap"
+    sets = {"player-red.class": "own_player:Atcs", "player-blue.class": "own_importer:Acts"}
+    words = [word for key, value in sets.items() for word in ("--set", f"players.{key}={value}")]
+    ran = CliRunner().invoke(app, [str(TABLE), "--for", "1 s", "--capture", str(capture), *words])
+    assert isinstance(ran.exception, DeploymentError) and not capture.exists()
+    red, blue = ran.exception.problems
+    assert red == (
+        "--set:1:26: players.player-red.class: there is no class Atcs in own_player"
+        " (there are: Acts, Bare, Hears, Takes), 'own_player:Atcs', nearest is 'own_player:Acts'"
+    )
+    assert blue.startswith(
+        "--set:2:27: players.player-blue.class: importing own_importer failed: ModuleNotFoundError: "
+    )
