@@ -12,7 +12,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Final
 
-MIB: Final = 1 << 20
+_UNITS: Final = {"TiB": 1 << 40, "TB": 10**12, "GiB": 1 << 30, "GB": 10**9, "MiB": 1 << 20, "MB": 10**6, "KiB": 1 << 10}
 
 
 class Level(IntEnum):
@@ -41,7 +41,7 @@ class Room:
         return Level.LOW if self.left < 2 * self.reserve else Level.FINE
 
     def __str__(self) -> str:
-        return f"{megabytes(max(0, self.left))} left {self.where}, the reserve is {megabytes(self.reserve)}"
+        return f"{megabytes(max(0, self.left))} left {self.where}, the reserve is {size_text(self.reserve)}"
 
 
 def free_bytes(place: int | Path) -> int:
@@ -56,7 +56,11 @@ def room_on_disk(place: int | Path, reserve: int) -> Room:
 
 
 def megabytes(count: int) -> str:
-    """Return a size for people: in MiB when it is a whole number of these, as files say it."""
-    if count >= MIB and count % MIB == 0:
-        return f"{count // MIB} MiB"
+    """Return a size for people: `12.4 MB`."""
     return f"{count / 1e6:.1f} MB" if count < 1e10 else f"{count / 1e9:.1f} GB"
+
+
+def size_text(count: int) -> str:
+    """Return a size as a deployment says it: exactly, in the unit in which the number is shortest (`64 MiB`)."""
+    whole = [f"{count // size} {unit}" for unit, size in _UNITS.items() if count >= size and count % size == 0]
+    return min([*whole, f"{count} B"], key=lambda text: len(text.split()[0]))

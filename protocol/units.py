@@ -114,8 +114,10 @@ def _nearest_unit(unit: str, dimension: Dimension) -> str | None:
 def parse_ns(text: object) -> int:
     """A time (`20s`, `2 ms`) in integer nanoseconds, at least 0; raises BadValue."""
     value = parse(text, TIME)
-    if value.denominator != 1 or value < 0:
-        raise BadValue("not a whole number of ns, at least 0", text)
+    if value < 0:
+        raise BadValue("a time that is not negative is needed", text)
+    if value.denominator != 1:
+        raise BadValue("not a whole number of ns", text)
     return int(value)
 
 

@@ -6,15 +6,17 @@ Each subcommand is a thin shell over a typed function: `up.Up`, `main.serve`, `c
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.hosts import places
 from foosim.protocol.messages import Answer
 from foosim.protocol.probe import ProgressOption
 from foosim.supervisor import control
@@ -23,7 +25,7 @@ from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
 from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
-from foosim.supervisor.new_capture import check_capture, default_capture
+from foosim.supervisor.new_capture import check_capture, check_rooms, default_capture
 from foosim.supervisor.outcome import Outcome, detached_outcome, ended_outcome, refused_result
 from foosim.supervisor.pki_hosts import files_for, send_files
 from foosim.supervisor.plan import (
@@ -36,7 +38,7 @@ from foosim.supervisor.plan import (
     plan_again,
 )
 from foosim.supervisor.remote import Remote, unit_name
-from foosim.supervisor.run_folder import RunFolder, create_run, open_run, run_exists
+from foosim.supervisor.run_folder import RunFolder, create_run, open_run, run_exists, runs_folder
 from foosim.supervisor.units import units_of
 from foosim.supervisor.up import Killed, Up
 
@@ -157,6 +159,9 @@ def _begin(
     check_players_here(plan)
     found = capture or default_capture(plan.deployment.world)
     path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
+    captured_here = None if VHUB in places(plan.deployment) else path
+    for warning in check_rooms(plan.deployment.capture, captured_here, runs_folder()):
+        display.say(warning)
     _prepare(plan, display, None)
     if detached:
         return detached_outcome(detach(plan, path, run), plan.deployment, path)
@@ -261,18 +266,20 @@ def rate(
 
 
 Numbers = tuple[float, float, float]
+Words = tuple[str, str, str]
 
 
 @app.command()
 def add(
     name: Annotated[str | None, typer.Argument(help="Its name; by default the next free one.")] = None,
-    position: Annotated[Numbers | None, typer.Option(help="Where, in m: X Y Z.")] = None,
-    velocity: Annotated[Numbers | None, typer.Option(help="How fast, in m/s: X Y Z.")] = None,
+    position: Annotated[Words | None, typer.Option(metavar="X Y Z", help="Where, in m.")] = None,
+    velocity: Annotated[Words | None, typer.Option(metavar="X Y Z", help="How fast, in m/s.")] = None,
     run: Run = None,
     json: Json = False,
 ) -> None:
     """Add a ball; by default it rests at the kick-off spot."""
-    _show(control.add(name, position, velocity, run), json)
+    place = None if position is None else _three("position", "m", position)
+    _show(control.add(name, place, None if velocity is None else _three("velocity", "m/s", velocity), run), json)
 
 
 @app.command()
@@ -329,7 +336,7 @@ def push(
     _show(control.push(_three("impulse", "N s", impulse), name, run), json)
 
 
-def _three(what: str, unit: str, words: list[str]) -> Numbers:
+def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
     """Return three numbers; raises BadValue, since typer does not say which ones are needed."""
     needed = f"{what}: three numbers are needed, X Y Z in {unit}"
     if len(words) != 3:

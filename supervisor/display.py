@@ -136,7 +136,7 @@ def fitted(status: dict[str, Any], console: Console) -> RenderableType:
     excess = len(console.render_lines(whole, pad=False)) - console.height
     if excess <= 0:
         return whole
-    return render(status, max(0, min(len(status["links"]), LINKS_SHOWN_MAX) - excess))
+    return render(status, max(0, min(status["links_in_all"], LINKS_SHOWN_MAX) - excess))
 
 
 def _head(status: dict[str, Any]) -> Text:
@@ -195,19 +195,19 @@ def _listed(names: list[str]) -> str:
 
 
 def _links(status: dict[str, Any], links_max: int) -> Table:
-    """A row per directed link, the busiest first when there are too many, and a last one for all."""
+    """A row per directed link that was used, the busiest when there are too many, and a last one for all."""
     table = Table(title="links", title_justify="left", box=None, pad_edge=False)
     table.add_column("from")
     table.add_column("to")
     for column in ("offered", "delivered", "dropped", "mean delay", "age at use, p99"):
         table.add_column(column, justify="right")
-    links = status["links"]
+    links = [link for link in status["links"] if link[2] > 0]
     shown = sorted(links, key=lambda link: (-link[2], link[:2]))[:links_max]
     for source, destination, offered, delivered, dropped, delay_ns, _, _, _, ages in sorted(shown):
         delay = f"{delay_ns / 1e6:.2f} ms"
         table.add_row(source, destination, str(offered), str(delivered), str(dropped), delay, _age_text(ages))
     packets = status["packets"]
-    hidden = max(len(links), status.get("links_in_all", 0)) - len(shown)
+    hidden = status["links_in_all"] - len(shown)
     more = f"and {hidden} more" if hidden > 0 else ""
     total = (str(packets["offered"]), str(packets["delivered"]), str(packets["dropped"]))
     table.add_row("all", more, *total, f"{packets['in_flight']} in flight", style="bold")

@@ -8,6 +8,12 @@ from __future__ import annotations
 from typing import Any
 
 
+def use_text(status: dict[str, Any]) -> str:
+    """`18 links used`: those that a packet was offered to, however many of them are told."""
+    count = status["links_in_all"]
+    return f"{count} link{'' if count == 1 else 's'} used"
+
+
 def links_shown(status: dict[str, Any], before: dict[str, Any] | None = None) -> list[dict[str, Any]]:
     """Return a mapping for each link, the one with the most traffic first.
 

@@ -30,7 +30,7 @@ from foosim.protocol.process import Stop
 from foosim.protocol.settings import nested
 from foosim.protocol.traces import check_files, network_files
 from foosim.supervisor import control
-from foosim.supervisor.links_shown import links_shown
+from foosim.supervisor.links_shown import links_shown, use_text
 from foosim.supervisor.net_text import RANGE_NOTE, link_line, link_table, meaning_tables
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.explain import explain_packet, parse_packet
@@ -215,9 +215,7 @@ def _show_links(
     if json:
         print(encode_json({"run": status["run"], "tick": status["ticks"], "links": links}).decode(), flush=True)
         return
-    used = sum(link[2] > 0 for link in status["links"])
-    told = f"{used} of {status['links_in_all']} links used"
-    title = f"run {status['run']} · tick {status['ticks']} · {told}"
+    title = f"run {status['run']} · tick {status['ticks']} · {use_text(status)}"
     if live is not None:
         live.update(link_table(links[: max(1, console.height - 4)], title), refresh=True)
         return

@@ -1,4 +1,7 @@
-"""Where a run is captured: a file that is not there yet, in a folder that takes files. Neighbours: `cli` asks, `up`."""
+"""Where a run is captured: a file that is not there yet, in a folder that takes files, on a disk with room.
+
+Neighbours: `cli` asks, `up`; `vhub.room_watch` and `journal_room` look after the room while the run lasts.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import tempfile
 from pathlib import Path
 
 from foosim.protocol import wall
+from foosim.protocol.deployment import Capture
+from foosim.protocol.disk import Level, room_on_disk
 from foosim.protocol.errors import Refused
 from foosim.vhub.capture_parts import parts_at
 
@@ -34,3 +39,28 @@ def check_capture(path: Path, *, is_split: bool = False) -> Path:
             return path
     except OSError as error:
         raise Refused(f"{path}: cannot be created, {error.strerror}") from None
+
+
+def check_rooms(settings: Capture, capture: Path | None, runs: Path) -> list[str]:
+    """Return warnings where disks have less than twice the reserve; raises Refused where a run would end at once.
+
+    `capture` is the file, None where none is written here; `runs` is the folder of runs, which need not be there yet.
+    """
+    goes_on = settings.on_full == "continue_unlogged"
+    places = [(runs, "the run ends", False)]
+    if capture is not None:
+        then = "the run goes on without its capture" if goes_on else "the run ends"
+        places.insert(0, (capture.parent, then, goes_on))
+    warnings = []
+    for folder, then, is_optional in places:
+        try:
+            there = next(place for place in (folder, *folder.parents) if place.exists())
+            room = room_on_disk(there, settings.reserve_bytes)
+        except OSError:
+            continue  # who writes there will tell
+        text = f"{folder}: {room} (capture.reserve)"
+        if room.level >= Level.FULL and not is_optional:
+            raise Refused(f"{text}: make room, or lower the reserve; nothing was started")
+        if room.level is not Level.FINE:
+            warnings.append(f"room gets little, at the reserve {then}: {text}")
+    return warnings

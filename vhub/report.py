@@ -67,7 +67,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
     Only the last report has everything as it is at this moment.
 
     `links` are those with the most traffic: [from, to, offered, delivered, dropped, mean delay in ns, rule, how long
-    its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many there are. Ages at use are [channel,
+    its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any. Ages at use are [channel,
     uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts messages by channel and sender,
     `refusals` packets by reason; `lateness_ms` is how late packets left in realtime, null if none did.
     """

@@ -1,15 +1,19 @@
 """The command `foosim-supervisor` without a run: help, what it refuses before anything starts, exit codes."""
 
 import json
+import re
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from foosim.protocol.deployment import Capture
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.protocol.disk import free_bytes
+from foosim.protocol.errors import Refused
 from foosim.protocol.identity import identities_of
 from foosim.supervisor import cli, pki
-from foosim.supervisor.new_capture import check_capture
+from foosim.supervisor.new_capture import check_capture, check_rooms
 from foosim.supervisor.run_folder import runs_folder
 from tests.supervisor.conftest import Command, Typed
 
@@ -149,6 +153,31 @@ def test_a_capture_that_cannot_be_created_is_refused_before_anything_starts(comm
     assert not runs_folder().exists()
 
 
+def test_a_disk_with_less_than_the_reserve_is_refused_before_anything_starts(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    reserve = "--set", "capture.reserve=1000 TiB"
+    done = command("up", TABLE, "--for", "1s", *reserve, "--capture", "mine.mcap")
+    assert done.code == 3 and not runs_folder().exists()
+    what = r"GB left on its disk, the reserve is 1000 TiB \(capture\.reserve\): make room, or lower the reserve; "
+    assert re.match(rf"\.: [0-9.]+ {what}nothing was started\n$", done.err)
+    done = command("up", TABLE, "--for", "1s", *reserve, "--set", "capture.on_full=continue_unlogged")
+    assert done.code == 3 and re.match(rf"{runs_folder()}: [0-9.]+ {what}", done.err), "journals have to be written"
+
+
+def test_a_disk_with_little_more_than_the_reserve_is_warned_of(tmp_path: Path) -> None:
+    at = tmp_path / "captures" / "run.mcap"
+    tight = Capture.model_construct(reserve_bytes=int(0.7 * free_bytes(tmp_path)), on_full="stop_world")
+    full = Capture.model_construct(reserve_bytes=3 * free_bytes(tmp_path), on_full="continue_unlogged")
+    assert check_rooms(Capture.model_construct(reserve_bytes=1 << 16, on_full="stop_world"), at, tmp_path) == []
+    told = check_rooms(tight, at, tmp_path / "runs")
+    assert [text.partition(": ")[0] for text in told] == ["room gets little, at the reserve the run ends"] * 2
+    assert len(check_rooms(tight, None, tmp_path / "runs")) == 1
+    with pytest.raises(Refused, match=f"^{tmp_path}/runs: "):
+        check_rooms(full, at, tmp_path / "runs")
+
+
 def test_the_folder_of_a_capture_is_made_and_left_empty(tmp_path: Path) -> None:
     path = tmp_path / "far" / "away" / "mine.mcap"
     assert check_capture(path) == path
@@ -183,6 +212,7 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
         ),
         (("up",), "a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN"),
         (("add", "--position", "0", "0", "inf"), "position: not a finite number, inf"),
+        (("add", "--position", "0", "1", "x"), "position: three numbers are needed, X Y Z in m; not all of these are numbers, '0 1 x'"),  # noqa: E501
         (("add", "--velocity", "nan", "0", "0"), "velocity: not a finite number, nan"),
     ],
 )

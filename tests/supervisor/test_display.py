@@ -56,6 +56,7 @@ def running() -> dict[str, Any]:
             "vhub": {"role": "vhub", **HERE, "busy": 0.22, "tick": 6170, "waiting_for": "Done of player-blue"},
             "supervisor": {"role": "supervisor", **HERE, "busy": 0.106, "tick": 6170, "waiting_for": "red"},
         },
+        "links_in_all": 2,
         "links": [
             ["player-red", "red.goal", 1234, 1220, 9, 1_302_000, "lan", 0, {}, []],
             ["camera", "player-red", 617, 612, 4, 1_297_000, "lan", 0, {}, [["ball", 600, 6_000_000, 8_000_000]]],
@@ -113,13 +114,21 @@ def test_a_row_for_each_link_and_one_for_all(running: dict[str, Any]) -> None:
     assert row_of(text, "22510").split() == ["all", "22510", "22390", "113", "7", "in", "flight"]
 
 
+def test_links_that_nobody_used_are_neither_shown_nor_counted(running: dict[str, Any]) -> None:
+    running["links"].append(["red.goal", "blue.goal", 0, 0, 0, 0, "lan", 0, {}, []])
+    text = render_text(running)
+    assert not [line for line in text.splitlines() if line.startswith("red.goal")]
+    assert " more" not in row_of(text, "all", "22510")
+
+
 def test_of_too_many_links_the_busiest_are_shown(running: dict[str, Any]) -> None:
     rest = [0, 0, "lan", 0, {}, []]
     running["links"] = [["camera", f"player-{n}", n, n, *rest] for n in range(LINKS_SHOWN_MAX + 5)]
+    running["links_in_all"] = LINKS_SHOWN_MAX + 4
     text = render_text(running)
     assert row_of(text, "player-5 ")
     assert "player-4 " not in text
-    assert "and 5 more" in row_of(text, "all", "22510")
+    assert "and 4 more" in row_of(text, "all", "22510")
 
 
 def test_the_plain_line_has_the_same_in_short(running: dict[str, Any]) -> None:
@@ -194,6 +203,7 @@ def test_what_passed_before_the_first_tick_does_not_count_as_slow(running: dict[
 @pytest.mark.parametrize("height", [17, 18, 24])
 def test_a_low_window_shows_fewer_links_and_keeps_the_row_for_all(running: dict[str, Any], height: int) -> None:
     running["links"] = [["camera", f"player-{number}", number, number, 0, 0, "lan", 0, {}, []] for number in range(40)]
+    running["links_in_all"] = 39
     console = Console(width=80, height=height, file=io.StringIO(), color_system=None)
     with console.capture() as captured:
         console.print(fitted(running, console))

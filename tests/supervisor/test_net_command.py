@@ -18,7 +18,7 @@ from foosim.protocol.settings import nested
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor import net_command
-from foosim.supervisor.links_shown import links_shown
+from foosim.supervisor.links_shown import links_shown, use_text
 from foosim.supervisor.net_text import link_line
 from foosim.vhub.capture_reader import CaptureData, open_capture
 from foosim.vhub.explain import PacketName, explain_packet, parse_packet
@@ -272,3 +272,4 @@ def test_links_are_told_with_their_causes_the_busiest_first() -> None:
         " mean delay 1.5 ms, queue 2 us, age at use of ball 6 ms, p99 8 ms"
     )
     assert links_shown(status, {**before, "run": "other"}) == links_shown(status)
+    assert use_text({**status, "links_in_all": 18}) == "18 links used"

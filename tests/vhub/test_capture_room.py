@@ -100,7 +100,7 @@ def test_at_the_reserve_a_run_that_is_to_end_is_captured_to_its_end(
     writer = new_writer(tmp_path / "run.mcap", hub_run, "capture.reserve=384 KiB")
     seen = feed(writer, hub_run)
     assert seen == [Level.FINE, Level.LOW, Level.FULL][-len(seen) :] and seen[-1] is Level.FULL, seen
-    assert writer.stops_world and "left on its disk, the reserve is 0.4 MB" in writer.state.text
+    assert writer.stops_world and "left on its disk, the reserve is 384 KiB" in writer.state.text
     assert writer.statistics().refused == 0
     assert_accounted(writer, hub_run)
     assert_valid(writer.path)
@@ -166,7 +166,8 @@ def test_the_quota_is_kept(hub_run: HubRun, tmp_path: Path) -> None:
 def test_levels_of_room() -> None:
     levels = [Room(left, 100, "").level for left in (200, 199, 100, 99, 25, 24, 0, -5)]
     assert levels == [Level.FINE, Level.LOW, Level.LOW, Level.FULL, Level.FULL, Level.OUT, Level.OUT, Level.OUT]
-    assert str(Room(-5, 64_000_000, "on its disk")) == "0.0 MB left on its disk, the reserve is 64.0 MB"
+    assert str(Room(-5, 64_000_000, "on its disk")) == "0.0 MB left on its disk, the reserve is 64 MB"
+    assert str(Room(40_000_000, 64 << 20, "on its disk")) == "40.0 MB left on its disk, the reserve is 64 MiB"
 
 
 def test_on_a_disk_that_is_really_full(hub_run: HubRun, small_disk: Callable[[int], Path]) -> None:

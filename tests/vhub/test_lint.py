@@ -202,8 +202,8 @@ def test_a_network_alone_is_shown_over_its_radios() -> None:
 def test_lines_are_for_people() -> None:
     wifi = meaning_of(Use("wifi", "wifi", radio(preset="wifi_5_indoor"), 2, ("a", "b")), {})
     assert meaning_line(wifi) == (
-        "wifi: wifi, 2 links (as a to b), loss 0.05 %, bursts of 20 ms, delay 600 us, sd 301 us, p99 1.68 ms, "
-        "at 54 Mbit/s, 100 B: 44 us, 4.03 Mbit/s, 10 stations 4.319 Mbit/s, 1500 B: 248 us, 29.81 Mbit/s, "
+        "wifi: wifi, for up to 2 links (as a to b), loss 0.05 %, bursts of 20 ms, delay 600 us, sd 301 us, "
+        "p99 1.68 ms, at 54 Mbit/s, 100 B: 44 us, 4.03 Mbit/s, 10 stations 4.319 Mbit/s, 1500 B: 248 us, 29.81 Mbit/s, "
         "10 stations 26.76 Mbit/s, range 7.37 km in sight, behind walls 112 m, queue of 17.3 ms"
     )
     lines = start_lines([wifi] * 40, "some.yaml")
