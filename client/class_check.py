@@ -8,7 +8,6 @@ Neighbours: `loading` finds a class, `supervisor.plan` and `supervisor.doctor` a
 
 from __future__ import annotations
 
-import faulthandler
 import json
 import os
 import select
@@ -22,7 +21,7 @@ from typing import Final, NamedTuple
 
 from foosim.client.loading import ClassPathError, load_player
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.process import end_with
+from foosim.protocol.process import STACK_SIGNAL, end_with, end_with_stack
 from foosim.protocol.references import Finding, quoted
 
 OURS: Final = "foosim."
@@ -124,7 +123,7 @@ def _read(reading: int, child: int, count: int, until_s: float) -> tuple[list[by
 
 def _show_stack(child: int) -> None:
     """Have the fork show where it hangs, which ends it; kill it where that does not."""
-    os.kill(child, signal.SIGUSR1)
+    os.kill(child, STACK_SIGNAL)
     until_s = time.monotonic() + SHOWS_S
     while time.monotonic() < until_s:
         if os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
@@ -154,12 +153,11 @@ def _tell(paths: Sequence[str], writing: int, parent: int) -> None:
     try:
         os.setpgid(0, 0)
         end_with(parent)
-        signal.signal(signal.SIGUSR1, signal.SIG_DFL)
         nothing = os.open(os.devnull, os.O_RDWR)
         os.dup2(nothing, 0)
         os.dup2(2, 1)
         sys.stdout = sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
-        faulthandler.register(signal.SIGUSR1, sys.stderr, all_threads=True, chain=True)
+        end_with_stack()
         for path in paths:
             os.write(writing, json.dumps(_look(path)).encode() + b"\n")
         code = 0

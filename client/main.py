@@ -30,7 +30,7 @@ from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Loop, Wire
 from foosim.protocol.names import is_name
 from foosim.protocol.probe import ProgressOption
-from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
+from foosim.protocol.process import Stop, die_with_parent, end_with_stack, new_boot, start_log
 from foosim.protocol.session import Session, use_client_runtime
 from foosim.protocol.session_settings import Security
 
@@ -179,6 +179,7 @@ def player(
     gone for longer than a run waits for it, and with 3 when the vHub would not have it.
     """
     die_with_parent()
+    end_with_stack()
     raise typer.Exit(run_players(name, connect, world, pki, progress_file))
 
 

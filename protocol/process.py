@@ -8,6 +8,7 @@ asked. Neighbours: `loop`, `supervisor.launcher` (the other side).
 from __future__ import annotations
 
 import ctypes
+import faulthandler
 import logging
 import os
 import signal
@@ -20,6 +21,7 @@ from typing import Final
 
 PARENT_VARIABLE: Final = "FOOSIM_PARENT"
 """Process id of the launcher and the number of the pipe's reading end, as `PID:FD`."""
+STACK_SIGNAL: Final = signal.SIGUSR1
 _PR_SET_PDEATHSIG: Final = 1
 
 
@@ -38,6 +40,12 @@ def end_with(parent: int) -> None:
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:  # it ended before the kernel was asked
         os._exit(1)
+
+
+def end_with_stack() -> None:
+    """Have STACK_SIGNAL write the stacks of all threads to standard error and then end this process: if it hangs."""
+    signal.signal(STACK_SIGNAL, signal.SIG_DFL)
+    faulthandler.register(STACK_SIGNAL, sys.stderr, all_threads=True, chain=True)
 
 
 def _watch(pipe: int) -> None:

@@ -2,12 +2,15 @@
 
 A player that does not return is interrupted by a signal, as a person's Ctrl-C would: its stack is logged, and the run
 ends in order. Where that does not help, since it is in C code or catches whatever is raised, `on_stuck` is called from
-the thread. Neighbours: `onlooker` decides, `rehearse` starts it.
+the thread. C code that keeps the interpreter's lock stops this thread, too: then a timer of faulthandler's, which this
+thread winds up again and again, ends the process. It rests while a Ctrl-Z has stopped all. Neighbours: `onlooker`
+decides, `rehearse` starts it.
 """
 
 from __future__ import annotations
 
 import faulthandler
+import os
 import signal
 import sys
 import threading
@@ -24,6 +27,10 @@ INTERRUPT: Final = signal.SIGUSR1
 INTERRUPTS_MAX: Final = 3
 """How often a player is interrupted, a second apart, before it is given up."""
 AGAIN_S: Final = 1.0
+WIND_S: Final = 1.0
+"""How often the last timer is wound up."""
+STARVED_S: Final = 20.0
+"""How much longer than a player may take this thread gets no turn before the process is ended."""
 
 
 class Attendant:
@@ -44,11 +51,19 @@ class Attendant:
         self._reason = ""
         self._interrupts, self._interrupted_s = 0, 0.0
         self._before: Callable[[int, FrameType | None], object] | int | None = None
+        self._ends_process = on_stuck is not None
+        self._wound_s = 0.0
+        self._winding = threading.RLock()  # a Ctrl-Z may come while the timer is wound up
         self._can_interrupt = threading.current_thread() is threading.main_thread()
+        stops = signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL
+        self._rests = self._ends_process and self._can_interrupt and stops
 
     def __enter__(self) -> Attendant:
         if self._can_interrupt:
             self._before = signal.signal(INTERRUPT, self._interrupt)
+            if self._rests:
+                signal.signal(signal.SIGTSTP, self._stop)
+        self._wind()
         self._thread.start()
         return self
 
@@ -57,6 +72,10 @@ class Attendant:
     ) -> None:
         self._over.set()
         self._thread.join()
+        if self._ends_process:
+            faulthandler.cancel_dump_traceback_later()
+            if self._rests:
+                signal.signal(signal.SIGTSTP, signal.SIG_DFL)
         if self._can_interrupt:
             signal.signal(INTERRUPT, self._before)
 
@@ -64,6 +83,9 @@ class Attendant:
         at_work = self._system.at_work
         while not self._over.wait(LOOK_S):
             now_s = time.monotonic()
+            if now_s >= self._wound_s + WIND_S:
+                self._wound_s = now_s
+                self._wind()
             line = self._onlooker.look(now_s, at_work)
             if line and self._say is not None:
                 self._say(line)
@@ -73,6 +95,22 @@ class Attendant:
             elif now_s >= self._interrupted_s + AGAIN_S:
                 self._interrupted_s = now_s
                 self._end_player()
+
+    def _wind(self) -> None:
+        """Have the process end, with its stack, when this is not called again for longer than a player may take."""
+        if self._ends_process:
+            limit_s = self._onlooker.allowed_s + STARVED_S
+            with self._winding:
+                faulthandler.dump_traceback_later(limit_s, exit=True, file=sys.__stderr__ or 2)
+
+    def _stop(self, number: int, frame: FrameType | None) -> None:
+        """Stop, as a Ctrl-Z asks, without the timer; it begins anew when the process goes on."""
+        with self._winding:
+            faulthandler.cancel_dump_traceback_later()
+            signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+            os.kill(os.getpid(), signal.SIGTSTP)
+            signal.signal(signal.SIGTSTP, self._stop)
+        self._wind()
 
     def _end_player(self) -> None:
         """Interrupt the player that hangs; give it up when that has not helped."""

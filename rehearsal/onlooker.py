@@ -56,6 +56,13 @@ class Onlooker:
         self._turns.clear()
         return line
 
+    @property
+    def allowed_s(self) -> float:
+        """How long a player's turn may take at this stage of the run: the first ones import its module."""
+        deadlines, core = self._core.deployment.deadlines, self._core
+        first_ns = deadlines.start_ns if core.frame.tick == core.first_tick else 0
+        return max(first_ns, deadlines.lockstep_fast_ns) / 1e9
+
     def overdue(self, at_work: AtWork) -> str:
         """Return what is said of a player that has not returned within its deadline; empty when none is overdue."""
         deadlines = self._core.deployment.deadlines

@@ -16,17 +16,22 @@ import signal
 import subprocess
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 from foosim.protocol.errors import Failed
+from foosim.protocol.process import STACK_SIGNAL
 from foosim.supervisor.children import GRACE_S, child_environment, script
 from foosim.supervisor.ending import Ending
 from foosim.supervisor.memory import oom_kills
 from foosim.supervisor.remote import Remote
 
 POLL_S: Final = 0.02
+PLAYER: Final = "foosim-player"
+STACK_S: Final = 1.0
+"""How long a player that hangs may take to show where."""
 LINES: Final = 30
 """How much of a log's end tells why ssh ended."""
 
@@ -73,9 +78,19 @@ class Child:
         return self.how.text
 
     def kill(self, why: str) -> None:
-        """Kill it, of which people are told why."""
+        """Kill it, of which people are told why; a player shows before where it hangs."""
         self.killed = why
+        if self.ask_for_stack():
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(STACK_S)
         self.process.kill()
+
+    def ask_for_stack(self) -> bool:
+        """Have a player on this machine write to its log where it hangs, and end by that; False for any other."""
+        is_player = self.command[0] == PLAYER and self.remote is None
+        if is_player:
+            self.process.send_signal(STACK_SIGNAL)
+        return is_player
 
     @property
     def is_away(self) -> bool:
@@ -177,9 +192,12 @@ class Launcher:
         return True
 
     def stop(self, grace_s: float = GRACE_S) -> None:
-        """End what lives: SIGTERM, then, after the grace, SIGKILL."""
+        """End what lives: SIGTERM, then, after the grace, SIGKILL; players that hang show before where."""
         self._signal(signal.SIGTERM)
         if not self.wait(grace_s):
+            asked = [child for child in self.alive() if child.ask_for_stack()]
+            if asked:
+                self.wait(STACK_S)
             self.kill()
 
     def kill(self) -> None:

@@ -81,6 +81,19 @@ def test_it_can_be_ended_while_nobody_answers(program: str) -> None:
     assert (child.returncode, err) == (1, f"gave up before a router answered at tcp/127.0.0.1:{port}\n")
 
 
+def test_a_player_writes_its_stack_when_it_is_asked_for_it() -> None:
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        address = f"tcp/127.0.0.1:{listening.getsockname()[1]}"
+        child = start(PLAYER, "--name", "red", "--connect", address)
+        connection, _ = listening.accept()
+        with connection:
+            child.send_signal(process.STACK_SIGNAL)
+            _, err = child.communicate(timeout=LIMIT_S)
+    assert child.returncode == -process.STACK_SIGNAL and "in run_players\n" in err
+
+
 def test_a_child_whose_launcher_is_gone_does_not_even_start() -> None:
     program = "from foosim.protocol.process import die_with_parent; die_with_parent(); print('alive')"
     environment = {process.PARENT_VARIABLE: "1:0"}

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import json
+import os
+import re
 import signal
+import sys
 import threading
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -16,6 +20,7 @@ from typer.testing import CliRunner
 from foosim.client.player import Commands, Samples
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.units import Pace
+from foosim.rehearsal import attendant
 from foosim.rehearsal.attendant import INTERRUPTS_MAX
 from foosim.rehearsal.onlooker import LOOK_S, STOOD_S, Onlooker
 from foosim.rehearsal.rehearse import rehearse
@@ -28,6 +33,8 @@ from foosim.supervisor.plan import RunSettings
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 HANGS_AT: Final = 30
 SETS: Final = ("engine=pure", "substeps=1", "players.player-red.class=tests.rehearsal.test_onlooker:Hangs")
+
+SHORT: Final = ("deadlines.lockstep_fast=0.1 s", "deadlines.start=1 s")
 
 
 def looks_on() -> tuple[Onlooker, SupervisorCore]:
@@ -132,6 +139,49 @@ def test_one_that_cannot_be_interrupted_is_given_up(capfd: pytest.CaptureFixture
     assert (result["reason"], result["failed"], result["ticks"]) == (reason, True, HANGS_AT + 1)
     assert "locks_twice" in capfd.readouterr().err, f"after {INTERRUPTS_MAX} interrupts its stack is shown"
     assert run["reason"] == reason, "by the interrupts that waited for it"
+
+
+def forked(run: Callable[[], object]) -> int:
+    """Run something in a fork of this process, in a process group of its own; return its process id."""
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setpgid(0, 0)
+            run()
+        finally:
+            os._exit(0)
+    return child
+
+
+def test_one_that_keeps_the_interpreter_ends_its_process_with_its_stack(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pause in C that holds the interpreter's lock: no thread of Python runs any more, and no signal is handled."""
+    monkeypatch.setattr(attendant, "STARVED_S", 1.0)
+    monkeypatch.setattr(sys, "__stderr__", None)
+    library = ctypes.PyDLL(None)
+
+    def pauses() -> None:
+        while True:
+            library.pause()
+
+    Hangs.how = pauses
+    sets = (*SETS, *SHORT)
+    child = forked(lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, sets, on_stuck=lambda result: None))
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
+    assert re.search(r"Timeout .*in pauses\n.*in act\n", capfd.readouterr().err, re.DOTALL)
+
+
+def test_a_rehearsal_that_a_ctrl_z_has_stopped_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(attendant, "STARVED_S", 2.0)
+    Hangs.how = lambda: signal.raise_signal(signal.SIGTSTP)
+    child = forked(
+        lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, *SHORT), on_stuck=lambda result: None)
+    )
+    assert os.WIFSTOPPED(os.waitpid(child, os.WUNTRACED)[1])
+    time.sleep(4.0)  # longer than the timer has
+    os.kill(child, signal.SIGCONT)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 
 
 def test_a_ctrl_c_ends_in_order_and_the_last_line_says_how_far_it_came(tmp_path: Path) -> None:
