@@ -29,19 +29,30 @@ COMPILED: Final = {
     "client/players": "each act of the table's teams",
     "client/steering": "a rover's wheels, at each of its acts",
     "client/tracking": "where the ball is going, at each act of a team",
+    "node/actuators/__init__": "the class that actuators derive from",
+    "node/actuators/drive": "each command of a rover's wheels",
     "node/actuators/position": "the torque of each rod, at each substep",
     "node/core": "a node's tick: what came, what is due, what is sent",
     "node/engines/pure": "each substep of the pure engine",
     "node/engines/pure_bodies": "motion and contacts of each body, at each substep",
     "node/engines/pure_shapes": "distances of each pair of shapes, at each substep",
     "node/engines/rovers": "each rover's motion and contacts, at each substep",
+    "node/hall_world": "a node's tick in the hall",
+    "node/held": "what came of an epoch that has not begun, at each message",
     "node/inputs": "what reaches the robots, at each tick",
     "node/rules": "goals and the ball's return, at each tick",
     "node/sensors/__init__": "samples that are due, at each tick; the class that sensors derive from",
+    "node/sensors/ball": "each sample of the ball",
+    "node/sensors/battery": "each sample of a battery",
+    "node/sensors/encoder": "each sample of a rod or wheel",
+    "node/sensors/fitting": "where a sensor sits, for each sample",
+    "node/sensors/odometry": "each sample of a rover's way",
+    "node/sensors/pose": "each sample of a pose",
     "node/sensors/proximity": "the rays of each rover's sensors",
     "node/solver": "the engine's turn, at each tick",
     "node/step": "load, command, step and read of each island",
     "node/table_world": "commands of each rod, at each tick",
+    "node/world": "the class that worlds derive from",
     "protocol/actions": "what a core asks for, one for each message: compiled modules read it",
     "protocol/assign": "islands and who solves them, at each tick",
     "protocol/barrier": "puts the parts of each frame together",
@@ -50,22 +61,34 @@ COMPILED: Final = {
     "protocol/draws": "each random number",
     "protocol/frame": "reads and digests each frame",
     "protocol/layout": "the places in a frame of each body: compiled modules read them",
+    "protocol/limits": "the project's limits: compiled modules read them",
+    "protocol/member": "the handshake and heartbeat of each process, at each turn",
     "protocol/obstacles": "distances from what stands in the hall",
     "protocol/patience": "deadlines, asked at each message",
     "protocol/refusals": "what became of each message",
     "protocol/sampling": "which sensor is due, at each tick",
     "protocol/scene": "where each body is, for radio and sensors",
+    "protocol/standstill": "whether a process itself stood still, at each turn",
     "rehearsal/bounds": "what the swarm checks at each message",
     "rehearsal/bus": "each message of a rehearsal",
     "rehearsal/clock": "each turn of a rehearsal",
     "rehearsal/hub_journal": "each record of a rehearsal's vHub",
     "rehearsal/laws": "what the swarm checks at each frame",
+    "rehearsal/machines": "machines that are lost, at each turn of a rehearsal",
+    "rehearsal/packet_laws": "what the swarm checks at each packet",
+    "rehearsal/people": "what people ask of a rehearsal, at each turn",
+    "rehearsal/replica": "the world computed again, at each tick",
     "rehearsal/settings": "the processes of a rehearsal: compiled modules read them at each turn",
     "rehearsal/system": "turns of all processes of a rehearsal",
     "rehearsal/whatif": "judges each captured packet again",
+    "rehearsal/world_bounds": "what the swarm checks of each world",
     "supervisor/arrivals": "each part of a frame that arrives",
+    "supervisor/closing": "when a run that has ended is over, at each turn",
     "supervisor/core": "the supervisor's tick: orders, parts, commits",
+    "supervisor/head": "what the supervisor's core stands on: compiled modules read it",
+    "supervisor/issued": "what was ordered at each tick",
     "supervisor/pacing": "when the next tick may begin",
+    "supervisor/watch": "who is waited for, at each message",
     "vhub/ages": "how old a packet is when a client uses it, at each turn",
     "vhub/air": "who hears whom, for each radio packet",
     "vhub/budget": "the power that each radio packet is received with",
@@ -73,10 +96,12 @@ COMPILED: Final = {
     "vhub/geometry": "a line of sight against each surface",
     "vhub/jitter": "the delay of each packet",
     "vhub/links": "takes each packet through its stages",
+    "vhub/mcap_writer": "each message and chunk of a capture",
     "vhub/members": "a client's part of the vHub's state, at each tick",
     "vhub/numbers": "powers and decibels of each radio packet",
     "vhub/packet": "each packet on its way",
     "vhub/propagation": "what is between two radios, for each packet",
+    "vhub/radio/airtime": "the time on air of each radio packet",
     "vhub/radio/contention": "who may send on a shared medium, for each packet",
     "vhub/radio/errors": "the odds of each radio frame",
     "vhub/radio/fading": "the fading of each radio packet",
@@ -89,10 +114,13 @@ COMPILED: Final = {
     "vhub/room": "room for what is on its way, for each packet",
     "vhub/sendings": "each broadcast's one sending",
     "vhub/solids": "boxes and cylinders that a line of sight may meet",
+    "vhub/stages/__init__": "the table of stages that each packet goes through",
     "vhub/stages/admit": "the first stage of each packet",
+    "vhub/stages/capacity": "how many packets are on a link, for each packet",
     "vhub/stages/channel": "the radio channel, for each packet",
     "vhub/stages/delay": "the delay, for each packet",
     "vhub/stages/medium": "the shared medium, for each radio packet",
+    "vhub/stages/policy": "partitions, filters and the age of each packet",
     "vhub/stages/queue": "the sender's queue, for each packet",
     "vhub/stages/receiver": "the receiver, for each packet",
     "vhub/stages/residual": "loss and bursts, for each packet",
@@ -105,8 +133,9 @@ COMPILED: Final = {
 }
 """Modules by path, each with what it does so often that it is compiled.
 
-The profile of the benches says which they are: what is left out takes less than a hundredth of any bench, or is what
-msgspec and numpy have compiled already. Those that call each other at each tick are compiled together, in one library.
+Each is in the path of a tick or of a packet, or has a class that such modules read: of an interpreted class compiled
+code looks each attribute up by name. All are in one library, since they call each other. What starts a run, what people
+are told, and the types of msgspec, which are compiled already, are left out.
 """
 PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
 TYPED: Final = Path("build", "typed")
@@ -196,11 +225,9 @@ def extensions() -> list[Extension]:
         shutil.copytree(package, TYPED / "foosim" / package, ignore=shutil.ignore_patterns("__pycache__"))
     os.environ["MYPYPATH"] = str(TYPED)
     files = [str(TYPED / "foosim" / f"{name}.py") for name in COMPILED]
-    library, *shims = mypycify(
-        [*MYPY, *files], multi_file=True, include_runtime_files=True, target_dir=str(MADE), group_name=LIBRARY
-    )
+    library, *shims = mypycify([*MYPY, *files], multi_file=True, target_dir=str(MADE), group_name=LIBRARY)
     library.sources = units(library.sources)
-    level = "-O0" if choice() == "quick" else "-Og"
+    level = "-O0" if choice() == "quick" else "-O1"
     library.extra_compile_args = [*library.extra_compile_args, level, *EXACT]
     for shim in shims:
         shim.extra_compile_args = ["-O0", "-g0"]

@@ -18,7 +18,7 @@ if [ -x .venv-compiled/bin/python ] && [ "$(key)" = "$(cat .venv-compiled/key 2>
     exit 0
 fi
 
-echo "Compiling the hot path into .venv-compiled; this takes a minute or some, once for each change."
+echo "Compiling the hot path into .venv-compiled; this takes two minutes of processor time or some, once for each change."
 rm -rf .venv-compiled
 "$python" -m venv --without-pip .venv-compiled
 # In a copy: what an earlier build left would be shipped, and nothing is left in this folder.
