@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import hypot
 from typing import Final, TypeVar
 
 from foosim.node.core import NodeCore
@@ -24,6 +25,8 @@ HEALED_TICK: Final = 180
 MS: Final = 1_000_000
 HOUR_NS: Final = 3_600_000 * MS
 ASK_AGAIN_NS: Final = 150 * MS
+PUSH_MAX: Final = 0.8
+"""In N s: a push may give the table's ball of 21 g no more than its speed limit of 40 m/s."""
 """How often who asks for something asks again until it is answered."""
 
 T = TypeVar("T")
@@ -244,10 +247,19 @@ def _add(dice: Dice, names: Sequence[str]) -> Fault:
 
 
 def _push(dice: Dice, names: Sequence[str]) -> Fault:
-    """Sometimes far too hard: then the ball goes into quarantine."""
+    """Sometimes as hard as one may, twice in one tick: then the ball goes into quarantine."""
     hard = dice.one_of((0.04, 0.04, 0.04, 4.0))
     impulse = [hard * (dice.unit() - 0.5) for _ in range(3)]
-    return Fault(_tick(dice), "push", "push the ball", partial(ask, verb="push", impulse=impulse))
+    size = hypot(*impulse)
+    is_too_hard = size > PUSH_MAX
+    if is_too_hard:
+        impulse = [PUSH_MAX * part / size for part in impulse]
+
+    def do(system: System) -> None:
+        for _ in range(1 + is_too_hard):
+            ask(system, "push", impulse=impulse)
+
+    return Fault(_tick(dice), "push", "push the ball", do)
 
 
 def _tempo(dice: Dice, names: Sequence[str]) -> Fault:

@@ -152,7 +152,7 @@ def test_bad_input_is_refused_with_its_place(run: Path, tmp_path: Path) -> None:
     assert f"{other}:3:41: network.links[0].loss: not a probability" in bad(run, "--network", other).err
     other.write_text("links: []\n")
     assert "missing key, 'network'" in bad(run, "--network", other).err
-    assert "cannot be read" in bad(run, "--network", tmp_path / "none.yaml").err
+    assert "there is no such file" in bad(run, "--network", tmp_path / "none.yaml").err
     assert "not a setting of the network" in bad(run, "--set", "tick=4 ms").err
     assert "nearest" in bad(run, "--set", "network.links.everything.los=4 %").err
     with pytest.raises(DeploymentError):
