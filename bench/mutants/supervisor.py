@@ -133,7 +133,7 @@ def _forgotten(planting: Planting) -> None:
     planting.swap(Requests, "resume", lambda self, edits, answers: None)
 
 
-@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 12)
+@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 25)
 def _other_orders(planting: Planting) -> None:
     def open_epoch(self: Any, *given: Any) -> None:
         for tick in range(self.frame.tick, self.released):
