@@ -210,7 +210,7 @@ def _never_lost(planting: Planting) -> None:
     planting.swap(Roster, "lose", lambda self, process: None)
 
 
-@register("a stopped node comes back", "who was stopped is not let in until it is started", 19)
+@register("a stopped node comes back", "who was stopped is not let in until it is started", 21)
 def _unstopped(planting: Planting) -> None:
     def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
         self._core.roster.stopped.discard(hello.name)

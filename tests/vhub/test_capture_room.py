@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -99,7 +100,9 @@ def test_at_the_reserve_a_run_that_is_to_end_is_captured_to_its_end(
     Disk(450 * KIB, monkeypatch)
     writer = new_writer(tmp_path / "run.mcap", hub_run, "capture.reserve=384 KiB")
     seen = feed(writer, hub_run)
-    assert seen == [Level.FINE, Level.LOW, Level.FULL][-len(seen) :] and seen[-1] is Level.FULL, seen
+    # The writer's thread may go through a level between two looks.
+    assert seen == [level for level in (Level.FINE, Level.LOW, Level.FULL) if level in seen], seen
+    assert seen[-1] is Level.FULL
     assert writer.stops_world and "left on its disk, the reserve is 384 KiB" in writer.state.text
     assert writer.statistics().refused == 0
     assert_accounted(writer, hub_run)
@@ -179,7 +182,8 @@ def test_on_a_disk_that_is_really_full(hub_run: HubRun, small_disk: Callable[[in
         for closings in range(4):
             for closing in hub_run.closings if closings == 0 else hub_run.closings[-1:]:
                 writer.keep(closing)
-        (place / "others").write_bytes(bytes(max(0, disk.free_bytes(place) - 4096)))
+        with suppress(OSError):  # its thread writes as well: then the disk is full before all of this is on it
+            (place / "others").write_bytes(bytes(max(0, disk.free_bytes(place) - 4096)))
         writer.finish({"reason": "enough"})
         found = writer.statistics()
         assert found.offered == found.written + found.refused
