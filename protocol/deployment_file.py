@@ -68,6 +68,12 @@ def apply_sets(text: str, name: str, sets: Sequence[str]) -> str:
     Canonical is block style in the file's order without comments: what travels in the handshake and is attached to
     the capture. Loading it gives the changed deployment, and its own canonical text is itself.
     """
+    return _applied(text, name, tuple(sets))
+
+
+@lru_cache(maxsize=DEPLOYMENTS_KEPT)
+def _applied(text: str, name: str, sets: tuple[str, ...]) -> str:
+    """What `apply_sets` returns; who rehearses the same again pays for it once."""
     tree, problems = read_tree(text, locate_in(name))
     if tree is not None:
         tree, set_problems = place_sets(tree, sets)

@@ -87,6 +87,9 @@ class CaptureWriter:
         self._say = say or (lambda level, text: None)
         self._flush_ns = deployment.capture.flush_ns
         self.state = CaptureState()
+        self.states: deque[CaptureState] = deque()
+        """Each state that it came to, in order, for one reader, who takes them out: the thread may be two further when
+        it is looked at."""
         self.stops_world = deployment.capture.on_full == "stop_world"
         self._offered = self._written = self._refused = self._pending = self._passed = 0
         """Rows by what became of them; pending ones are in the chunk that is being collected, passed
@@ -246,7 +249,7 @@ class CaptureWriter:
         if room.level is Level.OUT or (room.level is Level.FULL and not self.stops_world):
             self._give_up(f"{self.path}: {room}")
         elif room.level > self.state.level:
-            self.state = CaptureState(room.level, f"{self.path}: {room}")
+            self._come_to(CaptureState(room.level, f"{self.path}: {room}"))
 
     def _note_written(self) -> None:
         self._written += self._pending
@@ -264,7 +267,11 @@ class CaptureWriter:
         except OSError as error:
             self._file.give_up()
             text = f"{text}; its end could not be written, {error.strerror}"
-        self.state = CaptureState(Level.OUT, text)
+        self._come_to(CaptureState(Level.OUT, text))
+
+    def _come_to(self, state: CaptureState) -> None:
+        self.state = state
+        self.states.append(state)
 
     def _finish(self, ending: Mapping[str, str]) -> None:
         try:

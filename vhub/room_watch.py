@@ -28,28 +28,28 @@ class RoomWatch:
         self._capture = capture
         self._journals = journals
         self._reserve = reserve
-        self._told = CaptureState()
+        self._level = Level.FINE
         self._journal_level = Level.FINE
         self._look_ns = 0
 
     def look(self, now_ns: int) -> list[tuple[str, str]]:
         """Return what is new for people, as (level, text)."""
-        said = [] if self._capture is None else self._look_at(self._capture)
+        said = []
+        while self._capture is not None and self._capture.states:
+            said += self._tell(self._capture.states.popleft(), self._capture.stops_world)
         if now_ns >= self._look_ns:
             self._look_ns = now_ns + LOOK_NS
             said += self._look_at_journal()
         return said
 
-    def _look_at(self, capture: CaptureWriter) -> list[tuple[str, str]]:
-        state = capture.state
-        if state == self._told:
-            return []
-        before, self._told = self._told, state
+    def _tell(self, state: CaptureState, stops_world: bool) -> list[tuple[str, str]]:
+        """Note a state that the capture came to."""
+        before, self._level = self._level, state.level
         if state.level is Level.LOW:
-            then = "the run ends" if capture.stops_world else "the run goes on without its capture"
+            then = "the run ends" if stops_world else "the run goes on without its capture"
             return [("warning", f"room gets little, at the reserve {then}: {state.text}")]
-        if capture.stops_world:
-            if before.level < Level.FULL:
+        if stops_world:
+            if before < Level.FULL:
                 self.ends = ("the capture", state.text)
             return [("error", f"not captured further: {state.text}")] if state.level is Level.OUT else []
         return [("error", f"the run goes on without its capture: {state.text}")]

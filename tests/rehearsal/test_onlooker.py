@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import ctypes
+import faulthandler
 import json
 import os
 import re
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar, Final
 
 import pytest
@@ -34,7 +35,8 @@ TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 HANGS_AT: Final = 30
 SETS: Final = ("engine=pure", "substeps=1", "players.player-red.class=tests.rehearsal.test_onlooker:Hangs")
 
-SHORT: Final = ("deadlines.lockstep_fast=0.1 s", "deadlines.start=1 s")
+LONG_S: Final = 900
+LONG: Final = f"deadlines={{lockstep_fast: {LONG_S} s, start: {LONG_S} s}}"
 
 
 def looks_on() -> tuple[Onlooker, SupervisorCore]:
@@ -83,14 +85,34 @@ class Hangs:
     """A player that does not return from one tick."""
 
     how: ClassVar[Any]
+    hangs: ClassVar[bool] = False
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
         pass
 
     def act(self, tick: int, samples: Samples) -> Commands:
         if tick == HANGS_AT:
-            Hangs.how()
+            Hangs.hangs = True
+            try:
+                Hangs.how()
+            finally:
+                Hangs.hangs = False
         return {}
+
+
+@pytest.fixture
+def only_hanging_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The attendant's clock goes on while the player hangs alone: no machine is too slow for the ticks before."""
+    now_s = 0.0
+
+    def monotonic() -> float:
+        nonlocal now_s
+        now_s += STOOD_S if Hangs.hangs else 0.0
+        return now_s
+
+    monkeypatch.setattr(attendant, "time", SimpleNamespace(monotonic=monotonic))
+    monkeypatch.setattr(attendant, "WIND_S", 0.0)
+    monkeypatch.setattr(attendant, "STARVED_S", LONG_S)
 
 
 def rehearsed(*options: str) -> Any:
@@ -106,6 +128,7 @@ def loops() -> None:
             continue
 
 
+@pytest.mark.usefixtures("only_hanging_counts")
 @pytest.mark.parametrize("how", [loops, threading.Event().wait], ids=["loops", "waits"])
 def test_a_player_that_hangs_ends_the_run_in_order(how: Any, tmp_path: Path) -> None:
     Hangs.how, capture = how, tmp_path / "run.mcap"
@@ -117,6 +140,7 @@ def test_a_player_that_hangs_ends_the_run_in_order(how: Any, tmp_path: Path) -> 
     assert f"reason: {reason}" in CliRunner().invoke(replay_app, ["info", str(capture)]).stdout
 
 
+@pytest.mark.usefixtures("only_hanging_counts")
 def test_one_that_cannot_be_interrupted_is_given_up(capfd: pytest.CaptureFixture[str]) -> None:
     """A mutex that is locked twice is waited for in C, whatever signals come."""
     library, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(64)
@@ -145,11 +169,13 @@ def forked(run: Callable[[], object]) -> int:
     """Run something in a fork of this process, in a process group of its own; return its process id."""
     child = os.fork()
     if child == 0:
+        code = 7
         try:
             os.setpgid(0, 0)
             run()
+            code = 0
         finally:
-            os._exit(0)
+            os._exit(code)
     return child
 
 
@@ -157,31 +183,52 @@ def test_one_that_keeps_the_interpreter_ends_its_process_with_its_stack(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A pause in C that holds the interpreter's lock: no thread of Python runs any more, and no signal is handled."""
-    monkeypatch.setattr(attendant, "STARVED_S", 1.0)
+    monkeypatch.setattr(attendant, "STARVED_S", LONG_S)
+    monkeypatch.setattr(attendant, "WIND_S", 0.0)
     monkeypatch.setattr(sys, "__stderr__", None)
-    library = ctypes.PyDLL(None)
+    library, wound, wind = ctypes.PyDLL(None), threading.Event(), faulthandler.dump_traceback_later
+
+    def short(limit_s: float, **options: Any) -> None:
+        wind(1.0, **options)
+        wound.set()
 
     def pauses() -> None:
+        monkeypatch.setattr(faulthandler, "dump_traceback_later", short)  # here, in the fork, from now on
+        wound.wait()
         while True:
             library.pause()
 
     Hangs.how = pauses
-    sets = (*SETS, *SHORT)
-    child = forked(lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, sets, on_stuck=lambda result: None))
+    child = forked(lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, LONG), on_stuck=lambda result: None))
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
     assert re.search(r"Timeout .*in pauses\n.*in act\n", capfd.readouterr().err, re.DOTALL)
 
 
+def threads_of(process: int) -> int:
+    return len(os.listdir(f"/proc/{process}/task"))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
 def test_a_rehearsal_that_a_ctrl_z_has_stopped_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(attendant, "STARVED_S", 2.0)
-    Hangs.how = lambda: signal.raise_signal(signal.SIGTSTP)
+    """While it is stopped there is no timer, which is a thread of faulthandler's: so none is over when it goes on."""
+    monkeypatch.setattr(attendant, "STARVED_S", LONG_S)
+    counts, told = os.pipe()
+
+    def stops() -> None:
+        before = threads_of(os.getpid())
+        signal.raise_signal(signal.SIGTSTP)
+        os.write(told, bytes([before, threads_of(os.getpid())]))
+
+    Hangs.how = stops
     child = forked(
-        lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, *SHORT), on_stuck=lambda result: None)
+        lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, LONG), on_stuck=lambda result: None)
     )
     assert os.WIFSTOPPED(os.waitpid(child, os.WUNTRACED)[1])
-    time.sleep(4.0)  # longer than the timer has
+    stopped = threads_of(child)
     os.kill(child, signal.SIGCONT)
+    assert stopped == 2, "the rehearsal's and the attendant's"
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert os.read(counts, 2) == bytes([3, 3]), "there is one before, and again as soon as it goes on"
 
 
 def test_a_ctrl_c_ends_in_order_and_the_last_line_says_how_far_it_came(tmp_path: Path) -> None:

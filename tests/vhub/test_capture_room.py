@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -64,16 +63,12 @@ def new_writer(path: Path, run: HubRun, *sets: str) -> CaptureWriter:
 
 
 def feed(writer: CaptureWriter, run: HubRun) -> list[Level]:
-    """Hand over the whole run; return the states that were seen on the way."""
-    seen = [writer.state.level]
+    """Hand over the whole run; return the levels that the writer came to on the way."""
+    assert writer.state.level is Level.FINE
     for closing in run.closings:
         writer.keep(closing)
-        if writer.state.level != seen[-1]:
-            seen.append(writer.state.level)
     writer.finish({"reason": "enough"})
-    if writer.state.level != seen[-1]:
-        seen.append(writer.state.level)
-    return seen
+    return [state.level for state in writer.states]
 
 
 def assert_accounted(writer: CaptureWriter, run: HubRun) -> None:
@@ -99,10 +94,11 @@ def test_at_the_reserve_a_run_that_is_to_end_is_captured_to_its_end(
 ) -> None:
     Disk(450 * KIB, monkeypatch)
     writer = new_writer(tmp_path / "run.mcap", hub_run, "capture.reserve=384 KiB")
-    seen = feed(writer, hub_run)
-    # The writer's thread may go through a level between two looks.
-    assert seen == [level for level in (Level.FINE, Level.LOW, Level.FULL) if level in seen], seen
-    assert seen[-1] is Level.FULL
+    assert feed(writer, hub_run) == [Level.LOW, Level.FULL]
+    room = RoomWatch(writer, tmp_path, 1)
+    ((level, said),) = room.look(0)  # which comes when the thread is already two levels further
+    assert level == "warning" and said.startswith("room gets little, at the reserve the run ends: ")
+    assert room.ends == ("the capture", writer.state.text) and room.look(0) == []
     assert writer.stops_world and "left on its disk, the reserve is 384 KiB" in writer.state.text
     assert writer.statistics().refused == 0
     assert_accounted(writer, hub_run)
@@ -115,8 +111,7 @@ def test_a_run_that_goes_on_without_its_capture_has_a_valid_one_up_to_there(
 ) -> None:
     Disk(300 * KIB, monkeypatch)
     writer = new_writer(tmp_path / "run.mcap", hub_run, "capture.reserve=200 KiB", "capture.on_full=continue_unlogged")
-    seen = feed(writer, hub_run)
-    assert seen[-1] is Level.OUT and not writer.stops_world
+    assert feed(writer, hub_run) == [Level.LOW, Level.OUT] and not writer.stops_world
     assert_accounted(writer, hub_run)
     assert_valid(writer.path)
     capture = open_capture(writer.path)
@@ -157,11 +152,11 @@ def test_the_quota_is_kept(hub_run: HubRun, tmp_path: Path) -> None:
     for quota, on_full in ((100, "continue_unlogged"), (100, "stop_world"), (400, "stop_world")):
         path = tmp_path / f"{quota}-{on_full}.mcap"
         writer = new_writer(path, hub_run, f"capture.max_bytes={quota} KiB", f"capture.on_full={on_full}")
-        seen = feed(writer, hub_run)
+        levels = feed(writer, hub_run)
         assert_accounted(writer, hub_run)
         assert_valid(path)
         assert path.stat().st_size <= quota * KIB
-        assert seen[-1] is (Level.FINE if quota == 400 else Level.OUT)
+        assert levels[-1:] == ([] if quota == 400 else [Level.OUT])
         if quota == 100:
             assert "of the 0.1 MB that it may have" in writer.state.text
 
@@ -173,23 +168,43 @@ def test_levels_of_room() -> None:
     assert str(Room(40_000_000, 64 << 20, "on its disk")) == "40.0 MB left on its disk, the reserve is 64 MiB"
 
 
-def test_on_a_disk_that_is_really_full(hub_run: HubRun, small_disk: Callable[[int], Path]) -> None:
-    reserves: Sequence[tuple[int, int]] = ((256, 96), (72, 0))
-    for size, reserve in reserves:
-        place = small_disk(size)
-        sets = [f"capture.reserve={max(64, reserve)} KiB", "capture.on_full=continue_unlogged"]
-        writer = new_writer(place / "run.mcap", hub_run, *sets)
-        for closings in range(4):
-            for closing in hub_run.closings if closings == 0 else hub_run.closings[-1:]:
-                writer.keep(closing)
-        with suppress(OSError):  # its thread writes as well: then the disk is full before all of this is on it
-            (place / "others").write_bytes(bytes(max(0, disk.free_bytes(place) - 4096)))
-        writer.finish({"reason": "enough"})
-        found = writer.statistics()
-        assert found.offered == found.written + found.refused
-        if open_capture(writer.path).finished:
-            assert_valid(writer.path)
-        assert open_capture(writer.path).about.unfinished_bytes == 0
+def test_on_a_disk_that_is_really_full_the_reserve_takes_the_end(
+    hub_run: HubRun, small_disk: Callable[[int], Path]
+) -> None:
+    path = small_disk(144) / "run.mcap"
+    writer = new_writer(path, hub_run, "capture.reserve=64 KiB", "capture.on_full=continue_unlogged")
+    assert feed(writer, hub_run) == [Level.LOW, Level.OUT]
+    assert writer.statistics().refused > 0 and open_capture(path).finished
+    assert_accounted(writer, hub_run)
+    assert_valid(path)
+
+
+def test_on_a_disk_that_others_fill_what_was_whole_stays(
+    hub_run: HubRun, small_disk: Callable[[int], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They take all that is left between a look and the next write, which fails in its midst, and so does the end."""
+    path, write = small_disk(256) / "run.mcap", capture_file.write_all
+    others = path.with_name("others")
+
+    def others_write_first(file: int, content: bytes) -> None:
+        if os.fstat(file).st_size > 64 * KIB and not others.exists():
+            with pytest.raises(OSError, match=os.strerror(errno.ENOSPC)):
+                others.write_bytes(bytes(256 * KIB))
+        write(file, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(capture_file, "write_all", others_write_first)
+        writer = new_writer(path, hub_run, "capture.reserve=64 KiB")
+        levels = feed(writer, hub_run)
+    assert levels == [Level.OUT]
+    full = os.strerror(errno.ENOSPC)
+    assert f"cannot be written, {full}; its end could not be written, {full}" in writer.state.text
+    assert writer.statistics().written > 0 < writer.statistics().refused
+    assert_accounted(writer, hub_run)
+    assert not open_capture(path).finished and open_capture(path).about.unfinished_bytes == 0
+    others.unlink()
+    assert recover_capture(path) is not None
+    assert_valid(path)
 
 
 def test_a_capture_that_takes_long_to_close_shows_how_far_it_is(

@@ -13,6 +13,8 @@ from foosim.protocol.errors import BadValue
 from foosim.supervisor import control
 
 if TYPE_CHECKING:
+    from foosim.client.client import Client
+    from foosim.supervisor.run_folder import RunInfo
     from tests.wire.conftest import House
 
 CLIENTS = "clients={hand: {lockstep: true, rate: 100 Hz}, ear: {lockstep: false}}"
@@ -65,11 +67,19 @@ def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
     assert code == 0, err
 
 
-def test_a_free_running_client_hears_robots_and_gets_its_echo_back(house: House) -> None:
+def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_told_why(house: House) -> None:
     up = house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"), "--set", "engine=pure")
-    radio = house.info().radio
-    with connect(radio, "ear") as client, connect(radio, "hand") as other:
+    info = house.info()
+    assert_strangers_are_refused(info)
+    with connect(info.radio, "ear") as client, connect(info.radio, "hand") as other:
+        with pytest.raises(ConnectionRefused, match="a client hand is already here"):
+            connect(info.radio, "hand", timeout_s=PATIENCE_S)
+        assert_wrong_names_are_told(client)
         client.listen([("camera", "ball")])
+        with pytest.raises(NotJoined):
+            client.subscribe("red.goal", "encoder")
+        with pytest.raises(UnknownName, match="unknown destination"):
+            client.send("red.gaol", "echo", b"")
         other.listen()
         back: list[bytes] = []
         heard: list[bytes] = []
@@ -97,36 +107,29 @@ def test_a_free_running_client_hears_robots_and_gets_its_echo_back(house: House)
     assert code == 0, err
 
 
-def test_who_is_refused_is_told_why(house: House) -> None:
-    house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"))
-    info = house.info()
+def assert_strangers_are_refused(info: RunInfo) -> None:
     with pytest.raises(ConnectionRefused, match=r"no client hands .*declared are ear, hand, nearest is hand"):
         connect(info.radio, "hands", timeout_s=PATIENCE_S)
     with pytest.raises(ConnectionRefused, match="world pool, this is table"):
         connect(info.radio, "hand", "pool", timeout_s=PATIENCE_S)
-    with connect(info.radio, "hand", timeout_s=PATIENCE_S) as client:
-        with pytest.raises(ConnectionRefused, match="a client hand is already here"):
-            connect(info.radio, "hand", timeout_s=PATIENCE_S)
-        with pytest.raises(UnknownName, match=r"unknown robot .*'red.gaol', nearest is 'red.goal'"):
-            client.robots["red.gaol"]
-        with pytest.raises(UnknownName, match=r"no such actuator .*nearest is 'position'"):
-            client.robots["red.goal"].actuators["positon"]
-        with pytest.raises(UnknownName, match=r"no such channel to hear .*nearest is 'encoder'"):
-            client.subscribe("red.goal", "encode")
-        with pytest.raises(BadValue, match="not a whole number of ticks"):
-            client.lockstep(300)
-        with pytest.raises(BadValue, match="declares none for hand"):
-            client.lockstep()
-        client.listen()
-        with pytest.raises(NotJoined):
-            client.subscribe("camera", "ball")
-        with pytest.raises(UnknownName, match="unknown destination"):
-            client.send("red.gaol", "echo", b"")
     with pytest.raises(ConnectionFailed, match="radio plane's address"):
         connect(info.simulation, "hand", timeout_s=1.0)
     with pytest.raises(BadValue, match="not a name for a client"):
         connect(info.radio, "Hand")
-    house.kill("vhub")
+
+
+def assert_wrong_names_are_told(client: Client) -> None:
+    """By a client that does not listen yet."""
+    with pytest.raises(UnknownName, match=r"unknown robot .*'red.gaol', nearest is 'red.goal'"):
+        client.robots["red.gaol"]
+    with pytest.raises(UnknownName, match=r"no such actuator .*nearest is 'position'"):
+        client.robots["red.goal"].actuators["positon"]
+    with pytest.raises(UnknownName, match=r"no such channel to hear .*nearest is 'encoder'"):
+        client.subscribe("red.goal", "encode")
+    with pytest.raises(BadValue, match="not a whole number of ticks"):
+        client.lockstep(300)
+    with pytest.raises(BadValue, match="declares none for ear"):
+        client.lockstep()
 
 
 def test_a_client_says_that_the_vhub_is_lost(house: House) -> None:

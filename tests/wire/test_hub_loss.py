@@ -139,17 +139,7 @@ def test_a_run_whose_vhub_cannot_go_on_ends_in_order_and_says_why(house: House) 
     assert content["failed"] and content["reason"].startswith("lost vhub: it cannot go on: ")
     assert "vhub-000001.journal: no journal of this version" in content["reason"]
     assert err.count("vhub was killed by SIGKILL, not by foosim, starts again") == 1 and "is given up" not in err
-
-
-def test_a_vhub_whose_journal_cannot_be_read_ends_and_says_so(house: House) -> None:
-    """It would have to guess what the one before has said."""
-    house.start("foosim-supervisor", "run", house.table, "--set", "players={}", "--set", LONG)
-    connect = ["--connect", house.wait_for("the run file", house.live().info).simulation]
-    journals = house.folder / "hub" / "journals"
-    journals.mkdir(parents=True)
-    (journals / "vhub-000001.journal").write_bytes(b"nothing of a journal")
-    code, _, err = house.run("foosim-vhub", *connect, "--run-folder", str(house.folder / "hub"))
-    assert code == 1 and "no journal of this version" in err, err
+    assert "vhub ended with exit code 1" in err, "it would have to guess what the one before has said"
 
 
 TRAP: Final = """

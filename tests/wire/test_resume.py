@@ -48,7 +48,7 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     options = ("--run", "far", "--capture", "far.mcap")
     code, out, err = house.run("foosim-supervisor", "up", house.table, *BARE, *options, "--detach")
     assert (code, err) == (0, "") and "run far is up" in out
-    code, _, err = house.run("foosim-supervisor", "up", "--resume", "far")
+    code, _, err = house.ask("foosim-supervisor", "up", "--resume", "far")
     assert code == 3 and "run far is alive" in err
     before = house.ticking(100)["ticks"]
     (launcher,) = [pid for pid, line in house.processes_with("--run far").items() if "foosim-supervisor up" in line]
@@ -62,7 +62,7 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     flip(folder.journals, channels.VHUB)
     (journal,) = journal_files(folder.journals, channels.VHUB)
     journal.rename(journal.with_suffix(".away"))
-    code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
+    code, out, err = house.ask("foosim-supervisor", "up", "--resume", "far", "--json")
     why = f"run far cannot go on: the vHub's journal is gone from {folder.journals}; foosim-supervisor up {house.table}"
     assert code == 3 and err.startswith(why) and last_json(out)["reason"] == err.strip()
     assert last_json(out)["capture"] == str(house.folder / "far.mcap")
@@ -82,7 +82,7 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     assert open_capture(house.folder / "far.mcap").about.finished
     verified = verify_capture(house.folder / "far.mcap")
     assert verified.ticks == content["ticks"]
-    code, out, err = house.run("foosim-supervisor", "up", "--resume", "far", "--json")
+    code, out, err = house.ask("foosim-supervisor", "up", "--resume", "far", "--json")
     assert (code, last_json(out)) == (0, content) and "run far has ended: stopped" in err
 
 

@@ -14,21 +14,15 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from foosim.protocol.names import LINE_NAMES, TEAMS
-from foosim.protocol.units import parse_pace
-from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.verify import verify_capture
 from foosim.supervisor import control
 from foosim.supervisor.control import Control, RequestRefused
 from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.rows import PacketRow
 from tests.wire.conftest import LIMIT_S, LONG
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
-
-KEYS = {
-    *("ticks", "tick_ns", "rtf", "lag_ms", "digest", "packets", "nodes", "moves", "handovers", "score", "capture"),
-}
-
 
 def last_json(out: str) -> dict[str, Any]:
     """The object in the last line."""
@@ -42,28 +36,6 @@ def assert_finished(house: House, content: dict[str, Any]) -> None:
     about = open_capture(house.folder / content["capture"]).about
     assert about.finished
     assert about.end["reason"] == content["reason"]
-
-
-def test_two_nodes_and_two_players_compute_what_a_rehearsal_computes(house: House) -> None:
-    code, out, err = house.end(house.up("--pace", "fast", "--for", "600 ms", "--json", players=True))
-    assert code == 0, err
-    content = last_json(out)
-    assert content.keys() >= KEYS
-    assert (content["ticks"], content["tick_ns"], content["lag_ms"], content["reason"]) == (
-        *(300, 2_000_000, None, "done"),
-    )
-    assert content["rtf"] > 0
-    assert all(node["solved_ticks"] > 0 and node["owned"] for node in content["nodes"].values())
-    assert content["packets"]["dropped"] > 0 and content["packets"]["delivered"] > 0
-    assert_finished(house, content)
-    assert "capture captures/table-" in err, "people are told where it is"
-    assert house.processes_with(str(house.folder)) == {}
-    (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
-    assert list((run / "journals").iterdir()) == [], "nothing is left to recover"
-
-    rehearsed = rehearse(house.table.read_text(), "table.yaml", 300, nodes=None, pace=parse_pace("fast")).json
-    for same in ("digest", "packets", "nodes", "handovers", "score"):
-        assert content[same] == rehearsed[same], same
 
 
 def test_a_run_goes_on_whatever_is_asked_wrongly_and_dies_with_its_launcher(house: House) -> None:
@@ -278,12 +250,15 @@ ROUNDS_PER_S: Final = 100
 def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(
     house: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """A Ctrl-C then ends the run in order."""
     (house.folder / "sitecustomize.py").write_text(COUNTED)
     with monkeypatch.context() as counted:
         counted.setenv("PYTHONPATH", str(house.folder))
-        up = house.up("--json", players=True)
-    house.ticking(3)
-    code, out, _ = house.run("foosim-supervisor", "pause", "--json")
+        up = house.up("--json", "--capture", "run.mcap", players=True)
+    house.ticking(50)
+    cut, healed = cut_and_healed(house)
+    assert_top_shows_it(house)
+    code, out, _ = house.ask("foosim-supervisor", "pause", "--json")
     paused = json.loads(out)
     assert (code, paused["text"]) == (0, f"paused at tick {paused['tick']}")
     tick = paused["tick"]
@@ -299,10 +274,55 @@ def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(
         house.wait_for("ticks", lambda: asked.status()["ticks"] > resumed.tick)
         assert asked.status()["pace"] == "fast"
         house.wait_for("its load", lambda: asked.status()["processes"]["supervisor"]["busy"] > 0.0)
-        last = asked.ask("down").tick
+    up.send_signal(signal.SIGINT)
     code, out, err = house.end(up)
     assert code == 0, err
-    assert (last_json(out)["ticks"], last_json(out)["moves"]) == (last, 1)
+    content = last_json(out)
+    assert (content["reason"], content["failed"], content["moves"]) == ("stopped", False, 1)
+    assert_finished(house, content)
+    assert_packets_were_cut(house, cut, healed)
+
+
+def cut_and_healed(house: House) -> tuple[int, int]:
+    """A partition by `foosim-net` and its heal: the ticks at which they take effect."""
+    code, out, err = house.ask("foosim-net", "partition", "player-red", "rest", "--json")
+    assert code == 0, err
+    cut = json.loads(out)["tick"]
+    assert house.ask("foosim-net", "partition", "player-rde", "rest") == (
+        3,
+        "",
+        "partition[0][0]: a selector that matches no endpoint, 'player-rde', nearest is 'player-red'\n",
+    )
+    house.ticking(cut + 20)
+    code, out, err = house.ask("foosim-net", "heal", "--json")
+    healed = json.loads(out)["tick"]
+    assert (code, json.loads(out)["text"]) == (0, f"heal of all at tick {healed}")
+    status = house.ticking(healed + 20)
+    assert [told["tick"] for told in status["disruptions"]["last"]] == [cut, healed]
+    return cut, healed
+
+
+def assert_top_shows_it(house: House) -> None:
+    top = house.start("foosim-net", "top")
+    first = house.read_until(top.stdout, "· tick ")
+    line = house.read_until(top.stdout, "camera to player-red")
+    assert "links" in first and "partition" in line and "/s, offered" in line
+    top.send_signal(signal.SIGINT)
+    assert house.end(top)[0] == 0
+
+
+def assert_packets_were_cut(house: House, cut: int, healed: int) -> None:
+    """The capture has what the partition cost, and `explain` knows why."""
+    capture = open_capture(house.folder / "run.mcap")
+    rows = [row for row in capture.rows("/packets") if isinstance(row, PacketRow)]
+    lost = [row for row in rows if row.cause == "partition" and row.arrival_tick < 0]
+    ticks = {row.sent_ns // capture.deployment.tick_ns for row in lost}
+    assert ticks and min(ticks) >= cut and max(ticks) < healed
+    one = next(row for row in lost if row.source == "camera")
+    code, out, err = house.ask("foosim-net", "explain", "run.mcap", f"camera:{one.sequence}:player-red")
+    assert code == 0, err
+    assert "policy    at sending cut by request 0, from " in out and ": partition\n" in out
+    assert out.endswith("dropped at sending: partition (policy)\n")
 
 
 def assert_it_sleeps(house: House) -> None:

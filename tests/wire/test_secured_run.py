@@ -1,6 +1,9 @@
-"""A run of real processes with certificates: it is the run that it is without them, and lets in whom it should."""
+"""A run of real processes with certificates: it lets in whom it should.
 
-import json
+Nodes, supervisor and vHub that are killed, hang or are stopped come back, and the world is the one without that.
+"""
+
+import signal
 from pathlib import Path
 
 from foosim.client.client import connect
@@ -10,6 +13,7 @@ from foosim.supervisor import control, pki
 from foosim.supervisor.control import Control
 from foosim.vhub.capture_reader import open_capture
 from tests.wire.conftest import House
+from tests.wire.test_run import last_json
 
 CLIENTS = ("--set", "clients={hand: {}}", "--set", "players={}")
 
@@ -46,15 +50,16 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     assert code == 0, output
 
 
-def went_on(desk: Control, *what: str) -> bool:
-    """Whether all of this was lost or came, and the run went on each time."""
+def went_on(desk: Control, *what: str, times: int = 1) -> bool:
+    """Whether all of this was lost or came so often, and the run went on each time."""
     entries = desk.status()["recoveries"]
     told = [(entry["what"], entry["name"]) for entry in entries if entry["outage_ms"] is not None]
-    return all(tuple(each.split()) in told for each in what)
+    return all(told.count((kind, name)) >= times for kind, name in map(str.split, what))
 
 
-def test_a_run_with_certificates_survives_kills_and_is_the_run_without(house: House) -> None:
-    """A node, the supervisor (the router of one plane) and the vHub (that of the other): all dial and listen anew."""
+def test_a_run_survives_kills_and_one_that_hangs_and_is_the_run_without(house: House) -> None:
+    """A node, the supervisor (the router of one plane) and the vHub (that of the other): all dial and listen anew, with
+    certificates. The world is the one that would have been."""
     folder = certificates(house.folder / "certs")
     pki.issue(folder, ["client.player-red", "client.player-blue"])
     up = house.up("--json", "--engine", "pure", "--pki", folder, players=True)
@@ -66,16 +71,37 @@ def test_a_run_with_certificates_survives_kills_and_is_the_run_without(house: Ho
         house.wait_for("another supervisor", lambda: went_on(desk, "supervisor supervisor"))
         house.kill("vhub")
         house.wait_for("the vHub to come back", lambda: went_on(desk, "vhub vhub"))
+        house.kill("blue", signal.SIGSTOP)
+        house.wait_for("blue to come back", lambda: went_on(desk, "node blue", "join blue"))
+        house.kill("red")
+        house.wait_for("red to come back again", lambda: went_on(desk, "node red", "join red", times=2))
+        assert_it_is_stopped_and_started_from_another_terminal(house, desk)
         house.ticking(desk.status()["ticks"] + 20)
-        desk.ask("down")
+        last = desk.ask("down").tick
     code, output, error = house.end(up)
     assert code == 0, error
-    content = json.loads(output.splitlines()[-1])
+    content = last_json(output)
+    assert (content["ticks"], content["reason"], content["failed"]) == (last, "stopped", False)
     told = [(entry["what"], entry["name"]) for entry in content["recoveries"]]
-    assert told == [("node", "red"), ("join", "red"), ("supervisor", "supervisor"), ("vhub", "vhub")]
+    red, blue = ([("node", name), ("join", name)] for name in ("red", "blue"))
+    assert told == [*red, ("supervisor", "supervisor"), ("vhub", "vhub"), *blue, *red, ("join", "red")]
+    assert "lost node red (its connection closed)" in error
+    assert error.count("blue does not answer any more: it is killed") == 1, "not the one that is started then"
     same = rehearse(house.table.read_text(), "table.yaml", content["ticks"], None, ["engine=pure"]).json
     assert content["digest"] == same["digest"] and content["packets"] == same["packets"]
     capture = house.folder / content["capture"]
     assert open_capture(capture).about.finished
     assert str(folder).encode() not in capture.read_bytes(), "where secrets are is nobody's business"
     assert house.processes_with(str(house.folder)) == {}
+
+
+def assert_it_is_stopped_and_started_from_another_terminal(house: House, desk: Control) -> None:
+    code, out, err = house.ask("foosim-supervisor", "stop", "red")
+    assert (code, err) == (0, "") and out.startswith("red stopped at tick "), err
+    house.wait_for("red to be gone", lambda: not house.processes_with("--name red"))
+    status = desk.status()
+    assert status["processes"]["red"]["stopped"] and status["nodes"]["red"]["owned"] == []
+    assert house.ask("foosim-supervisor", "start", "red")[0] == 0
+    house.wait_for("red to come back", lambda: went_on(desk, "join red", times=3))
+    assert desk.status()["nodes"]["red"]["owned"] != []
+    assert house.ask("foosim-supervisor", "stop", "rde")[0] == 3
