@@ -19,6 +19,7 @@ from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.hosts import places
 from foosim.protocol.messages import Answer
 from foosim.protocol.probe import ProgressOption
+from foosim.protocol.usage import BadUsage
 from foosim.supervisor import control
 from foosim.supervisor.detach import detach
 from foosim.supervisor.display import Display, render_text
@@ -420,9 +421,15 @@ def install_units(  # a command's options
             print(f"node {name} has `launch: {node.launch}`; {hint}", file=sys.stderr)
 
 
+def _refuse_usage(words: Sequence[str], problem: BadUsage) -> None:
+    """Print the one object of `up --json` also where its options cannot be read."""
+    if words[:1] == ["up"]:
+        _print_result(refused_result(None, None, str(problem)), "--json" in words)
+
+
 def main() -> None:
     """Entry of `foosim-supervisor`."""
-    run_app(app, "foosim-supervisor")
+    run_app(app, "foosim-supervisor", _refuse_usage)
 
 
 if __name__ == "__main__":
