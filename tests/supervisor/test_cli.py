@@ -177,6 +177,8 @@ def test_a_disk_with_less_than_the_reserve_is_refused_before_anything_starts(
     assert re.match(rf"\.: [0-9.]+ {what}nothing was started\n$", done.err)
     done = command("up", TABLE, "--for", "1s", *reserve, "--set", "capture.on_full=continue_unlogged")
     assert done.code == 3 and re.match(rf"{runs_folder()}: [0-9.]+ {what}", done.err), "journals have to be written"
+    done = command("run", TABLE, "--for", "1s", *reserve)
+    assert done.code == 3 and re.match(rf"{runs_folder()}: [0-9.]+ {what}", done.err) and not runs_folder().exists()
 
 
 def test_a_disk_with_little_more_than_the_reserve_is_warned_of(tmp_path: Path) -> None:
