@@ -1,12 +1,13 @@
 """What the commands have in common: exit codes, `--version`, and how a refusal is shown.
 
 Exit codes: 0 done, 1 differs or failed, 2 bad input, 3 refused, 130 for a second Ctrl-C. Neighbours: `errors` (each
-error knows its code), every command.
+error knows its code), `usage` (what was typed), every command.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Final
@@ -14,6 +15,7 @@ from typing import Annotated, Final
 import typer
 
 from foosim.protocol.errors import Refused
+from foosim.protocol.usage import BadUsage, bad_usage
 
 DONE: Final = 0
 FAILED: Final = 1
@@ -54,10 +56,19 @@ def new_app() -> typer.Typer:
     )
 
 
-def run_app(app: typer.Typer, name: str) -> None:
-    """Run the command `name` and exit with its code; what is refused is shown without a traceback."""
+def run_app(app: typer.Typer, name: str, refusing: Callable[[Sequence[str], BadUsage], None] | None = None) -> None:
+    """Run the command `name` and exit with its code; what is refused is shown without a traceback.
+
+    `refusing` is told of arguments that are no use of the command, before that is shown.
+    """
+    words = sys.argv[1:]
     try:
-        app(prog_name=name)
+        sys.exit(_run(app, name, words))
+    except BadUsage as problem:
+        if refusing is not None:
+            refusing(words, problem)
+        print(str(problem), file=sys.stderr)
+        sys.exit(problem.exit_code)
     except Refused as refused:
         print(str(refused), file=sys.stderr)
         sys.exit(refused.exit_code)
@@ -66,3 +77,16 @@ def run_app(app: typer.Typer, name: str) -> None:
         sys.exit(FAILED)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
+
+
+def _run(app: typer.Typer, name: str, words: Sequence[str]) -> int:
+    """Return the exit code of a command. Raises BadUsage for arguments that are no use of it."""
+    try:
+        code = app(words, prog_name=name, standalone_mode=False)
+    except typer.TyperException as error:
+        root = typer.main.get_command(app)
+        if not words and hasattr(root, "commands"):  # then it is the help
+            print(error.format_message(), file=sys.stderr)
+            return BAD_INPUT
+        raise bad_usage(error, root, name, words) from None
+    return code if isinstance(code, int) else DONE

@@ -128,7 +128,8 @@ class Player(Placed):
     on: RobotName | None = None
     process: Name | None = None
     restart: bool = True
-    """Whether its process is started again when a signal has ended it, or it was lost with its machine."""
+    """Whether its process is started again when a signal has ended it, or it was lost with its machine; before the
+    first tick, when it has no memory to lose, it always is."""
     robots: dict[RobotName, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     hears: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)

@@ -5,11 +5,13 @@ and is not acceptable raises a `Refused` or a class made from it, whose text nam
 choices, so that it can be shown to a person as it is. Each part of the project adds its own classes beside its code.
 """
 
-from collections.abc import Sequence
-from typing import ClassVar, Final
+from collections.abc import Callable, Sequence
+from typing import ClassVar, Final, TypeVar
 
 ABSENT: Final = object()
 """Stands for a value that was not given, so that there is none to show."""
+
+Read = TypeVar("Read")
 
 
 class Refused(Exception):
@@ -39,6 +41,14 @@ class BadValue(Refused):
         self.problem = what
         self.value = value
         self.nearest = nearest
+
+
+def read_at(place: str, read: Callable[[str], Read], text: str) -> Read:
+    """Return what `read` makes of a text; the BadValue that it raises names the place, such as an option."""
+    try:
+        return read(text)
+    except BadValue as bad:
+        raise BadValue(f"{place}: {bad.problem}", bad.value, bad.nearest) from None
 
 
 class DeploymentError(Refused):

@@ -34,6 +34,11 @@ def die_with_parent() -> None:
     threading.Thread(target=_watch, args=(int(pipe),), name="parent", daemon=True).start()
 
 
+def has_launcher() -> bool:
+    """True in a process that a launcher has started, until it is tied to it."""
+    return bool(os.environ.get(PARENT_VARIABLE))
+
+
 def end_with(parent: int) -> None:
     """Have the kernel kill this process when its parent ends, where the kernel can be asked."""
     if sys.platform == "linux":

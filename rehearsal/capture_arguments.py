@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.errors import Refused, read_at
 from foosim.protocol.units import parse_ns
 from foosim.vhub.rows import CaptureError
 
@@ -35,9 +35,4 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 
 def time_of(option: str, text: str | None) -> int | None:
     """Return the simulated time in ns that an option says, None without one; raises BadValue, which names it."""
-    if text is None:
-        return None
-    try:
-        return parse_ns(text)
-    except BadValue as error:
-        raise BadValue(f"{option}: {error.problem}", error.value, error.nearest) from None
+    return None if text is None else read_at(option, parse_ns, text)

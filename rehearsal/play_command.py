@@ -15,7 +15,7 @@ from foosim.client.replay import hear_replay
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, PKI_VARIABLE, PkiOption
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, read_at
 from foosim.protocol.process import Stop
 from foosim.protocol.units import NS_PER_S, RATE, TIME, Dimension, parse, parse_ns, parse_pace
 from foosim.rehearsal.capture_arguments import Capture, Json, reading, time_of
@@ -71,7 +71,7 @@ def play(  # noqa: PLR0913, PLR0917  # a command's options
         time_of("--from", begin),
         time_of("--until", until),
         time_of("--for", duration),
-        parse_pace(rate),
+        read_at("--rate", parse_pace, rate),
         loop,
         paused,
         time_of("--delay", delay) or 0,
@@ -167,7 +167,7 @@ def _arguments(request: str, value: str | None) -> dict[str, Any]:
     if request == STEP and value is None:
         return {wanted[0]: 1}
     if value is None:
-        raise BadValue(f"{request} needs {_form(TIME) if request == SEEK else 'a rate such as 2x'}", None)
+        raise BadValue(f"{request} needs {_form(TIME) if request == SEEK else 'a rate such as 2x'}")
     if request == STEP:
         if not value.isdecimal() or len(value) > 9:
             raise BadValue("not a number of ticks", value)

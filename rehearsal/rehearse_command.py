@@ -71,7 +71,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     if swarm:
         raise typer.Exit(_swarm(file, duration, 1 if seed is None else seed, seeds, json))
     if duration is None:
-        raise BadValue("--for: how long is needed, e.g. 20s", None)
+        raise BadValue("--for is missing: how long is needed, e.g. --for 20s")
     if not 1 <= nodes <= limits.NODES_MAX:
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     settings = (*(sets or []), *([f"engine={engine}"] if engine is not None else []))

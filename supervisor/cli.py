@@ -19,6 +19,8 @@ from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.hosts import places
 from foosim.protocol.messages import Answer
 from foosim.protocol.probe import ProgressOption
+from foosim.protocol.process import has_launcher
+from foosim.protocol.usage import BadUsage
 from foosim.supervisor import control
 from foosim.supervisor.detach import detach
 from foosim.supervisor.display import Display, render_text
@@ -159,9 +161,7 @@ def _begin(
     check_players_here(plan)
     found = capture or default_capture(plan.deployment.world)
     path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
-    captured_here = None if VHUB in places(plan.deployment) else path
-    for warning in check_rooms(plan.deployment.capture, captured_here, runs_folder()):
-        display.say(warning)
+    _look_for_room(plan, path, runs_folder(), display)
     _prepare(plan, display, None)
     if detached:
         return detached_outcome(detach(plan, path, run), plan.deployment, path)
@@ -175,8 +175,16 @@ def _go_on(folder: RunFolder, display: Display) -> Up | Outcome:
         return ended_outcome(folder)
     plan, path = plan_again(folder)
     check_players_here(plan)
+    _look_for_room(plan, path, folder.path, display)
     _prepare(plan, display, folder.name)
     return Up(plan, path, display, None, folder)
+
+
+def _look_for_room(plan: Plan, capture: Path | None, runs: Path, display: Display) -> None:
+    """Raise Refused where a run would end at once, and warn where it soon might."""
+    captured_here = None if VHUB in places(plan.deployment) else capture
+    for warning in check_rooms(plan.deployment.capture, captured_here, runs):
+        display.say(warning)
 
 
 def _prepare(plan: Plan, display: Display, resumed: str | None) -> None:
@@ -207,6 +215,8 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     folder has the run file, logs and journals.
     """
     plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
+    if not has_launcher():  # which has looked, and ends a run in order whose room gets lost meanwhile
+        _look_for_room(plan, None, runs_folder(), Display(sys.stderr))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
     raise typer.Exit(serve(plan, folder, progress_file))
 
@@ -420,9 +430,15 @@ def install_units(  # a command's options
             print(f"node {name} has `launch: {node.launch}`; {hint}", file=sys.stderr)
 
 
+def _refuse_usage(words: Sequence[str], problem: BadUsage) -> None:
+    """Print the one object of `up --json` also where its options cannot be read."""
+    if words[:1] == ["up"]:
+        _print_result(refused_result(None, None, str(problem)), "--json" in words)
+
+
 def main() -> None:
     """Entry of `foosim-supervisor`."""
-    run_app(app, "foosim-supervisor")
+    run_app(app, "foosim-supervisor", _refuse_usage)
 
 
 if __name__ == "__main__":

@@ -50,6 +50,7 @@ from foosim.protocol.fingerprint import is_compiled, library_fingerprint
 from foosim.protocol.hosts import places
 from foosim.supervisor.guard import hosted_folder
 from foosim.supervisor.install import SYSTEM_FOLDER, USER_FOLDER
+from foosim.supervisor.new_capture import place_of
 from foosim.supervisor.pki_hosts import identities_on, passwords_of
 from foosim.supervisor.reach import REMEDIES, listen
 from foosim.supervisor.remote import unit_name
@@ -58,9 +59,6 @@ from foosim.supervisor.units import units_of
 
 State = Literal["fine", "warning", "problem"]
 
-GIB: Final = 1 << 30
-DISK_WARN_BYTES: Final = 4 * GIB
-DISK_BYTES_MIN: Final = GIB // 4
 HERE: Final = "here"
 TIME_ERROR: Final = 5
 """What `adjtimex` returns of a clock that nothing keeps in time."""
@@ -299,17 +297,15 @@ def _disk(case: Case) -> Iterator[_Said]:
     """Room and the right to write where runs keep journals and captures go."""
     here = {"runs": runs_folder(), "captures": case.captures}
     for subject, folder in ({"runs": hosted_folder()} if case.is_there else here).items():
-        place = folder.absolute()
-        while not place.exists():
-            place = place.parent
-        free = shutil.disk_usage(place).free
-        text = f"{free / GIB:.1f} GiB free at {place}"
-        if not os.access(place, os.W_OK | os.X_OK):
-            yield subject, "problem", f"{place} cannot be written", "let this user write there, or start elsewhere"
-        elif free < DISK_BYTES_MIN:
-            yield subject, "problem", text, "make room: a run without room stops"
-        elif free < DISK_WARN_BYTES:
-            yield subject, "warning", text, "make room before a long run"
+        place = place_of(case.deployment.capture, folder.absolute(), is_capture=subject == "captures")
+        text = f"{place.there}: {place.room} (capture.reserve)"
+        if not os.access(place.there, os.W_OK | os.X_OK):
+            remedy = "let this user write there, or start elsewhere"
+            yield subject, "problem", f"{place.there} cannot be written", remedy
+        elif place.is_refused:
+            yield subject, "problem", text, f"make room, or lower the reserve: at it {place.then}, and none is started"
+        elif place.is_low:
+            yield subject, "warning", text, f"make room: at the reserve {place.then}"
         else:
             yield subject, "fine", text, ""
 

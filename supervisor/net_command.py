@@ -231,6 +231,7 @@ def _say(console: Console, line: str) -> None:
 
 # --- events ----------------------------------------------------------------------------------------------------------
 
+
 @app.command("set")
 def set_link(
     link: Annotated[str, typer.Argument(help="The id of a link rule.", show_default=False)],
@@ -310,7 +311,7 @@ def _split(text: str) -> list[str]:
 def _for(lasts: str | None, random: bool) -> dict[str, Any]:
     if lasts is None:
         if random:
-            raise BadValue("--random needs --for, the mean", "--random")
+            raise BadValue("--random needs --for, the mean")
         return {}
     return {"for": {"exponential": lasts} if random else lasts}
 

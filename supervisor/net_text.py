@@ -18,12 +18,12 @@ from foosim.vhub.lint_text import burst_text, delay_text, loss_text
 def meaning_tables(meanings: Sequence[Meaning]) -> list[Table]:
     """Return tables for a terminal: what happens to packets, how media carry them, how far radios reach."""
     losses = Table(title="links", title_justify="left", box=None, pad_edge=False)
-    for column in ("rule", "medium", "links", "mean loss", "bursts", "delay beside the medium"):
-        losses.add_column(column, justify="right" if column == "links" else "left")
+    for column in ("rule", "medium", "links in use", "mean loss", "bursts", "delay beside the medium"):
+        losses.add_column(column, justify="right" if column == "links in use" else "left")
     media = _table("media", "rule", "rate", "bytes", "airtime", "1 station", f"{MANY} stations", "full queue")
     reach = _table("radios", "rule", "range in sight", "range behind walls", f"packets of {SMALL_BYTES} B an hour")
     for meaning in meanings:
-        links = "?" if meaning.links is None else str(meaning.links)
+        links = "?" if meaning.links is None else f"{meaning.used} of {meaning.links}"
         losses.add_row(
             meaning.name, meaning.medium, links, loss_text(meaning), burst_text(meaning), delay_text(meaning)
         )

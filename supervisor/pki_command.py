@@ -19,7 +19,7 @@ from foosim.protocol.deployment_file import load_deployment, read_deployment_tex
 from foosim.protocol.errors import BadValue
 from foosim.protocol.identity import FORMS, identities_of
 from foosim.supervisor import pki
-from foosim.supervisor.pki import LEAF_DAYS, Shown
+from foosim.supervisor.pki import LEAF_DAYS, LEAF_DAYS_MAX, Shown
 from foosim.supervisor.pki_hosts import files_for, send_files
 from foosim.supervisor.remote import remote_of
 
@@ -99,7 +99,9 @@ def issue(
 def renew(
     folder: Folder,
     identities: Identities = None,
-    within: Annotated[int | None, typer.Option(help="Only what ends within so many days.")] = None,
+    within: Annotated[
+        int | None, typer.Option(min=0, max=LEAF_DAYS_MAX, help="Only what ends within so many days.")
+    ] = None,
     host: Annotated[
         list[str] | None, typer.Option(help="A further name or address by which others reach it; may be repeated.")
     ] = None,

@@ -18,7 +18,7 @@ from foosim.protocol.certificates import load_credentials, operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text, refuse_findings
-from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.errors import BadValue, Refused, read_at
 from foosim.protocol.hall_start import start_findings
 from foosim.protocol.hosts import places
 from foosim.protocol.messages import Origin
@@ -175,12 +175,12 @@ def make_plan(options: RunOptions) -> Plan:
     check_meshes(deployment, options)
     listen = deployment.listen if options.listen is None else options.listen
     address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
-    pace = deployment.pace if options.pace is None else parse_pace(options.pace)
+    pace = deployment.pace if options.pace is None else read_at("--pace", parse_pace, options.pace)
     ticks = 0
     if options.duration is not None:
-        ticks = -(-parse_ns(options.duration) // deployment.tick_ns)
+        ticks = -(-read_at("--for", parse_ns, options.duration) // deployment.tick_ns)
         if ticks == 0:
-            raise BadValue("a run has at least one tick", options.duration)
+            raise BadValue("--for: a run has at least one tick", options.duration)
     branch = None if options.branch is None else read_branch(options.branch, deployment)
     return Plan(options, text, deployment, pace, ticks, address, branch, files)
 

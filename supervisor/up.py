@@ -356,7 +356,8 @@ class Up:
     def _comes_back(self, child: Child) -> bool:
         """Whether the run waits for this process, which has ended, and another one takes its place.
 
-        Before the first tick that is one that something else has ended: who ends by himself then says what is wrong.
+        Before the first tick that is one that something else has ended: who ends by himself then says what is wrong. A
+        player that is not to be restarted is no exception: it has not acted, so that it has nothing to forget.
         """
         if child.name == VHUB and (child.exit_code == REFUSED or VHUB in self._restarts.failed):
             return False

@@ -20,8 +20,9 @@ from foosim.protocol.radio_references import unheeded
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.jitter import interpolate_ns, moments_ns, quantiles_ns
+from foosim.vhub.lint_offers import flows_of, offered_hz, used_links
 from foosim.vhub.lint_phase import phase_warnings
-from foosim.vhub.profiles import NO_RADIO, Profile, Profiles, over, preset_radio
+from foosim.vhub.profiles import NO_RADIO, Profiles, over, preset_radio
 from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (
@@ -59,6 +60,8 @@ class Use:
     settings: Radio
     links: int | None = None
     """Directed pairs that have them; None where endpoints are not known."""
+    used: int | None = None
+    """Those that carry packets, by what is declared."""
     example: tuple[str, str] | None = None
     heights_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)
     """Of the ends of the example above the ground, without the mount of the antennas."""
@@ -82,6 +85,7 @@ class Meaning:
     rule: str
     radio: str
     links: int | None
+    used: int | None
     example: tuple[str, str] | None
     medium: str
     loss: float
@@ -118,27 +122,30 @@ class Meaning:
 # --- which settings there are ----------------------------------------------------------------------------------------
 
 
-def uses_of(deployment: Deployment, network: Network | None = None) -> list[Use]:
-    """Return the settings of all links of a deployment, in the order of rules, and radios that no link uses."""
-    network = deployment.network if network is None else network
-    profiles = Profiles(deployment, network)
+def uses_of(deployment: Deployment) -> list[Use]:
+    """Return the settings of all links of a deployment, in the order of rules, and radios that no link uses; the
+    example of each is a link that carries packets, if there is one."""
+    network, profiles = deployment.network, Profiles(deployment, deployment.network)
+    used = used_links(flows_of(deployment, profiles))
     found: dict[tuple[str, str], Use] = {}
     endpoints = deployment.endpoints()
     pairs = ((source, destination) for source in endpoints for destination in endpoints if source != destination)
     for source, destination, rule in ((*pair, rule) for pair in pairs for rule in network.rules_for(*pair)):
         profile = profiles.of_rule(rule, source, destination)
         key = profile.rule, profile.radio
-        known = found.get(key)
-        if known is None:
-            ends = network.place_of(source), network.place_of(destination)
-            one, other = (HEIGHT_M if place is None else place[2] for place in ends)
-            found[key] = Use(profile.rule, profile.radio, profile.settings, 1, (source, destination), (one, other))
-        else:
-            found[key] = replace(known, links=(known.links or 0) + 1)
+        known, carrying = found.get(key), used.get(key, set())
+        links = 1 if known is None or known.links is None else known.links + 1
+        pair = source, destination
+        if known is not None and (known.example in carrying or pair not in carrying):
+            found[key] = replace(known, links=links)
+            continue
+        one, other = (HEIGHT_M if place is None else place[2] for place in map(network.place_of, pair))
+        count = len(carrying)
+        found[key] = Use(profile.rule, profile.radio, profile.settings, links, count, pair, (one, other))
     order = {rule.id: number for number, rule in enumerate(network.links)}
     uses = sorted(found.values(), key=lambda use: (order.get(use.rule, len(order)), use.rule, use.radio))
     idle = [name for name in network.radios if all(use.radio != name for use in uses)]
-    return [*uses, *(Use(name, name, network.radios[name], 0) for name in idle)]
+    return [*uses, *(Use(name, name, network.radios[name], 0, 0) for name in idle)]
 
 
 def uses_alone(network: Network) -> list[Use]:
@@ -159,7 +166,7 @@ def uses_alone(network: Network) -> list[Use]:
 def meanings(deployment: Deployment) -> list[Meaning]:
     """Return what the network of a deployment means; the deployment has its files."""
     uses = uses_of(deployment)
-    offered = _offered(deployment, uses)
+    offered = offered_hz(flows_of(deployment, Profiles(deployment, deployment.network)))
     files = deployment.asset_files
     phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])
     found = []
@@ -193,6 +200,7 @@ def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
         use.rule,
         use.radio,
         use.links,
+        use.used,
         use.example,
         settings.medium,
         loss,
@@ -446,45 +454,6 @@ def _warnings(use: Use, meaning: Meaning) -> Iterator[str]:
 
 def _has_queue(settings: Radio) -> bool:
     return "queue" in settings.model_fields_set
-
-
-# --- what a deployment offers ----------------------------------------------------------------------------------------
-
-
-def _offered(deployment: Deployment, uses: Sequence[Use]) -> dict[tuple[str, str], float]:
-    """Return the packets per second that sensors and players offer, by rule and radio: of all on one air, else to the
-    busiest queue. What is published goes once for all where the radio broadcasts."""
-    profiles = Profiles(deployment, deployment.network)
-    flows: dict[tuple[tuple[str, str], str, str, str], float] = {}
-    queues: dict[tuple[str, str], dict[str, float]] = {}
-
-    def queue_of(profile: Profile, source: str, destination: str) -> str:
-        return f"{source}>{destination}" if profile.is_own_queue else source
-
-    for player, spec in deployment.players.items():
-        for source, channel in deployment.heard_by(player):
-            robot = deployment.robots.get(source)
-            if robot is None or channel not in robot.sensors:
-                continue
-            profile = profiles.find(source, player, channel)
-            once = profile.settings.is_on_air and profile.settings.published == "broadcast"
-            flow = _key(profile), queue_of(profile, source, player), "" if once else player, channel
-            flows[flow] = float(robot.sensors[channel].rate_hz)
-        for robot_name in spec.robots:
-            profile = profiles.find(player, robot_name, "")
-            flows[_key(profile), queue_of(profile, player, robot_name), robot_name, ""] = float(spec.rate_hz)
-    for (key, queue, _, _), rate_hz in flows.items():
-        queues.setdefault(key, {}).setdefault(queue, 0.0)
-        queues[key][queue] += rate_hz
-    found: dict[tuple[str, str], float] = {}
-    for use in uses:
-        rates = queues.get((use.rule, use.radio), {})
-        found[use.rule, use.radio] = sum(rates.values()) if use.settings.is_on_air else max(rates.values(), default=0.0)
-    return found
-
-
-def _key(profile: Profile) -> tuple[str, str]:
-    return profile.rule, profile.radio
 
 
 def _capacity_hz(meaning: Meaning) -> float | None:

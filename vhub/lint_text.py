@@ -47,7 +47,7 @@ def meaning_line(meaning: Meaning) -> str:
     parts = [meaning.medium if meaning.medium != "none" else "no medium"]
     if meaning.links is not None:
         example = "" if meaning.example is None else f" (as {meaning.example[0]} to {meaning.example[1]})"
-        parts.append(f"for up to {meaning.links} link{'' if meaning.links == 1 else 's'}{example}")
+        parts.append(f"{meaning.used} of {meaning.links} links carry declared packets{example}")
     parts.append(f"loss {loss_text(meaning)}")
     if burst_text(meaning) != "-":
         parts.append(f"bursts of {burst_text(meaning)}")

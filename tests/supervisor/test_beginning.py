@@ -114,9 +114,17 @@ def test_a_resumed_run_waits_for_all_as_long_as_for_a_start(sets: tuple[str, ...
     assert told == [("supervisor", "supervisor")], "nobody is lost who only starts slowly"
 
 
-@pytest.mark.parametrize("when", ["before the first tick", "with the vHub"])
-def test_a_client_whose_process_is_started_again_has_the_time_of_a_start(when: str) -> None:
-    run = Run()
+@pytest.mark.parametrize(
+    ("when", "sets"),
+    [
+        ("before the first tick", ()),
+        ("before the first tick", ("players.player-red.restart=false",)),
+        ("with the vHub", ()),
+    ],
+    ids=["before the first tick", "not to be restarted", "with the vHub"],
+)
+def test_a_client_whose_process_is_started_again_has_the_time_of_a_start(when: str, sets: tuple[str, ...]) -> None:
+    run = Run(sets)
     system = run.system
 
     def gone() -> None:

@@ -1,12 +1,15 @@
 """The command `foosim-supervisor` without a run: help, what it refuses before anything starts, exit codes."""
 
+import importlib
 import json
 import re
+import tomllib
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from foosim.node.main import main as run_node
 from foosim.protocol.deployment import Capture
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.disk import free_bytes
@@ -18,6 +21,7 @@ from foosim.supervisor.run_folder import runs_folder
 from tests.supervisor.conftest import Command, Typed
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
+PROGRAMS: dict[str, str] = tomllib.loads((TABLE.parent.parent / "pyproject.toml").read_text())["project"]["scripts"]
 COMMANDS = (
     *("up", "run", "status", "pause", "resume", "step", "rate", "add", "remove", "move", "push", "down", "validate"),
 )
@@ -115,8 +119,8 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
             2,
             "there is no module own (is the folder that it is in on PYTHONPATH?), 'own:Acts'",
         ),
-        (("--pace", "quick"), 2, "not a pace (realtime, fast or a factor such as 2x), 'quick'"),
-        (("--for", "20"), 2, "'20', nearest is '20 s'"),
+        (("--pace", "quick"), 2, "--pace: not a pace (realtime, fast or a factor such as 2x), 'quick'"),
+        (("--for", "20"), 2, "--for: not a time (a number and one of ns, us, ms, s, min, h), '20', nearest is '20 s'"),
         (("--for", "0 s"), 2, "a run has at least one tick"),
         (("--seed", "-1"), 2, "seed: "),
         (("--listen", "nowhere:x"), 2, "not an address (HOST, HOST:PORT, tcp/HOST:PORT or tls/HOST:PORT), 'nowhere:x'"),
@@ -124,7 +128,16 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--listen", "0.0.0.0"), 3, "say --insecure to mean it"),
         (("--run", "Über"), 2, "--run: a name is a lower case letter, then"),
         (("--capture", "a.mcap", "--no-capture"), 2, "exclude each other"),
-        (("--bogus",), 2, "No such option"),
+        (
+            ("--bogus",),
+            2,
+            "foosim-supervisor up: there is no such option, '--bogus'; options are --pace, --for, --seed,",
+        ),
+        (("--sed", "3"), 2, "foosim-supervisor up: there is no such option, '--sed', nearest is --seed\n"),
+        (("--seed", "x"), 2, "foosim-supervisor up --seed: a whole number is needed, 'x'\n"),
+        (("--for",), 2, "foosim-supervisor up --for: its value is missing; of it --help says: End after this much"),
+        (("--json=1",), 2, "foosim-supervisor up --json: it takes no value, '1'\n"),
+        (("more.yaml",), 2, "foosim-supervisor up: too many arguments, 'more.yaml'; it takes FILE\n"),
     ],
 )
 def test_what_is_wrong_with_a_run_is_said_before_anything_starts(
@@ -164,6 +177,8 @@ def test_a_disk_with_less_than_the_reserve_is_refused_before_anything_starts(
     assert re.match(rf"\.: [0-9.]+ {what}nothing was started\n$", done.err)
     done = command("up", TABLE, "--for", "1s", *reserve, "--set", "capture.on_full=continue_unlogged")
     assert done.code == 3 and re.match(rf"{runs_folder()}: [0-9.]+ {what}", done.err), "journals have to be written"
+    done = command("run", TABLE, "--for", "1s", *reserve)
+    assert done.code == 3 and re.match(rf"{runs_folder()}: [0-9.]+ {what}", done.err) and not runs_folder().exists()
 
 
 def test_a_disk_with_little_more_than_the_reserve_is_warned_of(tmp_path: Path) -> None:
@@ -193,10 +208,9 @@ def test_without_a_live_run_there_is_nobody_to_control(command: Command, argumen
 
 
 def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
-    assert command("step", "many").code == 2
-    assert command("step", "0").code == 2
-    done = command("step", "-3")
-    assert done.code == 2 and "'count': Input should be greater than or equal to 1" in done.err
+    for typed in ("many", "0", "-3", "1.5"):
+        wanted = f"foosim-supervisor step COUNT: a whole number from 1 on is needed, '{typed}'\n"
+        assert command("step", typed) == (2, "", wanted)
 
 
 @pytest.mark.parametrize(
@@ -212,12 +226,44 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
         ),
         (("up",), "a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN"),
         (("add", "--position", "0", "0", "inf"), "position: not a finite number, inf"),
-        (("add", "--position", "0", "1", "x"), "position: three numbers are needed, X Y Z in m; not all of these are numbers, '0 1 x'"),  # noqa: E501
+        (
+            ("add", "--position", "0", "1", "x"),
+            "position: three numbers are needed, X Y Z in m; not all of these are numbers, '0 1 x'",
+        ),
         (("add", "--velocity", "nan", "0", "0"), "velocity: not a finite number, nan"),
+        (
+            ("add", "--position", "0", "1"),
+            "foosim-supervisor add --position: 3 values are needed, X Y Z; here are 2, '0 1'",
+        ),
+        (("step", "3", "4"), "foosim-supervisor step: too many arguments, '4'; it takes COUNT"),
+        (("status", "x"), "foosim-supervisor status: it takes no arguments, 'x'"),
+        (("move", "red.goal"), "foosim-supervisor move: NODE is missing; needed are ROBOT, NODE"),
+        (("puhs", "1"), "foosim-supervisor: there is no such command, 'puhs', nearest is push"),
+        (("--json", "up"), "foosim-supervisor: there is no such option, '--json', nearest is --version"),
     ],
 )
 def test_a_value_that_no_run_could_take_is_bad_input(command: Command, arguments: tuple[str, ...], text: str) -> None:
     assert command(*arguments) == (2, "", f"{text}\n")
+
+
+def test_options_that_cannot_be_read_are_told_in_the_object_too(command: Command) -> None:
+    done = command("up", TABLE, "--seed", "x", "--json")
+    assert done.code == 2 and json.loads(done.out)["reason"] == done.err.strip()
+
+
+def test_a_command_without_words_shows_its_help(command: Command, typed: Typed) -> None:
+    done = command()
+    assert (done.code, done.out) == (2, "") and done.err.startswith("Usage: foosim-supervisor ")
+    done = typed("foosim-node", run_node)()
+    assert done == (2, "", "foosim-node: --name is missing; needed are --name, --connect\n")
+
+
+@pytest.mark.parametrize("program", sorted(PROGRAMS))
+def test_every_program_says_in_its_words_what_was_typed(typed: Typed, program: str) -> None:
+    module, _, name = PROGRAMS[program].partition(":")
+    done = typed(program, getattr(importlib.import_module(module), name))("--bogus")
+    assert done.code == 2 and done.out == ""
+    assert done.err.startswith(f"{program}: there is no such option, '--bogus'; options are --")
 
 
 def test_who_lacks_a_certificate_is_named_before_anything_starts(command: Command, tmp_path: Path) -> None:

@@ -2,21 +2,24 @@
 
 import importlib.metadata
 import json
-import shutil
 import socket
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import pytest
 from typer.testing import CliRunner
 
-from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment import Capture, Deployment
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.protocol.disk import free_bytes
+from foosim.protocol.errors import Refused
 from foosim.protocol.identity import identities_of
 from foosim.supervisor import doctor, pki
 from foosim.supervisor.doctor import CHECKS, Case, Finding, examine, is_well
 from foosim.supervisor.doctor_command import app
+from foosim.supervisor.new_capture import check_rooms
+from foosim.supervisor.run_folder import runs_folder
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -146,18 +149,28 @@ def test_ports_that_are_taken_or_elsewhere_are_found(deployment: Deployment) -> 
     assert finding.state == "problem" and "192.0.2.1:7401" in finding.text
 
 
-class Usage(NamedTuple):
-    total: int
-    used: int
-    free: int
-
-
-@pytest.mark.parametrize(("free", "state"), [(1 << 20, "problem"), (1 << 30, "warning"), (1 << 40, "fine")])
-def test_a_disk_without_room_is_found(
-    deployment: Deployment, monkeypatch: pytest.MonkeyPatch, free: int, state: str
+@pytest.mark.parametrize(
+    ("share", "on_full", "state"),
+    [
+        (3.0, "stop_world", "problem"),
+        (3.0, "continue_unlogged", "warning"),
+        (0.7, "stop_world", "warning"),
+        (1e-4, "stop_world", "fine"),
+    ],
+)
+def test_a_disk_without_room_is_found_as_by_what_starts_a_run(
+    deployment: Deployment, tmp_path: Path, share: float, on_full: str, state: str
 ) -> None:
-    monkeypatch.setattr(shutil, "disk_usage", lambda place: Usage(1 << 41, 0, free))
-    assert found(Case(deployment, "127.0.0.1"), "captures").state == state
+    kept = Capture.model_construct(reserve_bytes=int(share * free_bytes(tmp_path)), on_full=on_full)
+    case = Case(deployment.model_copy(update={"capture": kept}), "127.0.0.1")
+    finding = found(case, "captures")
+    assert finding.state == state and "the reserve is" in finding.text
+    assert found(case, "runs").state == ("problem" if share > 1 else state), "journals have to be written"
+    if share > 1:
+        with pytest.raises(Refused, match="nothing was started"):
+            check_rooms(kept, case.captures / "a.mcap", runs_folder())
+    else:
+        assert bool(check_rooms(kept, case.captures / "a.mcap", runs_folder())) == (state == "warning")
 
 
 @pytest.mark.parametrize(("kept", "state"), [(0, "fine"), (5, "warning")])

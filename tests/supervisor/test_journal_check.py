@@ -16,12 +16,14 @@ from foosim.protocol.errors import Refused
 from foosim.protocol.journal import Journal, journal_files, read_records
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
+from foosim.supervisor.cli import main
 from foosim.supervisor.journal_check import check_journals
 from foosim.supervisor.main import serve
 from foosim.supervisor.plan import RunOptions, launch_of, make_plan, plan_again
 from foosim.supervisor.run_folder import LAUNCHER_FILE, RunFolder, create_run
 from foosim.vhub.branching import read_branch
 from foosim.vhub.capture_reader import open_capture
+from tests.supervisor.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60
@@ -65,6 +67,18 @@ def damage(folder: RunFolder, stem: str, record: int) -> str:
     content[(starts[record] + starts[record + 1]) // 2] ^= 1
     path.write_bytes(content)
     return f"{path}: byte {starts[record]}: record {record + 1} is damaged, {len(starts) - record - 2} whole records"
+
+
+def test_a_run_that_would_end_at_once_for_want_of_room_is_left_as_it_is(typed: Typed, folder: RunFolder) -> None:
+    launch = folder.launch()
+    assert launch is not None and launch.capture
+    sets = (*SETS, "capture.reserve=1000 TiB")
+    folder.write_launch(launch_of(RunOptions(TABLE, sets=sets), Path(launch.capture)))
+    before = {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()}
+    done = typed("foosim-supervisor", main)("up", "--resume", folder.name)
+    assert done.code == 3 and done.err.startswith(f"{Path(launch.capture).parent}: ")
+    assert "GB left on its disk, the reserve is 1000 TiB (capture.reserve): make room" in done.err
+    assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before
 
 
 def refused(folder: RunFolder) -> str:

@@ -153,24 +153,33 @@ def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monk
 
 
 @pytest.mark.parametrize(
-    ("ends", "sets", "starts", "ends_run"),
+    ("ends", "sets", "begun", "starts", "ends_run"),
     [
-        ("kill -9 $$", (), 2, False),
-        ("kill -9 $$", ("players.player-red.restart=false",), 1, True),
-        ("exit 1", (), 1, True),
+        ("kill -9 $$", (), True, 2, False),
+        ("kill -9 $$", ("players.player-red.restart=false",), True, 1, True),
+        ("kill -9 $$", ("players.player-red.restart=false",), False, 2, False),
+        ("exit 1", (), True, 1, True),
+        ("exit 1", (), False, 1, True),
     ],
 )
 def test_a_player_is_started_again_when_a_signal_has_ended_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends: str, sets: tuple[str, ...], starts: int, ends_run: bool
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    ends: str,
+    sets: tuple[str, ...],
+    begun: bool,
+    starts: int,
+    ends_run: bool,
 ) -> None:
-    """One that ends by itself has failed. The sixth time within a minute it is given up, and the run ends."""
+    """One that ends by itself has failed. The sixth time within a minute it is given up, and the run ends. Before the
+    first tick `restart: false` says nothing: the player has not acted."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()
     up = Up(make_plan(RunOptions(TABLE, sets=sets)), None, Display(said), "run")
     (tmp_path / "player").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{ends}\n')
     (tmp_path / "player").chmod(0o755)
     up._launch("player-red", [str(tmp_path / "player")])
-    up._has_begun = True
+    up._has_begun = begun
     now_s = 0.0
 
     def ended() -> bool:

@@ -169,7 +169,14 @@ def test_every_link_of_a_deployment_is_in_one_line() -> None:
         ("perfect", ""): 11 * 10 - 6,
         ("idle", "idle"): 0,
     }
+    assert {key: use.used for key, use in uses.items()} == {
+        ("seen", ""): 2,  # the camera to both players
+        ("wifi", "wifi"): 2,  # red's goal and its player, both ways
+        ("perfect", ""): 18 - 2 - 2,
+        ("idle", "idle"): 0,
+    }
     assert uses["seen", ""].example == ("camera", "player-blue")
+    assert uses["wifi", "wifi"].example == ("player-red", "red.goal"), "one that carries packets"
     assert [meaning.warnings for meaning in meanings(made) if meaning.rule == "idle"] == [("no link uses it",)]
 
 
@@ -200,11 +207,11 @@ def test_a_network_alone_is_shown_over_its_radios() -> None:
 
 
 def test_lines_are_for_people() -> None:
-    wifi = meaning_of(Use("wifi", "wifi", radio(preset="wifi_5_indoor"), 2, ("a", "b")), {})
+    wifi = meaning_of(Use("wifi", "wifi", radio(preset="wifi_5_indoor"), 2, 1, ("a", "b")), {})
     assert meaning_line(wifi) == (
-        "wifi: wifi, for up to 2 links (as a to b), loss 0.05 %, bursts of 20 ms, delay 600 us, sd 301 us, "
-        "p99 1.68 ms, at 54 Mbit/s, 100 B: 44 us, 4.03 Mbit/s, 10 stations 4.319 Mbit/s, 1500 B: 248 us, 29.81 Mbit/s, "
-        "10 stations 26.76 Mbit/s, range 7.37 km in sight, behind walls 112 m, queue of 17.3 ms"
+        "wifi: wifi, 1 of 2 links carry declared packets (as a to b), loss 0.05 %, bursts of 20 ms, delay 600 us, "
+        "sd 301 us, p99 1.68 ms, at 54 Mbit/s, 100 B: 44 us, 4.03 Mbit/s, 10 stations 4.319 Mbit/s, 1500 B: 248 us, "
+        "29.81 Mbit/s, 10 stations 26.76 Mbit/s, range 7.37 km in sight, behind walls 112 m, queue of 17.3 ms"
     )
     lines = start_lines([wifi] * 40, "some.yaml")
     assert len(lines) == LINES_MAX and lines[-1] == "and 29 more: foosim-net lint some.yaml"
