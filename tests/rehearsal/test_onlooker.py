@@ -110,7 +110,8 @@ def test_the_command_shows_lines_of_progress(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(onlooker, "LINE_S", 0.0)
     Hangs.how = shown.wait
     assert rehearsed("--for", "0.1 s").exit_code == 0
-    assert all(re.match(r"0\.\d\d s of 0\.10 s simulated, [0-9.]+x, red 0 : 0 blue, waits for ", line) for line in lines)
+    what = r"0\.\d\d s of 0\.10 s simulated, [0-9.]+x, red 0 : 0 blue, waits for "
+    assert all(re.match(what, line) for line in lines)
 
 
 def loops() -> None:

@@ -112,7 +112,9 @@ def damage(path: Path) -> None:
     path.write_bytes(content)
 
 
-@pytest.mark.parametrize("what", ["whole", "supervisor gone", "supervisor", "vhub gone", "vhub", "capture", "another", "finished"])
+@pytest.mark.parametrize(
+    "what", ["whole", "supervisor gone", "supervisor", "vhub gone", "vhub", "capture", "another", "finished"]
+)
 def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: Left, what: str) -> None:
     folder, capture = left.folder, left.folder.path.parents[3] / "run.mcap"
     problems = {
