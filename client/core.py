@@ -177,7 +177,7 @@ class ClientCore:
         if self.is_away:
             return
         self.is_away = True
-        self._lost_ns = now_ns + self.deployment.deadlines.vhub_back_ns
+        self._lost_ns = now_ns + self._patience_ns(self.deployment)
         self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
         self._resend_ns = NEVER_NS
         self.actions.append(Say("warning", "the vHub is gone; waits for it to come back"))
@@ -190,7 +190,13 @@ class ClientCore:
     def rest(self, stood_ns: int, now_ns: int) -> None:
         """The client's own loop stood still for so long: the vHub could not come back to it (`standstill`)."""
         if self._lost_ns != NEVER_NS and self.deployment is not None:
-            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self.deployment.deadlines.vhub_back_ns)
+            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self._patience_ns(self.deployment))
+
+    def _patience_ns(self, deployment: Deployment) -> int:
+        """How long a vHub may be gone. Before it was told anything the run has perhaps not begun: then it may start."""
+        deadlines = deployment.deadlines
+        has_begun = self._answered or self._received
+        return deadlines.vhub_back_ns if has_begun else max(deadlines.vhub_back_ns, deadlines.start_ns)
 
     def statistics(self) -> ClientStatistics:
         downlinks = self._downlinks, self._repeated, self._missing, self._malformed, self._overflowed

@@ -25,9 +25,9 @@ HEALED_TICK: Final = 180
 MS: Final = 1_000_000
 HOUR_NS: Final = 3_600_000 * MS
 ASK_AGAIN_NS: Final = 150 * MS
+"""How often who asks for something asks again until it is answered."""
 PUSH_MAX: Final = 0.8
 """In N s: a push may give the table's ball of 21 g no more than its speed limit of 40 m/s."""
-"""How often who asks for something asks again until it is answered."""
 
 T = TypeVar("T")
 

@@ -101,9 +101,9 @@ class SupervisorProcess:
         self._loop.perform()
         if self.core.beginning.abandoned:
             return REFUSED
-        self._folder.write_result(result(self.core))
-        end = self.core.end
-        return FAILED if end is None or end.failed or self.core.closing.cut_off else DONE
+        told = result(self.core)
+        self._folder.write_result(told)
+        return FAILED if told["failed"] else DONE
 
     def stop(self) -> None:
         """Have the run end in order, as the command `down` does; a signal handler may call this."""

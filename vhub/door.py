@@ -168,6 +168,8 @@ class Door:
             return
         self.take_done(done.name)
         session.answered()
+        if session.away_ns >= 0:  # it lives, and has to come back
+            session.leave(session.back_ns, now_ns)
         session.done = done
 
     def take_done(self, client: str) -> None:

@@ -157,8 +157,11 @@ def test_a_vhub_that_is_gone_is_missed_by_all_and_lost_for_good_in_the_end() -> 
     assert [line.partition(":")[0] for line in lines] == [RED, BLUE]
     deployment = crew.cores[0].deployment
     assert deployment is not None
-    assert crew.deadline_ns() <= deployment.deadlines.vhub_back_ns
-    crew.wake(deployment.deadlines.vhub_back_ns)
+    assert crew.deadline_ns() <= deployment.deadlines.start_ns, "they were told nothing yet"
+    crew.wake(deployment.deadlines.start_ns - 1)
+    assert not crew.is_over
+    crew.actions.clear()
+    crew.wake(deployment.deadlines.start_ns)
     assert crew.is_over and crew.leave() == FAILED
     assert [action.text for action in crew.actions if isinstance(action, Say)] == [
         f"{name}: lost the vHub" for name in (RED, BLUE)

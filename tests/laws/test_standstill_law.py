@@ -92,6 +92,14 @@ def test_who_died_meanwhile_is_lost_once_it_stays_silent() -> None:
     assert [entry["reason"] for entry in run.json["recoveries"]] == ["no heartbeat for 1 s"]
 
 
+def test_the_time_of_a_vhub_that_is_gone_rests() -> None:
+    def sleep(system: System) -> None:
+        system.kill_hub("now", 2_000 * MS)
+        system.later(500 * MS, partial(system.set_forward, SUPERVISOR, 60_000 * MS))
+
+    assert_nobody_was_lost(fly(sleep, FAST, "deadlines.vhub_back=5 s"), "vhub")
+
+
 def test_its_successor_is_let_in_at_once() -> None:
     """The one before is as silent as one that only lost its connection; the next one is beyond doubt."""
 
@@ -161,11 +169,11 @@ def test_of_a_clients_two_deadlines_the_longer_one_counts() -> None:
     def stop(system: System) -> None:
         name = "player-red"
         system.pause(name, 3_000 * MS)
-        system.later(1_000 * MS, lambda: system.hub.client_gone(name, system.bus.now_ns))
+        system.later(500 * MS, lambda: system.hub.client_gone(name, system.bus.now_ns))
         system.later(2_999 * MS, lambda: client(system, name).hub_gone(system.bus.now_ns))
 
-    assert_nobody_was_lost(fly(stop))
     alone = "players.player-red.restart=false"
+    assert_nobody_was_lost(fly(stop, FAST, alone))
     run = fly(stop, FAST, alone, "deadlines.lockstep_fast=1 s", "deadlines.client_back=1 s")
     assert run.json["reason"] == "lost player-red: its connection closed"
 

@@ -31,7 +31,7 @@ def test_packets_with_errors(proof: Proof, size: int, rate: float) -> None:
     n, bits = proof.size(30_000, 600_000), 8 * size
     settings = f"corrupt: {{bit_error_rate: {rate:.10f} p, deliver: true}}"
     zeros = bytes(size)
-    counts, places = Counter[int](), [0] * min(bits, 16)
+    counts, places, within = Counter[int](), [0] * min(bits, 16), [0] * 8
     for flight in fates(fabric_of(settings, proof.seed), every(MS, n), size):
         assert not flight.cause
         found = flipped(zeros, content_of(flight)) if flight.bits_flipped else []
@@ -39,6 +39,7 @@ def test_packets_with_errors(proof: Proof, size: int, rate: float) -> None:
         counts[len(found)] += 1
         for place in found:
             places[place * len(places) // bits] += 1
+            within[place % 8] += 1
     what = f"{size} B at {rate:g}"
     hit = -expm1(bits * log1p(-rate))
     proof.normal("T15", f"corruption of {what}: share of packets", binomial_z(n - counts[0], n, hit), n)
@@ -49,6 +50,7 @@ def test_packets_with_errors(proof: Proof, size: int, rate: float) -> None:
         proof.likely("T15", f"corruption of {what}: bits in one packet", chi_square(seen, due), sum(seen))
     total = sum(places)
     proof.likely("T15", f"corruption of {what}: places", chi_square(places, [total / len(places)] * len(places)), total)
+    proof.likely("T15", f"corruption of {what}: bits of a byte", chi_square(within, [total / 8] * 8), total)
 
 
 @pytest.mark.parametrize(("size", "rate"), [(60_000, 0.01), (1500, 0.2), (8000, 0.5)])

@@ -13,10 +13,13 @@ from math import expm1, log1p, sqrt
 
 import pytest
 
+from foosim.protocol.draws import draw_key
+from foosim.protocol.impairments import ParetoDwell
+from foosim.vhub.episodes import Episodes, pareto_with_mean
 from foosim.vhub.packet import Flight
 from tests.links.offered import MS, S, every, fabric_of, fates, uniforms
 from tests.links.proof import Proof
-from tests.links.statistics import ks, ks_exponential
+from tests.links.statistics import binomial_z, ks, ks_exponential
 
 Times = list[tuple[int, int]]
 
@@ -63,6 +66,40 @@ def test_good_times_are_exponential(proof: Proof) -> None:
     proof.likely("T6", "times without outages of 30 ms: Kolmogorov against exponential", p, len(counts))
 
 
+def scale_of(mean: float, alpha: float, top: float) -> float:
+    """The least length of a Pareto law that, cut at `top`, has this mean."""
+    low, high = 0.0, mean
+    for _ in range(80):
+        scale = (low + high) / 2
+        found = (alpha * scale - scale**alpha * top ** (1 - alpha)) / (alpha - 1)
+        low, high = (scale, high) if found < mean else (low, scale)
+    return scale
+
+
+@pytest.mark.parametrize("dwell", [None, ParetoDwell(alpha=1.5, max="400 ms")], ids=["exponential", "Pareto"])
+def test_lengths_are_of_their_laws(proof: Proof, dwell: ParetoDwell | None) -> None:
+    """The times themselves, one after the other: many more than a flow of packets meets."""
+    n, good_ms, bad_ms, top_ms = proof.size(10_000, 100_000), 30.0, 20.0, 400.0
+    pareto = None if dwell is None else pareto_with_mean(20 * MS, dwell)
+    times = Episodes(draw_key(proof.seed, "times"), 30 * MS, 20 * MS, pareto)
+    lengths: dict[bool, list[float]] = {True: [], False: []}
+    for _ in range(2 * n):
+        lengths[times.is_bad(times.start_ns)].append((times.end_ns - times.start_ns) / MS)
+        times.is_bad(times.end_ns)
+    good, bad = lengths[False], lengths[True]
+    proof.likely("T6", "lengths of times without outages, 30 ms", ks_exponential(good, good_ms), len(good))
+    if dwell is None:
+        proof.likely("T6", "lengths of bad times, 20 ms", ks_exponential(bad, bad_ms), len(bad))
+        return
+    scale = scale_of(bad_ms, dwell.alpha, top_ms)
+    whole = 1 - (scale / top_ms) ** dwell.alpha
+    below = [length for length in bad if length < top_ms]
+    p = ks(below, lambda x: (1 - (scale / x) ** dwell.alpha) / whole if x > scale else 0.0)
+    proof.likely("T6", "lengths of bad times by Pareto, 1.5, up to 400 ms", p, len(below))
+    z = binomial_z(len(bad) - len(below), len(bad), 1 - whole)
+    proof.normal("T6", "lengths of bad times by Pareto that are cut at 400 ms", z, len(bad))
+
+
 def test_heavy_tailed_bad_times(proof: Proof) -> None:
     """Pareto lengths cut at the greatest: their mean as configured, and their law.
 
@@ -74,11 +111,7 @@ def test_heavy_tailed_bad_times(proof: Proof) -> None:
     times = bad_times(settings, proof.seed, MS // 10, n)
     spread = [(0.5 + 0.6180339887 * k) % 1.0 * 2 * step_ms for k in range(len(times))]
     lengths = [(last - first) / MS + more for (first, last), more in zip(times, spread, strict=True)]
-    low, high = 0.1, mean
-    for _ in range(80):
-        scale = (low + high) / 2
-        found = (alpha * scale - scale**alpha * top ** (1 - alpha)) / (alpha - 1)
-        low, high = (scale, high) if found < mean else (low, scale)
+    scale = scale_of(mean, alpha, top)
     square = alpha * scale * scale / (2 - alpha) * ((top / scale) ** (2 - alpha) - 1)
     square += top * top * (scale / top) ** alpha
     z = (sum(lengths) / len(lengths) - mean) / sqrt((square - mean * mean) / len(lengths))

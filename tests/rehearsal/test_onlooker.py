@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 from foosim.client.player import Commands, Samples
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.units import Pace
-from foosim.rehearsal import attendant
+from foosim.rehearsal import attendant, onlooker, rehearse_command
 from foosim.rehearsal.attendant import INTERRUPTS_MAX
 from foosim.rehearsal.onlooker import LOOK_S, STOOD_S, Onlooker
 from foosim.rehearsal.rehearse import rehearse
@@ -30,6 +30,7 @@ from foosim.rehearsal.replay_command import app as replay_app
 from foosim.rehearsal.settings import AtWork
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
+from foosim.vhub.capture_reader import open_capture
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 HANGS_AT: Final = 30
@@ -117,6 +118,22 @@ def only_hanging_counts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def rehearsed(*options: str) -> Any:
     return CliRunner().invoke(app, [str(TABLE), *options, *(word for setting in SETS for word in ("--set", setting))])
+
+
+def test_the_command_shows_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines: list[str] = []
+    shown = threading.Event()
+
+    def note(line: str) -> None:
+        lines.append(line)
+        shown.set()
+
+    monkeypatch.setattr(rehearse_command, "_note", note)
+    monkeypatch.setattr(onlooker, "LINE_S", 0.0)
+    Hangs.how = shown.wait
+    assert rehearsed("--for", "0.1 s").exit_code == 0
+    what = r"0\.\d\d s of 0\.10 s simulated, [0-9.]+x, red 0 : 0 blue, waits for "
+    assert all(re.match(what, line) for line in lines)
 
 
 def loops() -> None:
@@ -250,3 +267,4 @@ def test_a_second_ctrl_c_ends_it_at_once(tmp_path: Path) -> None:
     ran = rehearsed("--for", "60 s", "--capture", str(capture))
     assert ran.exit_code == 130 or isinstance(ran.exception, KeyboardInterrupt) or "Aborted" in ran.stderr
     assert f"interrupted at 0.06 s of 60.00 s, capture {capture} (unfinished)" in ran.stderr
+    assert not open_capture(capture).about.finished

@@ -16,6 +16,7 @@ from msgspec.structs import replace as replace_row
 from foosim.protocol.scene import Box, Cylinder, Shape, turn
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
+from foosim.rehearsal.report_asked import moves
 from foosim.rehearsal.report_map import MapMaker, outline
 from foosim.rehearsal.report_page import _runs, page
 from foosim.rehearsal.report_svg import WHOLE, round_up
@@ -24,7 +25,7 @@ from foosim.rehearsal.system import System
 from foosim.rehearsal.whatif import what_if
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import PACKETS, EpochRow, Fate, PacketRow
+from foosim.vhub.rows import PACKETS, EpochRow, Fate, OwnerRow, PacketRow
 from tests.replay.conftest import TABLE, damaged, messages_of, replay, rewritten, with_row
 
 NETWORK: Final = (
@@ -191,6 +192,15 @@ def test_what_was_asked_of_the_world_is_among_the_events(found: Report, radio_ru
     assert world[1] == "move red.goal from n1 to n2" and dict_of(moved)["red.goal"] == "n2"
     rows = Page(page(found)).rows
     assert all(any(row[1:] == [text, "asked for"] for row in rows) for text in world)
+
+
+def test_what_another_node_adopts_is_no_move() -> None:
+    def epoch(number: int, roster: list[str], owner: str) -> EpochRow:
+        return EpochRow(10 * number, number, "0" * 64, roster, [OwnerRow("red.goal", owner)], "")
+
+    both = ["n1", "n2"]
+    epochs = [epoch(1, both, "n1"), epoch(2, ["n2"], "n2"), epoch(3, both, "n1"), epoch(4, both, "n2")]
+    assert list(moves(epochs)) == [(40, "move red.goal from n1 to n2")]
 
 
 def dict_of(epoch: EpochRow) -> dict[str, str]:

@@ -11,6 +11,7 @@ import pytest
 
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.messages import Epoch
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import Rehearsed, with_nodes
 from foosim.rehearsal.system import Settings, System
@@ -104,10 +105,34 @@ def test_a_node_that_stands_for_a_while_is_lost_only_when_the_run_has_begun(when
     assert run.seen.json["reason"] == "done" and run.seen.digests == undisturbed()
 
 
-@pytest.mark.parametrize("sets", [(), ("nodes.n2.required=true",)], ids=["", "required"])
-def test_a_resumed_run_waits_for_all_as_long_as_for_a_start(sets: tuple[str, ...]) -> None:
+def test_a_vhub_that_ends_before_the_first_tick_has_the_time_of_a_start() -> None:
+    """For the supervisor and for the players. Frame 1 needs no vHub, so a node is slow as well."""
+    run = Run(("deadlines.vhub_back=5 s",))
+
+    def lose(epoch: Epoch) -> None:
+        if epoch.epoch == 1:
+            run.system.pause("n1", 45 * S)
+            run.system.soon(lambda: run.system.kill_hub("now", 40 * S))
+
+    run.system.settings.on_epoch = lose
+    run.go()
+    assert run.seen.json["reason"] == "done" and run.seen.digests == undisturbed()
+    assert [entry["what"] for entry in run.seen.json["recoveries"]] == ["vhub"]
+    assert [player.core.lost for player in run.system.players.values()] == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("sets", "slept_s"),
+    [((), 0), (("nodes.n2.required=true",), 0), (("nodes.n2.required=true",), 100)],
+    ids=["", "required", "slept"],
+)
+def test_a_resumed_run_waits_for_all_as_long_as_for_a_start(sets: tuple[str, ...], slept_s: int) -> None:
+    """The time for which the supervisor itself stood still meanwhile does not count."""
     run = Run(sets)
     run.resume_at(60, {SUPERVISOR: 0.1, "n1": 3.0, "n2": 50.0, VHUB: 45.0})
+    sleep = partial(run.system.set_forward, SUPERVISOR, slept_s * S)
+    for at_s in (10, 47):
+        run.system.at_tick(60, partial(run.system.later, at_s * S, sleep))
     run.go()
     assert run.seen.json["reason"] == "done" and run.seen.digests == undisturbed()
     told = [(entry["what"], entry["name"]) for entry in run.seen.json["recoveries"]]

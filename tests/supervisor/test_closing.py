@@ -95,3 +95,10 @@ def test_a_supervisor_that_stood_still_meanwhile_cuts_nothing_off() -> None:
     found = slow.run()
     assert (found["reason"], found["failed"], found["capture"]) == ("done", False, "run.mcap")
     assert 55 <= slow.took_s < 56
+
+
+def test_the_time_of_its_last_progress_rests_as_well() -> None:
+    """Not only that of the end, which is far behind."""
+    slow = Slow(takes_s=55)
+    slow.at[45.2] = lambda system: system.set_forward(SUPERVISOR, 100 * S)
+    assert slow.run()["reason"] == "done"

@@ -112,7 +112,9 @@ def damage(path: Path) -> None:
     path.write_bytes(content)
 
 
-@pytest.mark.parametrize("what", ["whole", "supervisor gone", "supervisor", "vhub gone", "vhub", "capture", "finished"])
+@pytest.mark.parametrize(
+    "what", ["whole", "supervisor gone", "supervisor", "vhub gone", "vhub", "capture", "another", "finished"]
+)
 def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: Left, what: str) -> None:
     folder, capture = left.folder, left.folder.path.parents[3] / "run.mcap"
     problems = {
@@ -122,10 +124,15 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
         "vhub gone": f"the vHub's journal is gone from {folder.journals}",
         "vhub": f"{left.journal(VHUB)}: ",
         "capture": f"{capture}: no MCAP file",
+        "another": f"{capture}: was overwritten, it is the capture of run theirs",
         "finished": f"{capture}: is finished, and a capture is never overwritten",
     }
     if what == "capture":
         capture.write_bytes(b"something else that is not a capture")
+    elif what == "another":
+        capture.unlink()
+        theirs = Settings(run="theirs")
+        rehearse(TABLE.read_text(), TABLE.name, 2, None, ["engine=pure"], theirs, capture=capture)
     elif what == "finished":
         capture.write_bytes(run.capture.read_bytes())
     elif what.endswith(" gone"):
@@ -163,6 +170,15 @@ def test_a_resume_of_a_run_that_has_ended_reports_its_result(run: Run, left: Lef
     assert "run over has ended: done" in err
     again.write_result({**run.result, "run": "over", "reason": "lost red", "failed": True})
     assert supervisor("up", "--resume", "over").code == 1
+
+
+def test_a_resume_imports_the_players_before_anything_starts(left: Left, typed: Typed) -> None:
+    sets = "engine=pure", "players.player-red.class=gone_since:Acts"
+    capture = left.folder.path.parents[3] / "run.mcap"
+    left.folder.write_launch(launch_of(RunOptions(TABLE, duration="120 ms", sets=sets), capture))
+    done = typed("foosim-supervisor", main)("up", "--resume", "mine")
+    assert done.code == 2 and "players.player-red.class: there is no module gone_since" in done.err
+    assert left.folder.result() is None and left.folder.info() is None
 
 
 @pytest.mark.parametrize(

@@ -153,8 +153,9 @@ def test_an_add_waits_for_the_engines_of_all_nodes_and_the_world_does_not() -> N
 
 
 def test_a_removed_ball_is_gone_from_the_frame_after_its_tick() -> None:
-    run = Run().ask_at(20, "add", name="second").ask_at(60, "remove", name="second").go()
-    added, removed = run.answers
+    run = Run().ask_at(20, "add", name="second").ask_at(50, "remove", name="ball").ask_at(60, "remove", name="second")
+    added, other, removed = run.go().answers
+    assert other.text == "'ball' cannot be removed: only a ball that was added can, and those are second"
     assert removed.text == f"second removed at tick {removed.tick}"
     present = [frame.tick for frame in run.frames if "second" in frame.layout]
     assert present == list(range(added.tick + 1, removed.tick + 1))

@@ -11,7 +11,7 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol.channels import SUPERVISOR
+from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.session import ConnectError
 from foosim.supervisor import control
 from foosim.supervisor.display import Display
@@ -247,14 +247,37 @@ def test_a_run_that_was_told_to_end_is_given_time_as_long_as_its_supervisor_says
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    said = io.StringIO()
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(said), "run")
     up._launch(SUPERVISOR, ["sleep", "100"])
-    told = {"state": "ended", "begun": True, "recoveries": [], "processes": {}, "starts": {}, "recording": NOT_RECORDED}
+    recording = {**NOT_RECORDED, "state": "closing", "offered": 9, "written": 4, "bytes": 1_000_000}
+    told = {"state": "ended", "begun": True, "recoveries": [], "processes": {}, "starts": {}, "recording": recording}
     closing = SimpleNamespace(status=lambda timeout_s, give_up: told)
     up._has_begun = up._has_ended = up._is_told = True
     up._interrupts, up._ending_s = 1, time.monotonic() - END_S - 1
     assert not up._goes_on(), "it would be cut off"
     up._show(closing)  # type: ignore[arg-type]
-    assert up._goes_on()
+    assert up._goes_on() and said.getvalue() == "closing the capture: 5 rows are left, 1.0 MB are written\n"
     up._launcher.kill()
     up._launcher.close()
+
+
+class Fails(Up):
+    """A run whose supervisor has ended before the vHub was told how to go on."""
+
+    def _start(self) -> bool:
+        ends = "trap 'echo was told to end; exit 1' TERM; echo ready; while true; do sleep 0.01; done"
+        self._launch(VHUB, ["sh", "-c", ends])
+        while "ready" not in self.folder.log(VHUB).read_text():
+            time.sleep(0.001)
+        self._launch(SUPERVISOR, ["sh", "-c", "exit 3"])
+        self._launcher.children[SUPERVISOR].process.wait()
+        return False
+
+
+def test_where_the_run_can_be_resumed_nobody_is_told_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who is told so finishes what it has; who is killed leaves it as it is."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Fails(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    assert up.run().failed
+    assert up.folder.log(VHUB).read_text() == "ready\n"

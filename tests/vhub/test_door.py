@@ -30,6 +30,15 @@ def test_whoever_has_the_name_of_a_client_that_a_tick_waits_for_is_waited_for(an
     assert hub.state.closed == (0 if answers else -1)
 
 
+def test_a_vhub_that_stood_still_is_no_orphan_by_that() -> None:
+    hub = Hub().begin()
+    orphan_ns = hub.core.deployment.deadlines.orphan_ns  # type: ignore[union-attr]
+    hub.core.orphan.hear(False, 0)
+    hub.core.door.rest(2 * orphan_ns, 2 * orphan_ns)
+    assert not hub.core.orphan.is_over(hub.core.deployment, 3 * orphan_ns - 1)
+    assert hub.core.orphan.is_over(hub.core.deployment, 3 * orphan_ns)
+
+
 def test_a_client_leaves_once_however_often_it_comes_and_goes() -> None:
     hub = Hub().begin()
     hub.enter("ear")
