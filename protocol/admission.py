@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.protocol.certificates import Credentials
-from foosim.protocol.tls_probe import NotAuthorised
+from foosim.protocol.certificates import Credentials, NotAuthorised
 
 ADMISSION_NS: Final = 10_000_000_000
 

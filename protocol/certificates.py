@@ -5,7 +5,8 @@
     client.NAME.password     instead of these, where clients of the radio plane have passwords
 
 A refused connection looks like a router that is not there, to both sides. So everything that can be checked here is
-checked before anything is opened. Neighbours: `identity`, `tls_probe` (what only the other side can say),
+checked before anything is opened. A process of a run without certificates, which most are, does not load what reads
+them. Neighbours: `certificate_files` (what is in a file), `identity`, `tls_probe` (what only the other side can say),
 `supervisor.pki` makes what is in the folder.
 """
 
@@ -21,14 +22,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final
 
-from cryptography import x509
-from cryptography.exceptions import InvalidSignature
-from cryptography.hazmat.primitives import serialization
-from cryptography.x509.oid import NameOID
-
 from foosim.protocol import wall
 from foosim.protocol.addresses import parse_address
-from foosim.protocol.errors import Refused, show
+from foosim.protocol.errors import Refused
 from foosim.protocol.identity import operator, parse_identity
 
 CA_FILE: Final = "ca.pem"
@@ -45,6 +41,10 @@ SOON: Final = timedelta(days=14)
 
 class CertificateError(Refused):
     """A certificate, key or password that is not there, or with which nobody would be let in; the text says why."""
+
+
+class NotAuthorised(Refused):
+    """The router will not have us, or we not the router; the text says why, as far as that can be known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +80,10 @@ def load_credentials(folder: Path | None, identity: str, password: str = "") -> 
         if password:
             raise CertificateError("a password needs the root certificate, too: it is sent to the right vHub only")
         return None
+    from foosim.protocol import certificate_files as files
+
     now = wall.now_utc()
-    ca = read_ca(folder, now)
+    ca = files.read_ca(folder, now)
     certificate, key = certificate_path(folder, identity), key_path(folder, identity)
     role, name = parse_identity(identity)
     own_password = folder / f"{identity}{PASSWORD_SUFFIX}"
@@ -94,9 +96,9 @@ def load_credentials(folder: Path | None, identity: str, password: str = "") -> 
     if not certificate.exists():
         known = ", ".join(identities_in(folder)) or "none"
         raise CertificateError(f"{folder} has no certificate of {identity}; it has: {known}")
-    found = read_certificate(certificate)
-    check_certificate(certificate, found, identity, ca, now)
-    check_key(key, found)
+    found = files.read_certificate(certificate)
+    files.check_certificate(certificate, found, identity, ca, now)
+    files.check_key(key, found)
     return Credentials(identity, folder / CA_FILE, certificate, key, until=found.not_valid_after_utc)
 
 
@@ -153,7 +155,7 @@ def passwords_file(folder: Path, clients: Sequence[str]) -> Iterator[Path]:
 def read_password(path: Path) -> str:
     """Return the one line of a password file. Raises CertificateError."""
     try:
-        password = _read(path).decode("ascii").strip()
+        password = read_bounded(path).decode("ascii").strip()
     except UnicodeDecodeError:
         raise CertificateError(f"{path}: not a line of ASCII") from None
     check_password(str(path), password)
@@ -166,80 +168,12 @@ def check_password(where: str, password: str) -> None:
         raise CertificateError(f"{where}: a password is printable ASCII without blanks and colons, and not empty")
 
 
-def read_ca(folder: Path, now: datetime) -> x509.Certificate:
-    """Return the root, checked. Raises CertificateError."""
-    path = folder / CA_FILE
-    if not path.exists():
-        raise CertificateError(f"{folder} has no {CA_FILE}; foosim-pki init {folder} makes one")
-    ca = read_certificate(path)
-    try:
-        is_ca = ca.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
-    except x509.ExtensionNotFound:
-        is_ca = False
-    if not is_ca:
-        raise CertificateError(f"{path}: not the certificate of an authority")
-    _check_dates(path, ca, now, "make a new root, and new certificates under it")
-    return ca
-
-
-def read_certificate(path: Path) -> x509.Certificate:
-    """Return the first certificate in a file. Raises CertificateError."""
-    try:
-        return x509.load_pem_x509_certificate(_read(path))
-    except ValueError as error:
-        raise CertificateError(f"{path}: not a certificate in PEM, {show(str(error), 120)}") from None
-
-
-def read_key(path: Path) -> serialization.PrivateFormat | object:
-    """Return the private key in a file. Raises CertificateError."""
-    try:
-        return serialization.load_pem_private_key(_read(path), None)
-    except (ValueError, TypeError) as error:
-        raise CertificateError(
-            f"{path}: not a private key in PEM, without a password: {show(str(error), 80)}"
-        ) from None
-
-
-def check_certificate(path: Path, found: x509.Certificate, identity: str, ca: x509.Certificate, now: datetime) -> None:
-    """Raise CertificateError unless this certificate is of this identity, from this root, and valid now."""
-    named = common_name(found)
-    if named != identity:
-        raise CertificateError(f"{path}: a certificate of {show(named)}, not of {identity}")
-    try:
-        found.verify_directly_issued_by(ca)
-    except (ValueError, TypeError, InvalidSignature):
-        raise CertificateError(f"{path}: not issued by the root in {CA_FILE} beside it") from None
-    _check_dates(path, found, now, f"foosim-pki renew {path.parent} {identity}")
-
-
-def check_key(path: Path, found: x509.Certificate) -> None:
-    """Raise CertificateError unless the key is that of the certificate."""
-    key = read_key(path)
-    public = getattr(key, "public_key", None)
-    if public is None or public() != found.public_key():
-        raise CertificateError(f"{path}: the key does not belong to the certificate {path.stem}{CERTIFICATE_SUFFIX}")
-
-
-def common_name(found: x509.Certificate) -> str:
-    """Return whom a certificate names; empty when nobody, or more than one."""
-    names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    return str(names[0].value) if len(names) == 1 else ""
-
-
-def hosts_of(found: x509.Certificate) -> list[str]:
-    """Return the host names and addresses under which its holder may listen."""
-    try:
-        alternatives = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-    except x509.ExtensionNotFound:
-        return []
-    names = alternatives.get_values_for_type(x509.DNSName)
-    return [*names, *map(str, alternatives.get_values_for_type(x509.IPAddress))]
-
-
 def check_host(credentials: Credentials | None, locator: str) -> None:
     """Raise CertificateError when those who connect to where we listen would not find its host in our certificate."""
     if credentials is None or credentials.certificate is None:
         return
+    from foosim.protocol.certificate_files import hosts_of, read_certificate
+
     host = parse_address(locator).host.strip("[]").lower()
     known = [name.lower() for name in hosts_of(read_certificate(credentials.certificate))]
     if host not in known:
@@ -251,15 +185,8 @@ def check_host(credentials: Credentials | None, locator: str) -> None:
         )
 
 
-def _check_dates(path: Path, found: x509.Certificate, now: datetime, remedy: str) -> None:
-    if now > found.not_valid_after_utc:
-        raise CertificateError(f"{path}: expired on {found.not_valid_after_utc:%Y-%m-%d %H:%M} UTC; {remedy}")
-    if now < found.not_valid_before_utc:
-        begin = f"{found.not_valid_before_utc:%Y-%m-%d %H:%M}"
-        raise CertificateError(f"{path}: valid from {begin} UTC, and it is {now:%Y-%m-%d %H:%M} here: mind the clock")
-
-
-def _read(path: Path) -> bytes:
+def read_bounded(path: Path) -> bytes:
+    """Return what is in a file of the folder, of a huge one the beginning. Raises CertificateError."""
     try:
         with path.open("rb") as file:
             return file.read(FILE_BYTES_MAX)

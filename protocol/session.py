@@ -31,7 +31,6 @@ from foosim.protocol.addresses import parse_address, reachable
 from foosim.protocol.errors import BadValue, Failed, show
 from foosim.protocol.inbox import Inbox, Item
 from foosim.protocol.session_settings import QUERY_S, Security, client_settings, holds, router_settings
-from foosim.protocol.tls_probe import probe
 
 KeyReader = Callable[[str], tuple[str, str] | None]
 """Gives the channel and the name that a key stands for, or None for a key that it does not know."""
@@ -161,6 +160,8 @@ class Session:
                     _open(client_settings(address, message_bytes_max, min(left_s, ATTEMPT_S), security)), str(address)
                 )
             except zenoh.ZError:  # its text says no more than the address, whatever the cause
+                from foosim.protocol.tls_probe import probe  # brings ssl, which few processes need
+
                 probe(address, None if security is None else security.credentials, left_s <= ATTEMPT_S)
                 if left_s <= ATTEMPT_S:
                     raise ConnectError(

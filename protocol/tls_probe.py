@@ -12,16 +12,11 @@ import ssl
 from typing import Final
 
 from foosim.protocol.addresses import Address
-from foosim.protocol.certificates import Credentials
-from foosim.protocol.errors import Refused
+from foosim.protocol.certificates import Credentials, NotAuthorised
 
 PROBE_S: Final = 1.0
 ALERT_S: Final = 0.5
 """How long the other side has to complain about our certificate: in TLS 1.3 it does so behind the handshake."""
-
-
-class NotAuthorised(Refused):
-    """The router will not have us, or we not the router; the text says why, as far as that can be known."""
 
 
 def probe(address: Address, credentials: Credentials | None, is_last: bool) -> None:

@@ -27,6 +27,7 @@ from packaging.requirements import Requirement
 from foosim.client.class_check import player_findings
 from foosim.protocol import limits, wall
 from foosim.protocol.addresses import Address, check_listen
+from foosim.protocol.certificate_files import check_certificate, check_key, hosts_of, read_ca, read_certificate
 from foosim.protocol.certificates import (
     CA_FILE,
     CA_KEY_FILE,
@@ -34,13 +35,8 @@ from foosim.protocol.certificates import (
     PASSWORD_SUFFIX,
     CertificateError,
     certificate_path,
-    check_certificate,
-    check_key,
-    hosts_of,
     key_path,
     load_credentials,
-    read_ca,
-    read_certificate,
     read_password,
 )
 from foosim.protocol.channels import SUPERVISOR, VHUB

@@ -23,7 +23,8 @@ import msgspec
 
 from foosim.protocol import wall
 from foosim.protocol.addresses import parse_address
-from foosim.protocol.certificates import CertificateError, read_ca
+from foosim.protocol.certificate_files import read_ca
+from foosim.protocol.certificates import CertificateError
 from foosim.protocol.channels import VHUB
 from foosim.protocol.errors import Refused
 from foosim.protocol.fingerprint import library_fingerprint

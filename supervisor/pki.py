@@ -24,22 +24,24 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from foosim.protocol import wall
+from foosim.protocol.certificate_files import (
+    check_certificate,
+    check_key,
+    common_name,
+    hosts_of,
+    read_ca,
+    read_certificate,
+    read_key,
+)
 from foosim.protocol.certificates import (
     CA_FILE,
     CA_KEY_FILE,
     PASSWORD_SUFFIX,
     CertificateError,
     certificate_path,
-    check_certificate,
-    check_key,
     check_password,
-    common_name,
-    hosts_of,
     identities_in,
     key_path,
-    read_ca,
-    read_certificate,
-    read_key,
 )
 from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.identity import parse_identity

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from foosim.protocol import identity, wall
+from foosim.protocol.certificate_files import read_ca
 from foosim.protocol.certificates import (
     CA_FILE,
     PASSWORD_SUFFIX,
@@ -19,7 +20,6 @@ from foosim.protocol.certificates import (
     certificate_path,
     key_path,
     load_credentials,
-    read_ca,
     read_password,
 )
 from foosim.protocol.channels import VHUB

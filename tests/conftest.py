@@ -5,9 +5,10 @@ measures in wall time is off, because the machines that run the tests are shared
 `make test ARGS='--hypothesis-profile=search tests/laws'`; what it finds becomes an `@example`.
 """
 
+import gc
 import os
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -48,6 +49,17 @@ def pytest_configure(config: pytest.Config) -> None:
     """What tests cost is measured; `make slow` makes the machine a slow one."""
     config.pluginmanager.register(Meter(), "meter")
     config.pluginmanager.register(Burden(config), "burden")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What is collected stays: no garbage collection looks at it, while it is collected or while tests run."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_report_header(config: pytest.Config) -> str:

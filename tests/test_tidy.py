@@ -45,6 +45,7 @@ SHELLS = {
     "node/engines/probation.py",
     "node/main.py",
     "protocol/assets.py",
+    "protocol/certificate_files.py",
     "protocol/certificates.py",
     "protocol/command.py",
     "protocol/deployment_file.py",
@@ -136,6 +137,12 @@ def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(), str(path))
 
 
+@cache
+def nodes_of(path: Path) -> tuple[ast.AST, ...]:
+    """All nodes of that tree: most rules look at each."""
+    return tuple(ast.walk(tree_of(path)))
+
+
 def python_files(*folders: str) -> list[Path]:
     """All Python files in the folders, without caches."""
     return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
@@ -153,7 +160,7 @@ def imports_of(path: Path) -> tuple[tuple[int, str], ...]:
 
 
 def _imports_of(path: Path) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_of(path):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -206,7 +213,7 @@ def test_cores_are_pure() -> None:
         for line, name in imports_of(path):
             if name.split(".")[0] in IMPURE:
                 wrong.append(f"{name_of(path)}:{line}: imports {name}")
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in {"open", "input"}:
                 wrong.append(f"{name_of(path)}:{node.lineno}: calls {node.func.id}()")
     assert not wrong, "\n".join(wrong)
@@ -223,7 +230,7 @@ def test_no_running_random_generator() -> None:
     for path in SOURCES:
         uses = [
             *imports_of(path),
-            *((node.lineno, ast.unparse(node)) for node in ast.walk(tree_of(path)) if isinstance(node, ast.Attribute)),
+            *((node.lineno, ast.unparse(node)) for node in nodes_of(path) if isinstance(node, ast.Attribute)),
         ]
         generators = re.compile(r"(random|secrets|np\.random|numpy\.random)\b")
         wrong += [f"{name_of(path)}:{line}: {name}" for line, name in uses if generators.match(name)]
@@ -236,7 +243,7 @@ def test_functions_and_files_are_short() -> None:
         lines = len(path.read_text().splitlines())
         if lines > LINES_OF_A_FILE_MAX:
             long.append(f"{name_of(path)}: {lines} lines")
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 assert node.end_lineno is not None
                 lines = node.end_lineno - node.lineno + 1
@@ -325,17 +332,17 @@ def test_what_derives_from_a_compiled_class_is_compiled() -> None:
     modules = compiled()
     wrong = []
     for path in ALL_FILES:
+        if tree_of(path) in modules.values():
+            continue
         named = {
             alias.asname or alias.name: node.module
-            for node in ast.walk(tree_of(path))
+            for node in nodes_of(path)
             if isinstance(node, ast.ImportFrom)
             for alias in node.names
         }
-        if tree_of(path) in modules.values():
-            continue
         wrong += [
             f"{name_of(path)}:{node.lineno}: {node.name} derives from a class of {named[base.id]}"
-            for node in ast.walk(tree_of(path))
+            for node in nodes_of(path)
             if isinstance(node, ast.ClassDef)
             for base in node.bases
             if isinstance(base, ast.Name) and named.get(base.id) in modules

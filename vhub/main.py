@@ -48,7 +48,6 @@ from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
-from foosim.vhub.branching import branch_command
 from foosim.vhub.capture_file import check_new, ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
@@ -289,6 +288,8 @@ class HubProcess:
 
     def _refusal(self, build: Build, records: list[bytes], damaged: JournalDamaged) -> Refused:
         """Return why nobody goes on over a damaged journal, and what helps."""
+        from foosim.vhub.branching import branch_command  # reads captures: not what a vHub starts with
+
         before = was_captured(records)
         capture = self._options.capture if before is None else Path(before) if before else None
         what = f"{damaged}; tick {last_tick_of(records)} is the last before it"

@@ -6,9 +6,8 @@ import pytest
 
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.admission import ADMISSION_NS, Admission
-from foosim.protocol.certificates import Credentials
+from foosim.protocol.certificates import Credentials, NotAuthorised
 from foosim.protocol.exposure import EVERY_NS, Exposure
-from foosim.protocol.tls_probe import NotAuthorised
 
 WHO = Credentials("node.green", Path("ca.pem"))
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 import msgspec
 import pytest
 
-from foosim.protocol.certificates import read_certificate
+from foosim.protocol.certificate_files import read_certificate
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import Malformed

@@ -15,14 +15,13 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from typer.testing import CliRunner
 
 from foosim.protocol import certificates, wall
+from foosim.protocol.certificate_files import hosts_of, read_certificate
 from foosim.protocol.certificates import (
     CertificateError,
     check_host,
-    hosts_of,
     load_credentials,
     operator_credentials,
     passwords_file,
-    read_certificate,
 )
 from foosim.protocol.errors import Refused
 from foosim.supervisor import pki

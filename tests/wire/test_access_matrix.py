@@ -20,14 +20,13 @@ import zenoh
 from foosim.protocol import session as wire
 from foosim.protocol.access import access_to
 from foosim.protocol.addresses import parse_address
-from foosim.protocol.certificates import load_credentials, passwords_file
+from foosim.protocol.certificates import NotAuthorised, load_credentials, passwords_file
 from foosim.protocol.channels import ALIVE, CHANNELS, Plane
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.session import ConnectError, Session
 from foosim.protocol.session_settings import Security, client_settings, router_settings
-from foosim.protocol.tls_probe import NotAuthorised
 from foosim.supervisor import pki
 from tests.granted import may_be_present, may_hear, may_put, may_watch
 from tests.wire.conftest import TABLE, wait_for
