@@ -30,7 +30,7 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     stranger = house.folder / "stranger"
     pki.init(stranger)
     pki.issue(stranger, ["node.red"])
-    running = house.up("--pki", folder, "--no-capture", *CLIENTS)
+    running = house.up("--pki", folder, "--engine", "pure", "--no-capture", *CLIENTS)
     house.ticking()
     info = house.info()
     assert info.simulation.startswith("tls/127.0.0.1:") and info.radio.startswith("tls/127.0.0.1:")
@@ -43,7 +43,7 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     assert code == 3 and "its certificate is not accepted here" in error
     code, _, error = house.run("foosim-node", "--name", "red", "--connect", info.simulation)
     assert code == 2 and "needs certificates: say where they are by --pki DIR" in error
-    code, _, error = house.run("foosim-node", "--name", "green", "--connect", info.simulation, "--pki", folder)
+    code, _, error = house.ask("foosim-node", "--name", "green", "--connect", info.simulation, "--pki", folder)
     assert code == 3 and "has no certificate of node.green; it has: client.hand, node.blue" in error
     control.down()
     code, output, _ = house.end(running)
