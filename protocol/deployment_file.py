@@ -38,6 +38,7 @@ from foosim.protocol.yaml_tree import (
     Place,
     Problem,
     Tree,
+    copied,
     locate_in,
     measure,
     plain,
@@ -50,16 +51,39 @@ PROBLEMS_MAX: Final = 100
 DEPLOYMENTS_KEPT: Final = 32
 """Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time.
 The swarm's worlds are 25 texts."""
+TREES_KEPT: Final = 4
+"""Files that are not read again when other settings are placed in them."""
+
+_kept: dict[tuple[str, str], Deployment] = {}
+"""By text and name, the one that was not asked for longest first."""
 
 
-@lru_cache(maxsize=DEPLOYMENTS_KEPT)
 def load_deployment(text: str, name: str) -> Deployment:
     """The deployment in `text`; `name` is the file's in messages. Raises DeploymentError with all problems.
 
     Equal texts give one value, which nobody changes: all processes of a rehearsal load the same.
     """
-    tree, problems = read_tree(text, locate_in(name))
-    return _check(tree, problems)
+    known = _kept.pop((text, name), None)
+    return _keep(text, name, known or read_deployment(text, name))
+
+
+def read_deployment(text: str, name: str) -> Deployment:
+    """What `load_deployment` returns, read from the text whatever is kept."""
+    return _check(*read_tree(text, locate_in(name)))
+
+
+def _keep(text: str, name: str, deployment: Deployment) -> Deployment:
+    """Keep what a text loads to, as the one that was asked for last."""
+    while len(_kept) >= DEPLOYMENTS_KEPT:
+        _kept.pop(next(iter(_kept)))
+    _kept[text, name] = deployment
+    return deployment
+
+
+@lru_cache(maxsize=TREES_KEPT)
+def _tree_of(text: str, name: str) -> tuple[Tree | None, list[Problem]]:
+    """What `read_tree` gives; nobody changes it."""
+    return read_tree(text, locate_in(name))
 
 
 def apply_sets(text: str, name: str, sets: Sequence[str]) -> str:
@@ -74,11 +98,11 @@ def apply_sets(text: str, name: str, sets: Sequence[str]) -> str:
 @lru_cache(maxsize=DEPLOYMENTS_KEPT)
 def _applied(text: str, name: str, sets: tuple[str, ...]) -> str:
     """What `apply_sets` returns; who rehearses the same again pays for it once."""
-    tree, problems = read_tree(text, locate_in(name))
+    tree, problems = _tree_of(text, name)
     if tree is not None:
-        tree, set_problems = place_sets(tree, sets)
+        tree, set_problems = place_sets(copied(tree), sets)
         problems = [*problems, *set_problems]
-    _check(tree, problems)
+    deployment = _check(tree, problems)
     assert tree is not None, "checked"
     canonical = write_yaml(plain(tree))
     depth, nodes = measure(tree)
@@ -86,6 +110,7 @@ def _applied(text: str, name: str, sets: tuple[str, ...]) -> str:
     if depth > DEPTH_MAX or nodes > NODES_MAX or size > limits.DEPLOYMENT_BYTES_MAX:
         what = f"too large with these settings ({size} bytes, {nodes} nodes, {depth} deep)"
         raise DeploymentError([str(Problem(tree.place, what))])
+    _keep(canonical, name, deployment)
     return canonical
 
 

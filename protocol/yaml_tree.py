@@ -276,6 +276,15 @@ def plain(tree: Tree) -> Any:
     return {key: plain(value) for key, value in tree.values.items()}
 
 
+def copied(tree: Tree) -> Tree:
+    """The tree with collections of its own: changing them leaves the other as it is. Scalars are shared."""
+    if isinstance(tree, Items):
+        return Items(tree.place, [copied(item) for item in tree.items])
+    if isinstance(tree, Fields):
+        return Fields(tree.place, {key: copied(value) for key, value in tree.values.items()}, dict(tree.keys))
+    return tree
+
+
 def measure(tree: Tree) -> tuple[int, int]:
     """Depth of nesting and number of nodes (keys too), as the reader counts them."""
     if isinstance(tree, Leaf):

@@ -24,7 +24,7 @@ class Plays:
         if self._error is not None:
             raise self._error
         if self._code is None:
-            assert self.stopped.wait(60.0), "nobody has stopped it"
+            assert self.stopped.wait(900.0), "nobody has stopped it"
             return FAILED
         return self._code
 

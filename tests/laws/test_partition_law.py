@@ -22,9 +22,9 @@ from foosim.rehearsal.system import Settings, System
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SEEDS = settings(max_examples=2, phases=[Phase.explicit, Phase.generate])
 """A run takes seconds, and a seed has nothing to shrink."""
-TICKS = 400
-MOVES = 100
-REBUILDS = 12
+TICKS = 250
+MOVES = 60
+REBUILDS = 8
 
 
 @dataclass

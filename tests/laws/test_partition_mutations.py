@@ -25,7 +25,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TICKS = 400
+TICKS = 250
 
 
 def differs() -> bool:

@@ -6,7 +6,7 @@ import pytest
 
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment, RodRobot
-from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment
 from foosim.protocol.errors import DeploymentError
 
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
@@ -120,3 +120,25 @@ def test_settings_do_not_lift_the_limits_of_a_file() -> None:
     assert "19 deep" in refused(deep)[0]
     assert refused(*["seed=1"] * 257) == ["--set:257:1: more than 256 settings, 257"]
     assert len(apply_sets(TABLE_TEXT, "f", pages[:5]).encode()) < limits.DEPLOYMENT_BYTES_MAX
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [
+        (),
+        ("seed=5", "tick=1e-3 s", "robots.red.goal.sensors.encoder.rate=50 Hz"),
+        ("table.rules.kickoff_delay=1e2 ms", "players={}", "network.links=[]", "clients={ear: {}, 'null': {}}"),
+        ("players.player-red.parameters={a: 1e3, b: '1e3', c: ~, d: \"\\a \\u2028\", e: -0.0, f: [yes, 'true']}",),
+    ],
+)
+def test_what_is_kept_of_a_changed_text_is_what_it_reads_as(sets: tuple[str, ...]) -> None:
+    canonical = apply_sets(TABLE_TEXT, "kept.yaml", sets)
+    kept, read = load_deployment(canonical, "kept.yaml"), read_deployment(canonical, "kept.yaml")
+    assert kept is load_deployment(canonical, "kept.yaml") and kept is not read
+    assert kept == read and repr(kept) == repr(read)
+
+
+def test_settings_change_no_other_text() -> None:
+    usual = apply_sets(TABLE_TEXT, "table.yaml", [])
+    assert load_deployment(apply_sets(TABLE_TEXT, "table.yaml", ["seed=5", "players={}"]), "x").seed == 5
+    assert apply_sets(TABLE_TEXT, "table.yaml", ["seed=1"]) == usual

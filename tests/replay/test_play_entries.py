@@ -221,7 +221,7 @@ class Reader:
 
     def take(self) -> Read:
         while (read := self.ahead.take()) is None:
-            assert self.woken.wait(60)
+            assert self.woken.wait(900)
             self.woken.clear()
         return read
 

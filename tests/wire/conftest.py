@@ -180,6 +180,7 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
     """A place for runs; whatever a test leaves running is killed, children with their launcher."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr(control, "CONNECT_S", LIMIT_S)
     made = House(tmp_path)
     yield made
     for process in made.started:

@@ -25,7 +25,7 @@ CHUNK_BYTES: Final = 65_536
 CHUNKS_HELD_MAX: Final = 256
 """What is on its way: when there is more, the sender waits, as it does for a full pipe."""
 RESET: Final = struct.pack("ii", 1, 0)
-START_S: Final = 10.0
+START_S: Final = 900.0
 
 
 @dataclass(frozen=True, slots=True)

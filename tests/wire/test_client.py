@@ -26,7 +26,7 @@ PATIENCE_S = 900.0
 def test_a_lockstep_client_moves_a_rod_and_sees_it_follow(house: House) -> None:
     up = house.up("--set", CLIENTS, "--set", PERFECT, "--set", "engine=pure", "--pace", "fast", "--for", "1s", "--json")
     radio = house.info().radio
-    with connect(radio, "hand", "table") as client:
+    with connect(radio, "hand", "table", timeout_s=PATIENCE_S) as client:
         client.subscribe("red.goal", "encoder")
         client.subscribe("blue.attack", "encoder")
         goal, attack = client.robots["red.goal"], client.robots["blue.attack"]
@@ -71,7 +71,10 @@ def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_
     up = house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"), "--set", "engine=pure")
     info = house.info()
     assert_strangers_are_refused(info)
-    with connect(info.radio, "ear") as client, connect(info.radio, "hand") as other:
+    with (
+        connect(info.radio, "ear", timeout_s=PATIENCE_S) as client,
+        connect(info.radio, "hand", timeout_s=PATIENCE_S) as other,
+    ):
         with pytest.raises(ConnectionRefused, match="a client hand is already here"):
             connect(info.radio, "hand", timeout_s=PATIENCE_S)
         assert_wrong_names_are_told(client)
@@ -135,7 +138,7 @@ def assert_wrong_names_are_told(client: Client) -> None:
 def test_a_client_says_that_the_vhub_is_lost(house: House) -> None:
     """The launcher is killed, and all with it: nobody starts it again."""
     up = house.up("--set", CLIENTS, "--set", "deadlines.vhub_back=1 s")
-    with connect(house.info().radio, "hand") as client:
+    with connect(house.info().radio, "hand", timeout_s=PATIENCE_S) as client:
         ticks = client.lockstep(100)
         assert next(ticks) == 0
         up.kill()

@@ -47,7 +47,7 @@ def deployed(path: Path, hosts: dict[str, Any]) -> Path:
 
 def examined(house: House, *arguments: str | Path) -> tuple[int, dict[tuple[str, str, str], dict[str, str]]]:
     """Exit code and findings of the doctor, by host, check and subject."""
-    code, out, err = house.run("foosim-doctor", *arguments, "--json")
+    code, out, err = house.ask("foosim-doctor", *arguments, "--json")
     assert code in (0, 1), err
     content = json.loads(out)
     assert content["well"] == (code == 0)
@@ -66,7 +66,7 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
     root = found["there", "certificates", "ca.pem"]
     assert root["state"] == "problem" and root["remedy"] == "foosim-pki send DIR there FILE"
 
-    code, out, err = house.run("foosim-pki", "send", folder, "there", file)
+    code, out, err = house.ask("foosim-pki", "send", folder, "there", file)
     assert code == 0 and sorted(out.split()) == [f"{there}/{name}" for name in OWN], err
     assert sorted(path.name for path in there.iterdir()) == list(OWN), "and nothing of others"
     for path in there.iterdir():

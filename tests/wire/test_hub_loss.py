@@ -16,7 +16,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor.control import Control
 from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import open_capture
-from tests.wire.conftest import LONG
+from tests.wire.conftest import LIMIT_S, LONG
 from tests.wire.test_run import last_json
 from tests.wire.test_same_bytes import PLAYERS, scribes
 
@@ -89,7 +89,11 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
     sets = [word for setting in (*SETS, *scribes(written), split) for word in ("--set", setting)]
     up = house.up("--json", *sets, players=True)
     info = house.info()
-    with Control(info.simulation) as control, connect(info.radio, "ear") as ear, connect(info.radio, "mouth") as mouth:
+    with (
+        Control(info.simulation) as control,
+        connect(info.radio, "ear", timeout_s=LIMIT_S) as ear,
+        connect(info.radio, "mouth", timeout_s=LIMIT_S) as mouth,
+    ):
         talk = Talk(ear, mouth)
         ear.listen([("camera", "ball")])
         mouth.listen()

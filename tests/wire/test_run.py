@@ -118,25 +118,6 @@ def test_a_second_ctrl_c_kills_everything(house: House) -> None:
     assert house.processes_with(info.simulation) == {}
 
 
-def test_a_required_node_that_is_lost_ends_the_run_in_order_and_is_named(house: House) -> None:
-    up = house.up("--json", "--set", "nodes.red.required=true")
-    house.ticking(5)
-    house.kill("red")
-    code, out, err = house.end(up)
-    assert code == 1, err
-    content = last_json(out)
-    assert content["reason"] == "lost red: its connection closed"
-    assert content["failed"]
-    (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
-    journals = {path.name for path in (run / "journals").iterdir()}
-    assert journals >= {"supervisor-000001.journal", "vhub-000001.journal"}
-    capture = next((house.folder / "captures").iterdir())
-    about = open_capture(capture).about
-    assert about.finished
-    assert about.end["reason"] == "lost red: its connection closed"
-    assert house.processes_with(str(house.folder)) == {}
-
-
 TRIPS = """
 from pathlib import Path
 
@@ -384,20 +365,32 @@ def altered_node(house: House, change: str, name: str, address: str) -> tuple[in
     return done.returncode, done.stderr
 
 
-def test_the_run_waits_for_a_node_that_is_started_by_hand(house: House) -> None:
-    up = house.up("--set", "nodes.blue.launch=manual", "--for", "0.2s")
-    line = house.read_until(up.stdout, "waiting for node blue; start it on its machine: ")
+def test_a_run_waits_for_a_node_that_is_started_by_hand_and_ends_in_order_when_a_required_one_is_lost(
+    house: House,
+) -> None:
+    up = house.up("--json", "--set", "nodes.blue.launch=manual", "--set", "nodes.red.required=true")
+    line = house.read_until(up.stderr, "waiting for node blue; start it on its machine: ")
     command = line.split(": ", 1)[1].split()
     assert command[:4] == ["foosim-node", "--name", "blue", "--connect"]
     house.wait_for("the others", lambda: control.status()["waiting_for"] == "blue")
     other_cpu = "from foosim.node import main; main.library_fingerprint = lambda: bytes(32)"
     code, err = altered_node(house, other_cpu, "blue", command[4])
     assert code == 3 and "arithmetic fingerprint 0000000000000000, this is " in err
-    code, _, err = house.run(*command)
+    blue = house.start(*command)
+    house.ticking(5)
+    house.kill("red")
+    code, _, err = house.end(blue)
     assert code == 0, err
-    code, out, _ = house.end(up)
-    assert code == 0
-    assert "the run has ended: done" in out
+    code, out, err = house.end(up)
+    assert code == 1 and "the run has ended: lost red: its connection closed" in err, err
+    content = last_json(out)
+    assert content["reason"] == "lost red: its connection closed"
+    assert content["failed"]
+    (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
+    journals = {path.name for path in (run / "journals").iterdir()}
+    assert journals >= {"supervisor-000001.journal", "vhub-000001.journal"}
+    assert_finished(house, content)
+    assert house.processes_with(str(house.folder)) == {}
 
 
 def free_port() -> int:

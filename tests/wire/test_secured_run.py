@@ -12,7 +12,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor import control, pki
 from foosim.supervisor.control import Control
 from foosim.vhub.capture_reader import open_capture
-from tests.wire.conftest import House
+from tests.wire.conftest import LIMIT_S, House
 from tests.wire.test_run import last_json
 
 CLIENTS = ("--set", "clients={hand: {}}", "--set", "players={}")
@@ -30,20 +30,20 @@ def test_a_run_with_certificates_lets_in_who_is_known(house: House) -> None:
     stranger = house.folder / "stranger"
     pki.init(stranger)
     pki.issue(stranger, ["node.red"])
-    running = house.up("--pki", folder, "--no-capture", *CLIENTS)
+    running = house.up("--pki", folder, "--engine", "pure", "--no-capture", *CLIENTS)
     house.ticking()
     info = house.info()
     assert info.simulation.startswith("tls/127.0.0.1:") and info.radio.startswith("tls/127.0.0.1:")
     assert control.push((0.01, 0.0, 0.0)).accepted, "the operator's certificate is found by the run file"
-    with connect(info.radio, "hand", pki=folder) as client:
+    with connect(info.radio, "hand", pki=folder, timeout_s=LIMIT_S) as client:
         client.subscribe("camera", "ball")
         client.listen()
-        assert client.receive(100.0)
+        assert client.receive(LIMIT_S)
     code, _, error = house.run("foosim-node", "--name", "red", "--connect", info.simulation, "--pki", stranger)
     assert code == 3 and "its certificate is not accepted here" in error
     code, _, error = house.run("foosim-node", "--name", "red", "--connect", info.simulation)
     assert code == 2 and "needs certificates: say where they are by --pki DIR" in error
-    code, _, error = house.run("foosim-node", "--name", "green", "--connect", info.simulation, "--pki", folder)
+    code, _, error = house.ask("foosim-node", "--name", "green", "--connect", info.simulation, "--pki", folder)
     assert code == 3 and "has no certificate of node.green; it has: client.hand, node.blue" in error
     control.down()
     code, output, _ = house.end(running)
@@ -101,7 +101,8 @@ def assert_it_is_stopped_and_started_from_another_terminal(house: House, desk: C
     house.wait_for("red to be gone", lambda: not house.processes_with("--name red"))
     status = desk.status()
     assert status["processes"]["red"]["stopped"] and status["nodes"]["red"]["owned"] == []
-    assert house.ask("foosim-supervisor", "start", "red")[0] == 0
+    code, _, err = house.ask("foosim-supervisor", "start", "red")
+    assert code == 0, err
     house.wait_for("red to come back", lambda: went_on(desk, "join red", times=3))
     assert desk.status()["nodes"]["red"]["owned"] != []
     assert house.ask("foosim-supervisor", "stop", "rde")[0] == 3
