@@ -97,7 +97,7 @@ class HubCore:
         self.speak: Callable[[int], int] = lambda now_ns: now_ns
         """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
-        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self.repeated = 0
+        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self.repeated = self.disk_progress = 0
         self._epoch_payload = b""
         self._owners: dict[str, str] = {}
         self.waits = Waits()
