@@ -55,7 +55,7 @@ def test_a_node_is_stopped_and_started_from_another_terminal(house: House) -> No
         house.wait_for("red to be gone", lambda: not house.processes_with("--name red"))
         status = control.status()
         assert status["processes"]["red"]["stopped"] and status["nodes"]["red"]["owned"] == []
-        assert house.run("foosim-supervisor", "start", "red")[0] == 0
+        assert house.ask("foosim-supervisor", "start", "red")[0] == 0
         house.wait_for("red to come back", lambda: came(control, "red", 1))
         assert control.status()["nodes"]["red"]["owned"] != []
     assert house.ask("foosim-supervisor", "stop", "rde")[0] == 3
