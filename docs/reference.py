@@ -65,7 +65,11 @@ DEADLINES: Final[Mapping[str, tuple[str, str]]] = {
         "vHub",
         "a client whose connection has closed; then it is lost, unless the time for its answer ends later",
     ),
-    "close": ("supervisor", "progress of the vHub in closing its capture; then the capture is cut off"),
+    "close": (
+        "supervisor",
+        "progress of the vHub in closing its capture; then the capture is cut off; while the run goes on, a vHub that "
+        "waits for the disk of its capture; then it is lost",
+    ),
 }
 """Who waits how long for what: the deadlines of a deployment."""
 CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {

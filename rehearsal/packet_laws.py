@@ -219,8 +219,8 @@ class PacketLaws:
 
     @staticmethod
     def account(state: HubState) -> None:
-        """Law 5: offered = delivered + dropped + in flight, in all and for every link."""
-        packets, flying = state.packets, state.in_flight()
+        """Law 5: offered = delivered + dropped + in flight, in all and for every link; copies are in none of these."""
+        packets, flying = state.packets, [flight for flight in state.in_flight() if flight.copy == 0]
         hold(packets.in_flight == len(flying), f"{packets.in_flight} packets in flight, there are {len(flying)}")
         links = list(state.fabric.states.values())
         total = sum(link.offered for link in links), sum(link.delivered for link in links)
@@ -228,16 +228,19 @@ class PacketLaws:
         hold(all(link.offered >= link.delivered + link.dropped for link in links), "a link has more fates than packets")
 
     def end(self, system: System) -> None:
-        """Every packet that was offered has its fate, and every downlink has come."""
+        """Every packet that was offered has its fate, so has every copy, and every downlink has come."""
         state = system.hub.state
         assert state is not None
         self.account(state)
         hold(state.packets.refused == 0, f"lockstep clients repeat nothing, {state.refusals} were refused")
         counted = {DELIVERED: 0, DROPPED: 0, IN_FLIGHT: 0}
-        for _, cause in self._fates.values():
+        fates = {key: cause for key, (_, cause) in self._fates.items() if key[3] == 0}
+        for cause in fates.values():
             counted[DELIVERED if not cause else IN_FLIGHT if cause == IN_FLIGHT else DROPPED] += 1
         packets = state.packets
-        by_link = Counter((source, to) for (source, to, _, _), (_, cause) in self._fates.items() if cause not in OPEN)
+        copies = len(self._fates) - len(fates)
+        hold(copies == packets.copies, f"{copies} copies have a fate, {packets.copies} were made")
+        by_link = Counter((source, to) for (source, to, _, _), cause in fates.items() if cause not in OPEN)
         dropped: Counter[tuple[str, str]] = Counter()
         for (source, destination, _), link in state.fabric.states.items():
             if link.dropped:

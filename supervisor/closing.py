@@ -1,6 +1,7 @@
 """When a run that has ended is over: once its vHub has closed the capture, which may take as long as it goes on.
 
-The account of the capture in the vHub's heartbeats shows whether it does. One that stands still for
+The account of the capture in the vHub's heartbeats shows whether it does, and what the disk does while the file is
+brought to it. One that stands still for
 `deadlines.close`, or whose vHub ends meanwhile, is cut off: an error, though the run itself may have been in order.
 Neighbours: `core` asks, `status` has the result, `vhub.closing` is the other side.
 """
@@ -39,7 +40,7 @@ class Closing:
         hub, deadlines = core.roster.by_name.get(VHUB), core.deployment.deadlines
         if hub is None or hub.farewell:
             return True
-        account = hub.report.get("recording")
+        account = hub.report.get("recording"), hub.report.get("disk_progress")
         if account != self._account:
             self._account, self._moved_ns = account, now_ns
         if hub.gone_ns and now_ns > hub.gone_ns + GONE_NS and not hub.in_doubt:

@@ -1,11 +1,13 @@
 """Players whose process was lost: the vHub waits for them or goes on without them, and the account says so.
 
-The vHub tells in its heartbeats who is away, and what is over of it, numbered. Neighbours: `vhub.absences` tells,
+The vHub tells in its heartbeats who is away, and what is over of it, numbered; one that is started again tells from its
+journal what the one before did. Neighbours: `vhub.absences` tells,
 `recovery` has the account, `absence` is the same of the vHub itself.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from foosim.supervisor.account import Recovered
@@ -24,8 +26,8 @@ class Departures:
         """The start of the vHub that has told last."""
         self._heard = 0
         """The number of what it told last."""
-        self._known: set[tuple[str, str, str, int]] = set()
-        """What the account had when this supervisor heard of the vHub first: a supervisor before it has noted that."""
+        self._known: Counter[tuple[str, str, str, int]] = Counter()
+        """What the account had when this supervisor heard of this start of the vHub first: it tells that once more."""
         self._gaps_ns: dict[str, int] = {}
         """Of those that are away: the longest time between two commits since."""
         self._open: list[tuple[Recovered, int]] = []
@@ -37,16 +39,20 @@ class Departures:
             return
         if told["boot"] != hub.boot:
             return  # it comes late, of a vHub before this one
-        if not self._boot:
-            self._known = {(entry.what, entry.name, entry.reason, entry.tick) for entry in core.recovery.recovered}
         if hub.boot != self._boot:
             self._boot, self._heard = hub.boot, 0
+            entries = core.recovery.recovered
+            self._known = Counter((entry.what, entry.name, entry.reason, entry.tick) for entry in entries)
         gaps_ns, self._gaps_ns = self._gaps_ns, {name: self._gaps_ns.get(name, 0) for name in told["away"]}
         for number, what, name, reason, tick in told["over"]:
-            if number > self._heard and (what, name, reason, tick) not in self._known:
-                entry = core.recovery.note(what, name, reason, core.epoch, tick)
-                self._open.append((entry, gaps_ns.get(name, 0)))
-            self._heard = max(self._heard, number)
+            if number <= self._heard:
+                continue
+            self._heard = number
+            if self._known[what, name, reason, tick] > 0:
+                self._known[what, name, reason, tick] -= 1
+                continue
+            entry = core.recovery.note(what, name, reason, core.epoch, tick)
+            self._open.append((entry, gaps_ns.get(name, 0)))
 
     def committed(self, before_ns: int, now_ns: int) -> None:
         """A frame is committed, the one before it was at `before_ns`."""

@@ -18,6 +18,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
 from foosim.protocol.standstill import TOLD_NS, told
 from foosim.supervisor.roster import Process, Roster
+from foosim.vhub.closing import CAPTURE
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -209,12 +210,20 @@ class Watch:
         lost_ns = core.beginning.patience_ns(tick, deadlines.tick_lost_ns)
         if names and all(map(self._has_sensed, names)):
             lost_ns = max(lost_ns, CUT_SEEN_NS)
+        if self._waits_for_capture(names):
+            lost_ns = max(lost_ns, deadlines.close_ns)
         if overdue_ns > lost_ns:
             return dict.fromkeys(names, f"tick {tick} is overdue by {overdue_ns / 1e9:.1f} s")
         if overdue_ns > deadlines.tick_named_ns and waited != self._named:
             self._named = waited
             core.say("warning", f"tick {tick} waits for {waited} since {overdue_ns / 1e9:.1f} s")
         return {}
+
+    def _waits_for_capture(self, names: list[str]) -> bool:
+        """Whether the vHub, which alone is waited for, says that it waits for its disk."""
+        hub = self.roster.by_name.get(VHUB)
+        told = None if hub is None else hub.heartbeat
+        return names == [VHUB] and told is not None and told.waiting_for == CAPTURE
 
     def _late_to_start(self, core: SupervisorCore, now_ns: int) -> dict[str, str]:
         """Give local processes and players their time to start; what is started by hand is waited for."""

@@ -119,6 +119,7 @@ SHELLS = {
     "vhub/capture_split.py",
     "vhub/capture_standing.py",
     "vhub/capture_writer.py",
+    "vhub/disk_progress.py",
     "vhub/earlier_crc.py",
     "vhub/main.py",
     "vhub/room_watch.py",

@@ -1,19 +1,23 @@
 """Players that were away and came back, or left the run: what the vHub tells the supervisor for its account.
 
-It is told in every heartbeat, with a number each, since heartbeats may be lost. Neighbours: `door` notes it, `report`
-tells it, `supervisor.departures` takes it.
+It is told in every heartbeat, with a number each, since heartbeats may be lost, and is in the journal before that:
+a vHub that is started again tells it once more. Neighbours: `door` notes it, `report` tells it, `records` has it,
+`supervisor.departures` takes it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, Final
+
+from foosim.vhub.records import AbsencesRecord
 
 TOLD_MAX: Final = 64
 """How many of the last ones are told."""
 
 
 class Absences:
-    """Who is away, and what is over of it, as of this start of the vHub."""
+    """Who is away, and what is over of it."""
 
     def __init__(self) -> None:
         self._away: dict[str, tuple[str, str, int]] = {}
@@ -21,7 +25,24 @@ class Absences:
         self._over: list[tuple[int, str, str, str, int]] = []
         self._count = 0
         self.is_new = False
-        """Whether there is something of which no heartbeat has told."""
+        """Whether there is something that is neither written nor told."""
+
+    def go_on(self, written: AbsencesRecord, here: Collection[str], came: Collection[str], tick: int) -> None:
+        """Go on from what the vHub before wrote. Behind it others may have left the run or come back (`came`), at the
+        tick that it wrote last: `here` are those who take part then."""
+        self._away = {name: (boot, reason, went) for name, boot, reason, went in written.away}
+        self._over = [(number, *line) for number, line in enumerate(written.over, 1)]
+        self._count = len(self._over)
+        for name in sorted(self._away.keys() - here):
+            self.leave(name, tick)
+        for name in sorted(came):
+            if not any((what, who, at) == ("return", name, tick) for _, what, who, _, at in self._over):
+                self.come_back(name, tick)
+
+    def record(self) -> AbsencesRecord:
+        """Return it as it is written down."""
+        away = [(name, *about) for name, about in sorted(self._away.items())]
+        return AbsencesRecord(away, [(what, name, reason, tick) for _, what, name, reason, tick in self._over])
 
     def begin(self, name: str, boot: str, reason: str, tick: int) -> None:
         """A player's process, which was started as `boot`, is away, and waited for."""
@@ -32,6 +53,7 @@ class Absences:
         """A player is here again before it was given up; where it is the same process, only its connection was cut."""
         if name in self._away:
             before, reason, tick = self._away.pop(name)
+            self.is_new = True
             if before != boot:
                 self._note("player", name, reason, tick)
 

@@ -164,6 +164,7 @@ class CaptureFile:
         self._reserve = capture.reserve_bytes
         self._bytes_max = capture.bytes_max
         self._split = Split(path, capture, self._plan.tick_ns) if capture.is_split else None
+        self.is_syncing = False
         self._swap = threading.Lock()
         """Held while another file takes the place of the one that is written, or this one is brought to the disk."""
         self._known: Frame | None = None
@@ -297,7 +298,11 @@ class CaptureFile:
     def sync(self) -> None:
         """Bring to the disk what was written."""
         with self._swap:
-            os.fdatasync(self._file)
+            self.is_syncing = True
+            try:
+                os.fdatasync(self._file)
+            finally:
+                self.is_syncing = False
 
     def close(self) -> None:
         """Let go of the file, as it is."""

@@ -34,6 +34,8 @@ GATHER_S: Final = 0.02
 BATCH_ROWS: Final = 2_000
 """How many rows are written between two looks at the clock."""
 SYNC_NS: Final = 1_000_000_000
+WAIT_S: Final = 0.1
+"""How often whoever waits for a full queue is told so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +116,8 @@ class CaptureWriter:
         """Whether nothing is written any more."""
         self.on_end: Callable[[], None] = lambda: None
         """Called then, in the thread that wrote."""
+        self.while_waiting: Callable[[], None] = lambda: None
+        """Called again and again while `keep` or `log` waits, in the thread that does."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
         self._syncer = _Syncer(self._file)
         self._thread.start()
@@ -147,6 +151,11 @@ class CaptureWriter:
         """Whether nothing comes any more, and what came is still being written."""
         return self._is_over and not self.has_ended
 
+    @property
+    def is_syncing(self) -> bool:
+        """Whether a call of the system brings the file to the disk at this moment."""
+        return self._file.is_syncing
+
     def leave(self) -> None:
         """Write what waits and let go of the file without an end: whoever has its journal can go on with it.
 
@@ -178,16 +187,24 @@ class CaptureWriter:
             first = full and self._waits == 1
         if first:
             self._say("warning", f"the run waits for its capture {self.path}: {self._queued_rows} rows are queued")
+        while not self._takes(item, rows):
+            self.while_waiting()
+        self._raise_error()
+
+    def _takes(self, item: Item, rows: int) -> bool:
+        """Queue an item, which may take a wait; return False when it took too long."""
         with self._changed:
-            while self._is_full(rows) and self._error is None:
-                self._changed.wait()
+            if self._is_full(rows) and self._error is None:
+                self._changed.wait(WAIT_S)
+            if self._is_full(rows) and self._error is None:
+                return False
             self._queue.append(item)
             self._queued_rows += rows
             self._offered += rows
             if self._idle:
                 self._idle = False
                 self._changed.notify_all()
-        self._raise_error()
+            return True
 
     def _is_full(self, rows: int) -> bool:
         """A single closing larger than the queue goes in alone."""

@@ -97,7 +97,7 @@ class HubCore:
         self.speak: Callable[[int], int] = lambda now_ns: now_ns
         """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
-        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self.repeated = 0
+        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self.repeated = self.disk_progress = 0
         self._epoch_payload = b""
         self._owners: dict[str, str] = {}
         self.waits = Waits()
@@ -319,7 +319,7 @@ class HubCore:
         assert layout is not None
         added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
         chain = self.commits.chain_at(self.state.closed)
-        where = commit, self._epoch_payload, self.capture_file, chain, self.footing.machine
+        where = commit, self._epoch_payload, self.capture_file, chain, self.footing.machine, self.door.absences.record()
         return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added, *where))
 
     def _release(self, now_ns: int) -> None:
@@ -371,7 +371,7 @@ class HubCore:
         self.commits.start(past.layout, state.closed + 1, past.chain, past.committed)
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
-        self.door.go_on(past.inputs, now_ns)
+        self.door.go_on(past.inputs, past.absences, now_ns)
         self.actions += past.words()
         if past.epoch is not None:
             self._take_epoch(past.epoch)

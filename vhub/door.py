@@ -8,6 +8,7 @@ Neighbours: `core` closes the ticks, `sessions` has the clients.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from foosim.protocol import limits
@@ -22,7 +23,7 @@ from foosim.vhub.absences import Absences
 from foosim.vhub.members import Member, may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
-from foosim.vhub.records import Closing, InputsRecord
+from foosim.vhub.records import AbsencesRecord, Closing, InputsRecord
 from foosim.vhub.sessions import Session
 from foosim.vhub.state import HubState
 
@@ -43,14 +44,18 @@ class Door:
         self.absences = Absences()
         self._looked_ns = 0
 
-    def go_on(self, written: InputsRecord | None, now_ns: int) -> None:
-        """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick."""
+    def go_on(self, written: InputsRecord | None, absences: AbsencesRecord, now_ns: int) -> None:
+        """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick, and
+        `absences` which players it knew to be away."""
         core = self._core
         assert core.state is not None and core.deployment is not None
         self.written = written
-        here = {name for name, member in core.state.members.items() if member.active}
+        members, came = core.state.members, set()
+        here = {name for name, member in members.items() if member.active}
         if written is not None:
+            came = {joining.name for joining in written.joins if _is_return(joining, members)}
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
+        self.absences.go_on(absences, here, came, core.state.closed if written is None else written.tick)
         core.sessions.expect(here, self._start_ns, now_ns)  # theirs may have ended as well, and be started again
 
     def _known(self, name: str) -> Member | Joining | None:
@@ -80,7 +85,7 @@ class Door:
             for name in leaves:
                 self.absences.leave(name, tick)
             for joining in joins:
-                if joining.period and joining.name in members and not members[joining.name].active:
+                if _is_return(joining, members):
                     self.absences.come_back(joining.name, tick)
             self.tell()
         return joins, leaves
@@ -239,6 +244,7 @@ class Door:
         """Tell the supervisor at once of whoever has gone or come, when that is written: a run may end soon."""
         if self.absences.is_new:
             self.absences.is_new = False
+            self._core.actions.append(Journal(encode(self.absences.record())))
             self._core.say_heartbeat()
 
     def _back_ns(self, name: str) -> int:
@@ -357,6 +363,11 @@ class Door:
         core.sessions.leave(name)
         if self._known(name) is not None:
             self._leaves.append(name)
+
+
+def _is_return(joining: Joining, members: Mapping[str, Member]) -> bool:
+    """Whether a lockstep client that joins took part before, and had left."""
+    return joining.period > 0 and joining.name in members and not members[joining.name].active
 
 
 def _is_member(known: Member | Joining, join: Join) -> bool:

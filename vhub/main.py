@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from msgspec.structs import replace
 
 from foosim.protocol import channels, limits, wall
 from foosim.protocol.access import access_to
@@ -25,6 +26,7 @@ from foosim.protocol.addresses import LOOPBACK, Address, check_listen, parse_add
 from foosim.protocol.admission import Admission
 from foosim.protocol.certificates import Credentials, check_host, load_credentials, passwords_file, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
+from foosim.protocol.codec import encode
 from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Level
@@ -51,7 +53,7 @@ from foosim.protocol.session_settings import Security
 from foosim.vhub.capture_file import check_new, ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.closing import ClosingCore
+from foosim.vhub.closing import CAPTURE, ClosingCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.link_models import check_link_models
@@ -227,9 +229,16 @@ class HubProcess:
         """Say what gets little, and end the run while what is left to be written still fits."""
         core = self.core
         core.actions += [Say(level, text) for level, text in room.look(now_ns)]
-        core.recording = room.recording
+        core.recording, core.disk_progress = room.recording, room.disk_progress(now_ns)
         if room.ends is not None and not core.lost and not core.finished:
             core.lose(*room.ends)
+
+    def _wait_for_capture(self) -> None:
+        """Say that the vHub lives, and what it waits for, while the capture's full queue holds up the loop."""
+        core = self.core
+        if self._room is not None:
+            core.recording = self._room.recording
+        self._wire.put(channels.HEARTBEAT, VHUB, encode(replace(core.heartbeat(), waiting_for=CAPTURE)))
 
     def _on_unwritten(self, error: JournalError) -> None:
         """The journal has failed: nothing is said any more that would have to be in it, and the run ends.
@@ -316,6 +325,7 @@ class HubProcess:
         }
         described = build.deployment_name, build.deployment, metadata, self._say
         self._capture = CaptureWriter(path, deployment, *described, first_tick_of(records), end_of(deployment, records))
+        self._capture.while_waiting = self._wait_for_capture
         return self._capture.begun_with
 
     def _listen(self, deployment: Deployment) -> None:

@@ -3,13 +3,14 @@
 A fold of the records through the same state gives frames, fates, what is in flight and the next deliveries again, byte
 for byte. The first record of a file holds the whole state, so that older files can go; such a head also stands between
 the ticks now and then, so that a fold need not begin far back. Beside them are the epochs, and who joins and leaves at
-a tick whose Go is said before its record is written. Neighbours: `state`, `core`, `resume`.
+a tick whose Go is said before its record is written; and which players are away. Neighbours: `state`, `core`, `resume`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 import msgspec
 
@@ -24,6 +25,19 @@ from foosim.protocol.start import first_chain
 from foosim.vhub.memory import Age, Joining
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState
+
+
+class AbsencesRecord(msgspec.Struct, frozen=True, array_like=True, tag="absences", forbid_unknown_fields=True):
+    """Which players are away, and what is over of it, for the run's account: no closing depends on it.
+
+    `away` has name, process, reason and tick, `over` what, name, reason and tick, as in `absences`.
+    """
+
+    away: list[tuple[str, str, str, int]]
+    over: list[tuple[str, str, str, int]]
+
+
+NONE_AWAY: Final = AbsencesRecord([], [])
 
 
 class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
@@ -43,6 +57,7 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     """Over the frames up to that of the last closed tick."""
     machine: str = ""
     """The start of the machine on which it was written: what came last of one before may not have reached the disk."""
+    absences: AbsencesRecord = NONE_AWAY
 
 
 def first_head(build: Build, deployment: Deployment, capture: str) -> bytes:
@@ -79,7 +94,7 @@ class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbi
     owing: list[str] = []
 
 
-HubRecord = HeadRecord | TickRecord | InputsRecord | Epoch
+HubRecord = HeadRecord | TickRecord | InputsRecord | AbsencesRecord | Epoch
 
 
 @dataclass(slots=True)
@@ -175,7 +190,8 @@ class Folded:
 class Fold:
     """Computes again what the records of a journal, the first of which is a head, are about.
 
-    Iterating gives each closing; `state`, `layout`, `commit`, `epoch` and `inputs` are then those behind it. Raises
+    Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then those behind
+    it. Raises
     Malformed when the records are not those of one run of this version.
     """
 
@@ -190,7 +206,7 @@ class Fold:
         self.commit = head.commit
         self.epoch = head.epoch
         self.chain = head.chain
-        self.machine = head.machine
+        self.machine, self.absences = head.machine, head.absences
         self.inputs: InputsRecord | None = None
         """Who joins and leaves at the tick behind the last closed one, where that was written."""
 
@@ -204,8 +220,10 @@ class Fold:
             elif isinstance(record, Epoch):
                 self.epoch = raw
                 self.state.turn_to(record)
+            elif isinstance(record, AbsencesRecord):
+                self.absences = record
             else:
-                self.machine = record.machine
+                self.machine, self.absences = record.machine, record.absences
 
     def _close(self, record: TickRecord) -> Folded:
         state = self.state

@@ -94,6 +94,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
             "lateness_ms": lateness.as_json() if lateness is not None and lateness.count else None,
             "capture": core.capture,
             "recording": core.recording,
+            "disk_progress": core.disk_progress,
             "radio_address": core.radio_address,
         }
     )

@@ -22,7 +22,17 @@ from foosim.vhub.commits import Committed
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.naming import in_branch
 from foosim.vhub.packet import received
-from foosim.vhub.records import Closing, Fold, Folded, HeadRecord, HubRecord, InputsRecord, TickRecord
+from foosim.vhub.records import (
+    NONE_AWAY,
+    AbsencesRecord,
+    Closing,
+    Fold,
+    Folded,
+    HeadRecord,
+    HubRecord,
+    InputsRecord,
+    TickRecord,
+)
 from foosim.vhub.state import HubState
 
 
@@ -47,6 +57,7 @@ class Past:
     """The start of the machine that the journal names."""
     epoch: Epoch | None = None
     inputs: InputsRecord | None = None
+    absences: AbsencesRecord = NONE_AWAY
     sent: dict[int, bytes] = field(default_factory=dict)
     """Deliveries by tick, as they were published or as others take them to be."""
     published: bytes = b""
@@ -100,6 +111,7 @@ def recall(
             raise Malformed(f"the capture has tick {captured.tick}, its journal ends at {fold.state.closed}")
         past.kept = list(_untold(found, closings, captured.epoch))
     past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
+    past.absences = fold.absences
     _name_branch(past)
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
     frame = _frame(fold)

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from foosim.protocol.disk import Level, room_on_disk
 from foosim.vhub.capture_writer import CaptureState, CaptureWriter
+from foosim.vhub.disk_progress import DiskProgress
 
 LOOK_NS: Final = 1_000_000_000
 """How often the disk of the journal is looked at."""
@@ -31,6 +32,7 @@ class RoomWatch:
         self._level = Level.FINE
         self._journal_level = Level.FINE
         self._look_ns = 0
+        self._disk = None if capture is None else DiskProgress(capture.path)
 
     def look(self, now_ns: int) -> list[tuple[str, str]]:
         """Return what is new for people, as (level, text)."""
@@ -67,6 +69,12 @@ class RoomWatch:
             return [("warning", f"room gets little, at the reserve the run ends: {self._journals}: {room}")]
         self.ends = ("room for the journal", f"{self._journals}: {room}")
         return []
+
+    def disk_progress(self, now_ns: int) -> int:
+        """Return a number that changes as long as the disk goes on with the capture that is brought to it."""
+        if self._capture is None or self._disk is None:
+            return 0
+        return self._disk.look(self._capture.is_syncing, now_ns)
 
     @property
     def recording(self) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify_capture
 from foosim.rehearsal.whatif import what_if
 from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.records import HubRecord, InputsRecord, TickRecord, fold
+from foosim.vhub.records import AbsencesRecord, HubRecord, InputsRecord, TickRecord, fold
 from foosim.vhub.rows import CLIENTS, ClientRow
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -112,6 +112,41 @@ def test_a_vhub_that_dies_before_the_record_gives_the_player_its_time_again(tmp_
         run.check()
         (_, left, back) = run.comings()
         assert (left[1], back[1]) == ("leaves_owing", "joins") and left[0] < back[0]
+
+
+@pytest.mark.parametrize(
+    ("pace", "line"), [("fast", 0), ("fast", 1), ("realtime", 0), ("realtime", 1), ("realtime", 2), ("realtime", -1)]
+)
+def test_a_line_of_the_account_outlives_the_vhub_that_was_to_tell_it(tmp_path: Path, pace: str, line: int) -> None:
+    """The vHub dies at the record of an absence, when that is written and nothing is said of it; or (-1), of the tick
+    at which a player leaves, when the record of the tick alone is written."""
+
+    def also(system: System) -> None:
+        written, ends = 0, system.settings.on_journal
+        assert ends is not None
+
+        def look(name: str, raw: bytes) -> None:
+            nonlocal written
+            ends(name, raw)
+            record = None if name != "vhub" else decode_any(HubRecord, raw)
+            leaves = isinstance(record, TickRecord) and bool(record.owing)
+            written += isinstance(record, AbsencesRecord)
+            if (leaves and line < 0) or (isinstance(record, AbsencesRecord) and written == line + 1):
+                system.kill_hub("now", 50 * MS)
+
+        system.settings.on_journal = look
+
+    run = Run(tmp_path / "run.mcap", pace, 500, *SOON, also=also)
+    run.check()
+    (lost, *came), again = (
+        [entry for entry in run.json["recoveries"] if (entry["what"] == "vhub") == is_hub] for is_hub in (False, True)
+    )
+    assert len(again) == 1
+    (_, *events) = run.comings()
+    on = "; the run goes on without it" if pace == "realtime" else ""
+    assert (lost["what"], lost["name"], lost["reason"]) == ("player", RED, f"its connection closed{on}")
+    assert [(entry["what"], entry["name"]) for entry in came] == ([("return", RED)] if on else [])
+    assert [entry["tick"] for entry in (lost, *came)] == ([tick for tick, _ in events] if on else [lost["tick"]])
 
 
 @pytest.mark.parametrize(

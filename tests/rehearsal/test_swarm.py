@@ -47,6 +47,17 @@ def test_the_laws_hold_under_random_faults_and_a_seed_flies_equally_each_time() 
     assert asdict(fly(TABLE.read_text(), TABLE.name, lost["seed"])) == lost
 
 
+def test_the_laws_hold_where_links_make_copies() -> None:
+    """Which are in no account but one of their own. Questions for echoes are not doubled: each comes back once."""
+    text, rules = TABLE.read_text(), "\n  links:"
+    assert text.count(rules) == 1
+    doubled = "{id: doubled, from: '*', to: '*', channels: [ball, encoder, position], delay: 3 ms, duplicate: 20 %}"
+    before, _, behind = text.partition(rules)
+    comment, _, rest = behind.partition("\n")
+    flown = fly(f"{before}{rules}{comment}\n    - {doubled}\n{rest}", TABLE.name, 1001)
+    assert flown.broken == "" and flown.ticks == TICKS
+
+
 def test_a_seed_is_a_plan() -> None:
     assert plan_of(7) != plan_of(8)
     for seed in range(200):

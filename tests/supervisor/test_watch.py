@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
+from msgspec.structs import replace
 
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
@@ -23,6 +24,7 @@ from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.status import status
 from foosim.supervisor.watch import Watch, _names
+from foosim.vhub.closing import CAPTURE
 from foosim.vhub.core import HubCore
 from foosim.vhub.waits import Waits
 
@@ -303,6 +305,31 @@ def test_a_vhub_whose_presence_ends_and_that_is_heard_later_is_back() -> None:
     assert entry["tick"] >= 60 and entry["epoch"] == 1 and entry["outage_ms"] is not None
     assert any(line.startswith("lost the vHub: its connection closed; the run waits for it") for line in seen.lines)
     assert any(line.startswith("the vHub is back after 0.") for line in seen.lines)
+
+
+@pytest.mark.parametrize(("waits_s", "lost"), [(5, False), (40, True)])
+def test_a_vhub_that_waits_for_its_capture_is_not_taken_for_dead(waits_s: int, lost: bool) -> None:
+    """Its loop stands still, as a full queue makes it, and it says what it waits for: it has `deadlines.close`."""
+    seen = Seen(ticks=200, sets=("deadlines.vhub_back=1 h",))
+
+    def prepare(system: System) -> None:
+        def stand() -> None:
+            told = encode(replace(system.hub.heartbeat(), waiting_for=CAPTURE))
+
+            def say() -> None:
+                system.supervisor.receive(channels.HEARTBEAT, VHUB, told, system.now_of(SUPERVISOR))
+
+            for number in range(10 * waits_s):
+                system.later(number * 100 * MS, say)
+            system.pause(VHUB, waits_s * 1000 * MS)
+
+        system.at_tick(60, stand)
+
+    seen.prepare = prepare
+    seen.go()
+    assert seen.result["reason"] == "done"
+    reasons = [entry["reason"] for entry in seen.result["recoveries"] if entry["what"] == "vhub"]
+    assert [re.sub(r"[0-9.]+ s", "", reason) for reason in reasons] == (["tick 61 is overdue by "] if lost else [])
 
 
 def never_there(absent: str, sets: Sequence[str] = ()) -> Seen:

@@ -16,10 +16,11 @@ import zstandard
 
 from foosim.protocol import limits
 from foosim.protocol.errors import Refused
-from foosim.vhub import capture_file
+from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.disk_progress import DiskProgress
 from foosim.vhub.mcap_file import CHUNK_BYTES_MAX
 from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.rows import CaptureError
@@ -205,6 +206,59 @@ def test_a_lagging_writer_slows_the_run_says_so_once_and_loses_nothing(
     assert said[0][1].startswith(f"the run waits for its capture {path}: ")
     capture = open_capture(path)
     assert len(capture.ticks) == 65 and len(capture.packets) == hub_run.core.statistics().offered
+
+
+def test_who_waits_for_a_full_queue_is_told_so_again_and_again(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So a vHub can say meanwhile that it lives."""
+    monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 30)
+    monkeypatch.setattr(capture_writer, "WAIT_S", 1e-4)
+    Gated.gate.clear()
+    told = 0
+
+    def wait() -> None:
+        nonlocal told
+        told += 1
+        if told == 3:
+            Gated.gate.set()
+
+    writer = Gated(tmp_path / "slow.mcap", hub_run.deployment, "table.yaml", hub_run.text, {})
+    writer.while_waiting = wait
+    for closing in hub_run.closings:
+        writer.keep(closing)
+    writer.finish()
+    assert told >= 3 and len(open_capture(writer.path).ticks) == 65
+
+
+def test_the_disk_is_asked_for_its_progress_while_a_sync_lasts(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, goes_on, sync = threading.Event(), threading.Event(), os.fdatasync
+
+    def slow(file: int) -> None:
+        begun.set()
+        goes_on.wait()
+        sync(file)
+
+    writer = CaptureWriter(tmp_path / "slow.mcap", hub_run.deployment, "table.yaml", hub_run.text, {})
+    device = writer.path.stat().st_dev
+    account = tmp_path / f"{os.major(device)}:{os.minor(device)}" / "stat"
+    account.parent.mkdir()
+    disk = DiskProgress(writer.path, tmp_path)
+    monkeypatch.setattr(os, "fdatasync", slow)
+    writer.begin_finish({})
+    begun.wait()
+    assert writer.is_syncing and writer.is_closing
+    counted = [disk.look(True, now_ns) for now_ns in (0, 5 * 10**8, 10**9, 2 * 10**9)]
+    assert counted == [1, 1, 2, 3], "the kernel does not tell"
+    for written in (8, 8, 16):
+        account.write_text(f"1 0 8 0 2 0 {written} 0 1 0 0\n", "ascii")
+        assert disk.look(True, 3 * 10**9) == 2 + written
+    assert disk.look(False, 3 * 10**9) == 0
+    goes_on.set()
+    writer.finish()
+    assert not writer.is_syncing
 
 
 class Disk:
