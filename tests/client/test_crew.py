@@ -14,6 +14,7 @@ from foosim.client.errors import PlayerError
 from foosim.client.player import Commands, Samples
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
+from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.deployment import Deployment
@@ -139,6 +140,10 @@ def test_one_that_fails_says_who_and_at_which_tick(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Counts, "fails", True)
     with pytest.raises(PlayerError, match=rf"^{BLUE} failed at tick 5: ValueError: too much \(.*raise ValueError"):
         say(crew, channels.DOWN, BLUE, Go(1, 5, 0, []))
+    published = [action for action in crew.actions if isinstance(action, Publish)]
+    said = [decode_any(action.channel.message, action.payload) for action in published]
+    (failure,) = [message for message in said if isinstance(message, Failure)]
+    assert failure.name == BLUE and failure.reason.startswith(f"{BLUE} failed at tick 5: ValueError: too much (")
 
 
 def test_it_is_over_when_the_run_has_ended_for_all() -> None:
