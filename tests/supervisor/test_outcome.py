@@ -21,6 +21,7 @@ from foosim.supervisor.outcome import plan_facts, result_without_supervisor, wit
 from foosim.supervisor.plan import RunOptions, launch_of, make_plan, plan_again
 from foosim.supervisor.run_folder import RunFolder, create_run
 from foosim.supervisor.status import UNFINISHED, status
+from foosim.supervisor.up import Killed, Up
 from foosim.vhub.capture_parts import FOOTER
 from tests.supervisor.conftest import Typed
 
@@ -200,3 +201,25 @@ def test_json_is_one_object_whatever_is_refused(
     content = msgspec.json.decode(line)
     assert done.code == code and content.keys() == run.result.keys()
     assert content["failed"] and content["reason"] == done.err.rstrip("\n")
+
+
+def test_json_is_one_object_also_of_a_run_that_was_killed(
+    typed: Typed, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    def kill(self: Up) -> None:
+        raise Killed("killed", self.unended("killed by a second Ctrl-C"))
+
+    monkeypatch.setattr(Up, "run", kill)
+    done = typed("foosim-supervisor", main)("up", TABLE, "--no-capture", "--json")
+    (line,) = done.out.splitlines()
+    content = msgspec.json.decode(line)
+    assert done.code == 130 and content.keys() == run.result.keys() and done.err.endswith("killed\n")
+    assert content["failed"] and content["reason"] == "killed by a second Ctrl-C"
+
+
+def test_each_tick_of_the_ball_is_somebodys(run: Run) -> None:
+    nodes = run.result["nodes"].values()
+    assert sum(node["ball_ticks"] for node in nodes) == TICKS
+    assert all(node["ball_ticks"] <= node["solved_ticks"] for node in nodes)
