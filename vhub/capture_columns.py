@@ -25,7 +25,7 @@ Objects: TypeAlias = NDArray[np.object_]
 
 @dataclass(frozen=True, slots=True)
 class Packets:
-    """All packets of a capture as columns, in the order in which their fates became final.
+    """All packets of a capture as columns, in the order of the closings that made their fates final, then of sending.
 
     Texts and payloads are object arrays (`packets.source == "camera"` gives a mask), the rest int64. `due_ns` and
     `arrival_tick` are -1 for what was dropped at sending; a word is the 64-bit draw that was used, or None. Where

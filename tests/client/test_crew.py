@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import faulthandler
+import signal
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 
+from foosim.client import main as client_main
 from foosim.client.core import ClientCore
 from foosim.client.crew import Crew
 from foosim.client.errors import PlayerError
 from foosim.client.player import Commands, Samples
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
+from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.deployment import Deployment
@@ -28,6 +33,7 @@ from foosim.protocol.messages import (
     Join,
     Subscription,
 )
+from foosim.protocol.process import STACK_SIGNAL
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 RED, BLUE = "player-red", "player-blue"
@@ -139,6 +145,10 @@ def test_one_that_fails_says_who_and_at_which_tick(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Counts, "fails", True)
     with pytest.raises(PlayerError, match=rf"^{BLUE} failed at tick 5: ValueError: too much \(.*raise ValueError"):
         say(crew, channels.DOWN, BLUE, Go(1, 5, 0, []))
+    published = [action for action in crew.actions if isinstance(action, Publish)]
+    said = [decode_any(action.channel.message, action.payload) for action in published]
+    (failure,) = [message for message in said if isinstance(message, Failure)]
+    assert failure.name == BLUE and failure.reason.startswith(f"{BLUE} failed at tick 5: ValueError: too much (")
 
 
 def test_it_is_over_when_the_run_has_ended_for_all() -> None:
@@ -158,11 +168,28 @@ def test_a_vhub_that_is_gone_is_missed_by_all_and_lost_for_good_in_the_end() -> 
     deployment = crew.cores[0].deployment
     assert deployment is not None
     assert crew.deadline_ns() <= deployment.deadlines.start_ns, "they were told nothing yet"
-    crew.wake(deployment.deadlines.start_ns - 1)
-    assert not crew.is_over
-    crew.actions.clear()
-    crew.wake(deployment.deadlines.start_ns)
-    assert crew.is_over and crew.leave() == FAILED
+    over = []
+    for now_ns in (deployment.deadlines.start_ns - 1, deployment.deadlines.start_ns):
+        crew.actions.clear()
+        crew.wake(now_ns)
+        over.append(crew.is_over)
+    assert over == [False, True] and crew.leave() == FAILED
     assert [action.text for action in crew.actions if isinstance(action, Say)] == [
         f"{name}: lost the vHub" for name in (RED, BLUE)
     ]
+
+
+def test_the_process_shows_its_stack_when_it_is_asked_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = signal.getsignal(STACK_SIGNAL)
+    asked: list[object] = []
+
+    def play(*given: object) -> int:
+        was_registered: object = faulthandler.unregister(STACK_SIGNAL)  # type: ignore[func-returns-value]
+        asked.append(was_registered)
+        return DONE
+
+    monkeypatch.setattr(client_main, "run_players", play)
+    with pytest.raises(typer.Exit):
+        client_main.player([RED], "tcp/127.0.0.1:1")
+    signal.signal(STACK_SIGNAL, before)
+    assert asked == [True]

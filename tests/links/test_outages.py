@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from itertools import groupby
 from math import expm1, log1p, sqrt
+from typing import Final
 
 import pytest
 
@@ -76,7 +77,10 @@ def scale_of(mean: float, alpha: float, top: float) -> float:
     return scale
 
 
-@pytest.mark.parametrize("dwell", [None, ParetoDwell(alpha=1.5, max="400 ms")], ids=["exponential", "Pareto"])
+PARETO: Final = ParetoDwell.model_validate({"alpha": 1.5, "max": "400 ms"})
+
+
+@pytest.mark.parametrize("dwell", [None, PARETO], ids=["exponential", "Pareto"])
 def test_lengths_are_of_their_laws(proof: Proof, dwell: ParetoDwell | None) -> None:
     """The times themselves, one after the other: many more than a flow of packets meets."""
     n, good_ms, bad_ms, top_ms = proof.size(10_000, 100_000), 30.0, 20.0, 400.0

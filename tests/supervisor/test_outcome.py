@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from pathlib import Path
 from typing import Final
@@ -11,16 +12,24 @@ import pytest
 
 from foosim.protocol.actions import Journal as JournalAction
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.codec import decode_any
+from foosim.protocol.command import REFUSED
 from foosim.protocol.errors import Refused
-from foosim.protocol.journal import Journal, journal_files
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.journal import Journal, journal_files, read_records
+from foosim.protocol.messages import End
+from foosim.protocol.session import Session
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.cli import main
+from foosim.supervisor.main import SupervisorProcess
 from foosim.supervisor.main import _history as history_of
 from foosim.supervisor.outcome import plan_facts, result_without_supervisor, with_capture
 from foosim.supervisor.plan import RunOptions, launch_of, make_plan, plan_again
+from foosim.supervisor.records import Record, fold
 from foosim.supervisor.run_folder import RunFolder, create_run
 from foosim.supervisor.status import UNFINISHED, status
+from foosim.supervisor.up import Killed, Up
 from foosim.vhub.capture_parts import FOOTER
 from tests.supervisor.conftest import Typed
 
@@ -200,3 +209,44 @@ def test_json_is_one_object_whatever_is_refused(
     content = msgspec.json.decode(line)
     assert done.code == code and content.keys() == run.result.keys()
     assert content["failed"] and content["reason"] == done.err.rstrip("\n")
+
+
+def test_json_is_one_object_also_of_a_run_that_was_killed(
+    typed: Typed, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    def kill(self: Up) -> None:
+        raise Killed("killed", self.unended("killed by a second Ctrl-C"))
+
+    monkeypatch.setattr(Up, "run", kill)
+    done = typed("foosim-supervisor", main)("up", TABLE, "--no-capture", "--json")
+    (line,) = done.out.splitlines()
+    content = msgspec.json.decode(line)
+    assert done.code == 130 and content.keys() == run.result.keys() and done.err.endswith("killed\n")
+    assert content["failed"] and content["reason"] == "killed by a second Ctrl-C"
+
+
+def test_each_tick_of_the_ball_is_somebodys(run: Run) -> None:
+    nodes = run.result["nodes"].values()
+    assert sum(node["ball_ticks"] for node in nodes) == TICKS
+    assert all(node["ball_ticks"] <= node["solved_ticks"] for node in nodes)
+
+
+def test_of_a_run_that_is_not_gone_on_with_no_result_is_written(left: Left) -> None:
+    """So it can be resumed again."""
+    journal = left.journal(SUPERVISOR)
+    records = [raw for raw in read_records(journal) if not isinstance(decode_any(Record, raw), End)]
+    journal.unlink()
+    plan = make_plan(RunOptions(TABLE, duration="120 ms", sets=("engine=pure",)))
+    thresholds = gc.get_threshold()
+    with Session.router("tcp/127.0.0.1:0") as session, Journal(left.folder.journals, SUPERVISOR) as written:
+        for record in records:
+            written.append(record)
+        history = fold(plan.deployment, iter(records))
+        process = SupervisorProcess(plan, left.folder, session, Inbox(1000), written, history)
+        process.core.finish("lost vhub", failed=True)
+        assert process.run() == REFUSED and process.core.beginning.abandoned == "lost vhub"
+    gc.set_threshold(*thresholds)
+    gc.unfreeze()
+    assert left.folder.result() is None

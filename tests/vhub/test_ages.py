@@ -21,6 +21,7 @@ from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.report import report
 from foosim.vhub.rows import AGES, AgeRow
+from foosim.vhub.state import HubState
 from tests.laws.test_hub_recovery_law import Fault, Seen, fly
 from tests.vhub.conftest import WATCHER, HubRun
 
@@ -75,6 +76,17 @@ def test_it_says_what_delay_and_periods_make_of_it(sets: tuple[str, ...], age_ms
     assert len(ages) == 10, "each team hears its rods and the camera"
 
 
+def test_median_and_99_percent_of_what_differs() -> None:
+    """A player that acts every second tick, of a sensor of every fifth: 1 to 5 ticks, each as often."""
+    systems: list[System] = []
+    sets = delayed("1300 us", "players.player-red.rate=250 Hz")
+    rehearse(TABLE.read_text(), TABLE.name, 100, 1, sets, Settings(), prepare=systems.append)
+    content = decode_json(report(systems[0].hub, is_last=True))
+    (ball,) = [link[9] for link in content["links"] if link[:2] == ["camera", "player-red"]]
+    assert [age[2:] for age in ball] == [[6 * MS, 10 * MS]]
+    assert content["links_in_all"] == sum(link[2] > 0 for link in content["links"]) == len(content["links"])
+
+
 def test_of_a_free_running_client_each_tick_counts_that_admits_its_packets(hub_run: HubRun) -> None:
     """By the records alone: the watcher of the driven hub comes, goes and comes back, and hears some channels."""
     records = [record for raw in hub_run.records if isinstance(record := decode_any(HubRecord, raw), TickRecord)]
@@ -97,6 +109,7 @@ def test_of_a_free_running_client_each_tick_counts_that_admits_its_packets(hub_r
     state = hub_run.core.state
     assert state is not None and expected and sum(sum(counts.values()) for counts in expected.values()) > 5
     assert {(age.source, age.channel): age.counts for age in state.ages.of(WATCHER, state.closed)} == expected
+    assert HubState.restore(hub_run.deployment, state.snapshot()).ages.state() == state.ages.state()
 
 
 def test_a_capture_tells_each_second_and_whatif_and_report_have_it(tmp_path: Path) -> None:

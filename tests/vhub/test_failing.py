@@ -8,24 +8,29 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING
 
 import msgspec
 import pytest
 
 from foosim.protocol import channels, limits
-from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.command import FAILED
+from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, decode_any, decode_json, encode
+from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Failed
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, journal_files
-from foosim.protocol.messages import Build
+from foosim.protocol.messages import Build, End, Heartbeat
 from foosim.protocol.session import Session
+from foosim.vhub import capture_file
 from foosim.vhub.capture_file import CaptureFile, Described
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_parts import end_of, has_end
+from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import UNCLEAN, recover_capture
+from foosim.vhub.closing import CAPTURE
 from foosim.vhub.main import HubOptions, HubProcess
 from foosim.vhub.records import HeadRecord, HubRecord, TickRecord
 from tests.vhub.conftest import NAME
@@ -128,3 +133,36 @@ def test_a_vhub_whose_journal_is_damaged_goes_on_over_nothing(
     found = recover_capture(path, tmp_path / "journals")
     assert found is not None and "its journal cannot be used to its end: " in found.problem
     assert CAPTURED < found.tick == int(told[1]) < LAST
+
+
+def test_a_vhub_that_closes_its_capture_says_meanwhile_how_far_it_is(
+    hub_run: HubRun, plane: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its disk takes the end of the capture only when it has said so three times."""
+    inbox, gate, write, told = Inbox(limits.INBOX_MESSAGES_MAX), Event(), capture_file.write_all, list[str]()
+    monkeypatch.setattr(limits, "DOWNLINK_KEPT_NS", 0)
+
+    def slow(file: int, content: bytes) -> None:
+        gate.wait(60)
+        write(file, content)
+
+    def put(channel: Channel, name: str, payload: bytes) -> None:
+        if channel is channels.HEARTBEAT:
+            beat = decode(Heartbeat, payload)
+            if beat.waiting_for == CAPTURE:
+                told.append(decode_json(beat.report)["recording"]["state"])
+            if len(told) == 3:
+                gate.set()
+
+    def listen(deployment: Deployment) -> Session:
+        monkeypatch.setattr(capture_file, "write_all", slow)
+        inbox.offer((channels.END.key, "supervisor", encode(End(0, "enough", False))))
+        return radio
+
+    with Session.router("tcp/127.0.0.1:0") as radio:
+        hub = HubProcess(plane, listen, inbox, HubOptions(tmp_path / "run.mcap", folder=tmp_path))
+        monkeypatch.setattr(hub._wire, "put", put)
+        build = Build("vhub", hub.core.member.boot, "first", "run-1", NAME, hub_run.text, "fast", [])
+        inbox.offer((channels.BUILD.key, "vhub", encode(build)))
+        assert hub.run() == DONE
+    assert told[:3] == 3 * ["closing"] and open_capture(tmp_path / "run.mcap").about.end["reason"] == "enough"
