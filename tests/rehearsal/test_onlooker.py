@@ -29,10 +29,11 @@ from foosim.rehearsal.replay_command import app as replay_app
 from foosim.rehearsal.settings import AtWork
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
+from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 HANGS_AT: Final = 30
-SETS: Final = ("engine=pure", "substeps=1", "players.player-red.class=tests.rehearsal.test_onlooker:Hangs")
+SETS: Final = ("engine=pure", "substeps=1", *BY_PERIOD, "players.player-red.class=tests.rehearsal.test_onlooker:Hangs")
 
 SHORT: Final = ("deadlines.lockstep_fast=0.1 s", "deadlines.start=1 s")
 

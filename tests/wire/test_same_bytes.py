@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from foosim.rehearsal.rehearse import rehearse
+from foosim.vhub.capture_reader import open_capture
 from tests.replay.test_verify import messages_of
 
 if TYPE_CHECKING:
@@ -48,6 +49,10 @@ def test_processes_say_what_a_rehearsal_says(house: House, monkeypatch: pytest.M
     assert len(found["/tick"]) == len(found["/frame"]) == TICKS + 1
     for topic in sorted(expected):
         assert found[topic] == expected[topic], topic
+    packets = open_capture(capture).packets
     for team in ("red", "blue"):
         assert (real / f"{team}.txt").read_text() == (rehearsed / f"{team}.txt").read_text()
-        assert len((real / f"{team}.txt").read_text().splitlines()) == TICKS // 5
+        asked = [int(line.split()[0]) for line in (real / f"{team}.txt").read_text().splitlines()]
+        balls = (packets.source == "camera") & (packets.destination == f"player-{team}") & (packets.fate == "delivered")
+        assert asked == sorted(set(asked)) and len(asked) > TICKS // 6
+        assert set(packets.where(balls).arrival_tick.tolist()) <= set(asked), "it acts when the ball comes"
