@@ -69,6 +69,8 @@ SMALL: Final[tuple[str, ...]] = (
 """What is computed is the same, with fewer steps to it, and robots are asked for echoes."""
 OF_TABLE: Final[tuple[str, ...]] = ("table.rules.kickoff_delay=20 ms",)
 """The ball of a table rolls from the start."""
+BY_PERIOD: Final[tuple[str, ...]] = ("act=period", "arrivals={}", "rate=100 Hz")
+"""Players that act at arrival do so in the last world; in others they have ticks of their own: both kinds are flown."""
 PATIENT: Final[tuple[str, ...]] = (
     "deadlines.tick_lost=5 s",
     "deadlines.lockstep_fast=24 h",
@@ -218,7 +220,11 @@ class Flown:
 @lru_cache(maxsize=4 * WORLDS)
 def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
     """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
-    of_world = () if load_deployment(text, name).is_hall else OF_TABLE
+    deployment = load_deployment(text, name)
+    of_world = [] if deployment.is_hall else list(OF_TABLE)
+    if seed != WORLDS - 1:
+        acting = [player for player in deployment.players if deployment.arrivals_of(player)]
+        of_world += [f"players.{player}.{what}" for player in acting for what in BY_PERIOD]
     text = with_nodes(text, name, nodes, [f"seed={seed}", *SMALL, *of_world, *PATIENT])
     return text, with_nodes(text, name, 1, ["players={}", "clients={}", "network={}"])
 

@@ -279,6 +279,7 @@ def _judged(
             for (source, _), sent in sorted(offered.clients.items()):
                 admitted.setdefault(source, []).append(sent)
             state.close_clients(frame, admitted, fates)
+            state.final = state.closed + 1  # none ahead: who acts at arrival spoke when the captured network let it
             ages.take(state.aged)
             yield from fates
     ages.take(state.ages.untold(state.closed))

@@ -113,8 +113,8 @@ def _unwritten(planting: Planting) -> None:
 
 @register("refusals are not journalled", "the same id gets the same answer over restarts", 1)
 def _unwritten_refusal(planting: Planting) -> None:
-    def write(self: Any, answer: Any, edits: Any, owners: Any) -> Any:
-        return before(self, answer, edits, owners) if answer.accepted else answer
+    def write(self: Any, answer: Any, *added: Any) -> Any:
+        return before(self, answer, *added) if answer.accepted else answer
 
     before: Any = planting.swap(Requests, "_write", write)
 
@@ -128,9 +128,9 @@ def _each_time(planting: Planting) -> None:
     before: Any = planting.swap(Requests, "take", take)
 
 
-@register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 8)
+@register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 5)
 def _forgotten(planting: Planting) -> None:
-    planting.swap(Requests, "resume", lambda self, edits, answers: None)
+    planting.swap(Requests, "resume", lambda self, *journalled: None)
 
 
 @register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 25)
@@ -200,7 +200,7 @@ def _kept_robots(planting: Planting) -> None:
     before: Any = planting.swap(Recovery, "join", join)
 
 
-@register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 13)
+@register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 1)
 def _unmoved(planting: Planting) -> None:
     planting.swap(Recovery, "moved", lambda self, robot: None)
 
@@ -259,7 +259,7 @@ def _lost_commit(planting: Planting) -> None:
 @register("a loss is told twice", "a commit tells of what is over by it, once", 1)
 def _told_twice(planting: Planting) -> None:
     before: Any = planting.swap(
-        Recovery, "committed", lambda self, before_ns, now_ns: before(self, before_ns, now_ns) and self.recovered[-2:]
+        Recovery, "committed", lambda self, *when: before(self, *when) and self.recovered[-2:]
     )
 
 

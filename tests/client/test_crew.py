@@ -34,6 +34,7 @@ from foosim.protocol.messages import (
     Subscription,
 )
 from foosim.protocol.process import STACK_SIGNAL
+from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 RED, BLUE = "player-red", "player-blue"
@@ -103,7 +104,8 @@ def test_who_gets_a_go_acts_and_nobody_else() -> None:
 
 
 def test_one_that_acts_at_arrival_joins_so_and_acts_at_any_tick_beside_one_that_does_not() -> None:
-    sets = ["players.player-blue.act=arrival", "players.player-blue.arrivals={camera: [ball], 'blue.*': [encoder]}"]
+    arrivals = "{camera: [ball], 'blue.*': [encoder]}"
+    sets = [*BY_PERIOD, "players.player-blue.act=arrival", f"players.player-blue.arrivals={arrivals}"]
     text = apply_sets(TABLE.read_text(), TABLE.name, sets)
     crew = crew_of(RED, BLUE)
     joins = {}

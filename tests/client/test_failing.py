@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from foosim.client.failing import failed
 from foosim.rehearsal.rehearse_command import app
 from foosim.rehearsal.replay_command import app as replay_app
+from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SOURCE = '''
@@ -74,7 +75,8 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_rehearsal_ends_in_order_and_says_where(own: Path, name: str, when: str, what: str, code: str) -> None:
     capture = own / "run.mcap"
     arguments = [str(TABLE), "--for", "0.3 s", "--engine", "pure", "--json", "--capture", str(capture)]
-    ran = CliRunner().invoke(app, [*arguments, "--set", f"players.player-blue.class=own_failing:{name}"])
+    sets = (*BY_PERIOD, f"players.player-blue.class=own_failing:{name}")
+    ran = CliRunner().invoke(app, [*arguments, *(word for text in sets for word in ("--set", text))])
     assert ran.exit_code == 1
     result = json.loads(ran.stdout)  # it has nothing else, whatever players print
     assert result["failed"] and result["ticks"] == (51 if when == "at tick 50" else 0)

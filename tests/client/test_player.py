@@ -21,6 +21,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets
 from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
+from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NAME = "player-red"
@@ -50,7 +51,7 @@ class Scripted:
 def begun(*sets: str, load: Any = lambda path: Scripted) -> PlayerLoop:
     """A loop whose player has joined a run."""
     core = ClientCore(NAME, "one", 0)
-    text = apply_sets(TABLE.read_text(), TABLE.name, sets)
+    text = apply_sets(TABLE.read_text(), TABLE.name, [*BY_PERIOD, *sets])
     welcome = ClientWelcome(NAME, "one", "hub", 0, 0, TABLE.name, text)
     core.receive(channels.CLIENT_WELCOME, NAME, encode(welcome), 0)
     loop = PlayerLoop(core, load)

@@ -55,7 +55,8 @@ def test_the_table_has_eight_rods_a_camera_two_nodes_and_two_players(table: Depl
     assert table.endpoints() == sorted([*rods, "camera", "player-red", "player-blue"])
     for team in TEAMS:
         player = table.players[f"player-{team}"]
-        assert (player.class_, player.rate_hz, player.lockstep) == ("foosim.client.players:Team", Fraction(100), True)
+        assert (player.class_, player.rate_hz, player.lockstep) == ("foosim.client.players:Team", Fraction(50), True)
+        assert (player.act, player.arrivals) == ("arrival", {"camera": ["ball"]})
         assert player.robots == {f"{team}.{line}": ["encoder"] for line in LINE_NAMES} | {"camera": ["ball"]}
         assert player.parameters == {"team": team}
 

@@ -8,6 +8,7 @@ import pytest
 
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import DeploymentError
+from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -39,7 +40,7 @@ def test_who_is_on_board_is_kept_and_clients_too() -> None:
 
 
 def test_a_selector_over_robots_takes_those_that_have_the_channel() -> None:
-    sets = ("players.player-red.hears={'*': [encoder, beacon]}", "players.player-red.robots={}")
+    sets = (*BY_PERIOD, "players.player-red.hears={'*': [encoder, beacon]}", "players.player-red.robots={}")
     deployment = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name)
     heard = deployment.heard_by("player-red")
     assert ("camera", "encoder") not in heard and ("red.goal", "encoder") in heard

@@ -12,6 +12,7 @@ from foosim.rehearsal.system import IDLE_NS_MAX, System
 from foosim.rehearsal.verify import verify_capture
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
+from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 PERIOD: Final = 5
@@ -27,7 +28,7 @@ def test_a_run_that_loses_a_player_is_captured_to_its_last_commit(tmp_path: Path
 
         system.at_tick(60, lose)
 
-    sets = ("engine=pure", "deadlines.lockstep_fast=200 ms")
+    sets = ("engine=pure", "deadlines.lockstep_fast=200 ms", *BY_PERIOD)
     run = rehearse(TABLE.read_text(), TABLE.name, 400, 2, sets, prepare=prepare, capture=path).json
     found = re.fullmatch(
         r"player-red has not answered tick (\d+) for 0.2 s \(deadlines.lockstep_fast\)", run["reason"]

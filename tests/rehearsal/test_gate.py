@@ -23,6 +23,7 @@ def test_a_planted_bug_is_found(mutant: Mutant) -> None:
     """By the seed that is noted; where a change of the faults has made others of the seeds, by one of the first."""
     found = find(mutant.name, [mutant.seed, *range(1, FIRST_SEEDS + 1)])
     assert found.seed >= 0, f"{mutant.rule}: `make swarm-gate ARGS='\"{mutant.name}\"'` looks for a seed that finds it"
+    assert not found.broken.startswith(("TypeError", "AttributeError")), f"the bug itself is broken: {found.broken}"
 
 
 @pytest.mark.parametrize("seed", sorted({mutant.seed for mutant in MUTANTS}))

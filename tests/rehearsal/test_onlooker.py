@@ -31,10 +31,11 @@ from foosim.rehearsal.settings import AtWork
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.plan import RunSettings
 from foosim.vhub.capture_reader import open_capture
+from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 HANGS_AT: Final = 30
-SETS: Final = ("engine=pure", "substeps=1", "players.player-red.class=tests.rehearsal.test_onlooker:Hangs")
+SETS: Final = ("engine=pure", "substeps=1", *BY_PERIOD, "players.player-red.class=tests.rehearsal.test_onlooker:Hangs")
 
 LONG_S: Final = 900
 LONG: Final = f"deadlines={{lockstep_fast: {LONG_S} s, start: {LONG_S} s}}"

@@ -24,11 +24,14 @@ from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.rows import PROFILE
+from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300
 TICK_NS: Final = 2_000_000
 ADDED_AT: Final = 60
+SETS: Final = ("engine=pure", *(text for text in BY_PERIOD if "player-blue" in text))
+"""One player acts at arrival, the other at ticks of its own."""
 
 
 def disturb(system: System) -> None:
@@ -37,7 +40,7 @@ def disturb(system: System) -> None:
 
 
 def capture_to(path: Path, ticks: int = TICKS) -> Path:
-    rehearse(TABLE.read_text(), TABLE.name, ticks, 2, ["engine=pure"], prepare=disturb, capture=path)
+    rehearse(TABLE.read_text(), TABLE.name, ticks, 2, SETS, prepare=disturb, capture=path)
     return path
 
 

@@ -20,6 +20,7 @@ from foosim.rehearsal.whatif_reading import Offers
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.rows import PACKETS, CaptureError, PacketRow
 from tests.replay.conftest import TABLE, TICKS, Done, capture_to, disturb, messages_of, replay, rewritten, with_row
+from tests.turns import BY_PERIOD
 
 NETWORKS: Final = {
     "wire": "links: [{id: w, from: '*', to: '*', delay: 1 ms, jitter: {shape: gamma, sd: 1 ms}, rate: 400 kbit/s,"
@@ -183,7 +184,7 @@ def test_a_broadcast_whose_fate_is_behind_the_end_is_left_out(tmp_path: Path) ->
 
 def test_a_part_is_judged_by_what_it_has(tmp_path: Path) -> None:
     """Who took part before it began takes part; what was sent before that is not judged."""
-    whole, part = captured(tmp_path / "run.mcap", "wifi"), tmp_path / "part.mcap"
+    whole, part = captured(tmp_path / "run.mcap", "wifi", *BY_PERIOD), tmp_path / "part.mcap"
     assert replay("cut", whole, "--from", "0.2 s", "-o", part).code == 0
     found, all_of_it = what_if(open_capture(part)), what_if(open_capture(whole))
     assert found.earlier > 0 and found.packets > all_of_it.packets * 2 // 5

@@ -27,6 +27,7 @@ from foosim.supervisor.watch import Watch, _names
 from foosim.vhub.closing import CAPTURE
 from foosim.vhub.core import HubCore
 from foosim.vhub.waits import Waits
+from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
@@ -59,7 +60,7 @@ class Seen:
             self.system = system
             self.prepare(system)
 
-        sets = ["engine=pure", "on_node_loss=stop", *self.sets]
+        sets = ["engine=pure", "on_node_loss=stop", *BY_PERIOD, *self.sets]
         self.result = rehearse(
             TEXT, TABLE.name, self.ticks, self.nodes, sets, self.settings, pace=self.pace, prepare=prepare
         ).json

@@ -52,6 +52,7 @@ from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.records import Closing, HubRecord, TickRecord
+from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NAME = "table.yaml"
@@ -66,6 +67,7 @@ RECOVERED = {
 }
 """What the commits of these frames tell of."""
 SETS = (
+    *BY_PERIOD,
     "clients={watcher: {lockstep: false}}",
     "network.links=[{id: slow, from: watcher, to: '*', delay: 7 ms},"
     " {id: steady, from: '*', to: red.goal, delay: 1 ms, jitter: {shape: gamma, sd: 1 ms}},"

@@ -23,20 +23,14 @@ from foosim.vhub.report import report
 from foosim.vhub.rows import AGES, AgeRow
 from foosim.vhub.state import HubState
 from tests.laws.test_hub_recovery_law import Fault, Seen, fly
+from tests.turns import BY_PERIOD
 from tests.vhub.conftest import WATCHER, HubRun
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MS: Final = 1_000_000
 TICKS: Final = 620
-PLAYERS: Final = ("player-red", "player-blue")
-LOCKED: Final = (
-    "engine=pure",
-    "table.rules.kickoff_delay=20 ms",
-    "robots.camera.sensors.ball.offset=0 s",
-    *(f"players.{name}.act=period" for name in PLAYERS),
-    *(f"players.{name}.arrivals={{}}" for name in PLAYERS),
-    *(f"players.{name}.rate=100 Hz" for name in PLAYERS),
-)
+QUICK: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms")
+LOCKED: Final = (*QUICK, *BY_PERIOD)
 
 
 def delayed(delay: str, *sets: str) -> tuple[str, ...]:
@@ -85,6 +79,16 @@ def test_median_and_99_percent_of_what_differs() -> None:
     (ball,) = [link[9] for link in content["links"] if link[:2] == ["camera", "player-red"]]
     assert [age[2:] for age in ball] == [[6 * MS, 10 * MS]]
     assert content["links_in_all"] == sum(link[2] > 0 for link in content["links"]) == len(content["links"])
+
+
+def test_the_players_of_the_table_see_the_ball_as_old_as_its_link_makes_it() -> None:
+    """They act when it comes: a tick or two later, and with 6 ms more of delay 6 ms older."""
+    for delay, age_ms in {"1 ms": 2.0, "7 ms": 8.0}.items():
+        ages = told((*QUICK, f"network.links.everything.delay={delay}", "network.links.everything.loss=0 %"))
+        for team in ("red", "blue"):
+            p50_ms, p99_ms = ages[f"player-{team}", "camera ball"]
+            assert p50_ms == age_ms and p99_ms in (age_ms, age_ms + 2.0)
+            assert ages[f"player-{team}", f"{team}.goal encoder"][0] == age_ms
 
 
 def test_of_a_free_running_client_each_tick_counts_that_admits_its_packets(hub_run: HubRun) -> None:

@@ -15,7 +15,6 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.impairments import Impairments
-from foosim.protocol.names import LINE_NAMES
 from foosim.protocol.network import Network
 from foosim.protocol.radios import Radio
 from foosim.vhub.jitter import interpolate_ns, quantiles_ns
@@ -31,6 +30,7 @@ from foosim.vhub.lint import (
     uses_of,
 )
 from foosim.vhub.lint_text import LINES_MAX, meaning_line, start_lines
+from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 APPROXIMATELY: Final = partial(pytest.approx, rel=1e-6)
@@ -253,13 +253,6 @@ def test_means_of_models_of_loss_and_delay() -> None:
 # --- sensors and players in step -------------------------------------------------------------------------------------
 
 STEP: Final = "sensor and player are in step"
-IN_STEP: Final = (
-    "robots.camera.sensors.ball.offset=0 s",
-    *(f"robots.{team}.{line}.sensors.encoder.offset=0 s" for team in ("red", "blue") for line in LINE_NAMES),
-    *(f"players.{name}.act=period" for name in ("player-red", "player-blue")),
-    *(f"players.{name}.arrivals={{}}" for name in ("player-red", "player-blue")),
-    *(f"players.{name}.rate=100 Hz" for name in ("player-red", "player-blue")),
-)
 
 
 @pytest.mark.parametrize(
@@ -277,9 +270,16 @@ IN_STEP: Final = (
 def test_sensor_and_player_in_step_are_told(delay: str, sets: tuple[str, ...], what: str) -> None:
     """What tests/vhub/test_ages.py measures: 10 ms at 1.3 ms and at 7 ms of delay alike."""
     link = f"network.links=[{{id: w, from: '*', to: '*', delay: {delay}}}]"
-    text = apply_sets(TABLE.read_text(), TABLE.name, [*IN_STEP, link, *sets])
+    text = apply_sets(TABLE.read_text(), TABLE.name, [*BY_PERIOD, link, *sets])
     (meaning,) = meanings(load_deployment(text, TABLE.name))
     assert len(meaning.warnings) == bool(what)
     if what:
         (warning,) = meaning.warnings
         assert warning.startswith("player-red and 1 more see camera ball and 8 more channels ") and what in warning
+
+
+@pytest.mark.parametrize("name", ["table", "cluster", "warehouse"])
+def test_of_what_is_shipped_nothing_is_warned(name: str) -> None:
+    path = TABLE.with_stem(name)
+    found = meanings(load_deployment(path.read_text(), path.name))
+    assert found and [warning for meaning in found for warning in meaning.warnings] == []

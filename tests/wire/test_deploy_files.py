@@ -57,7 +57,7 @@ def test_all_files_start_the_same_processes() -> None:
 
 def test_the_processes_run_with_the_arguments_of_their_file(house: House) -> None:
     processes, port, table = from_kubernetes(), free_port(), house.folder / "table.yaml"
-    sets = [LONG, "engine=pure", "pace=fast", "players.player-red.rate=50 Hz"]
+    sets = [LONG, "engine=pure", "pace=fast", "players.player-red.rate=25 Hz"]
     text = apply_sets(house.table.read_text(), "table.yaml", sets)
     table.write_text(text)
     places = {

@@ -9,6 +9,7 @@ import pytest
 
 from foosim.protocol.units import parse_pace
 from foosim.rehearsal.rehearse import rehearse
+from foosim.vhub.capture_reader import open_capture
 from tests.replay.test_verify import messages_of
 from tests.wire.test_run import assert_finished, last_json
 
@@ -55,9 +56,13 @@ def test_processes_say_what_a_rehearsal_says(house: House, monkeypatch: pytest.M
     assert len(found["/tick"]) == len(found["/frame"]) == TICKS + 1
     for topic in sorted(expected):
         assert found[topic] == expected[topic], topic
+    packets = open_capture(capture).packets
     for team in ("red", "blue"):
         assert (real / f"{team}.txt").read_text() == (rehearsed / f"{team}.txt").read_text()
-        assert len((real / f"{team}.txt").read_text().splitlines()) == TICKS // 5
+        asked = [int(line.split()[0]) for line in (real / f"{team}.txt").read_text().splitlines()]
+        balls = (packets.source == "camera") & (packets.destination == f"player-{team}") & (packets.fate == "delivered")
+        assert asked == sorted(set(asked)) and len(asked) > TICKS // 6
+        assert set(packets.where(balls).arrival_tick.tolist()) <= set(asked), "it acts when the ball comes"
 
 
 def assert_told(house: House, content: dict[str, Any], err: str) -> None:

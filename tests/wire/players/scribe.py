@@ -1,4 +1,4 @@
-"""A team that writes down what it is given at each of its ticks: for comparing a rehearsal with real processes."""
+"""A team that writes down what it is given at each of its turns: for comparing a rehearsal with real processes."""
 
 from __future__ import annotations
 
