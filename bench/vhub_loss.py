@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import median
 from typing import Final
@@ -18,7 +18,7 @@ from bench.runs import BenchError, name_of, watch
 
 KILLS: Final = 2
 CALM_S: Final = 3.0
-"""How long the run goes on between two kills, and before the first."""
+"""How long the run goes on between two kills, and before the first, in simulated time."""
 LIMIT_MS: Final = 1000.0
 VHUB: Final = "vhub"
 
@@ -32,18 +32,29 @@ class VhubLoss:
     max_ms: float
 
 
+class Killer:
+    """Kills the vHub whenever the run has gone on for a while, by simulated time.
+
+    By wall time it would kill it before the first tick of a run that starts slowly, or once more before it is back.
+    """
+
+    def __init__(self, kill: Callable[[], None]) -> None:
+        self._kill = kill
+        self._left = KILLS
+        self._next_s = CALM_S
+
+    def __call__(self, simulated_s: float) -> None:
+        if self._left and simulated_s >= self._next_s:
+            self._left -= 1
+            self._next_s = simulated_s + CALM_S
+            self._kill()
+
+
 def vhub_loss(seconds: float = 30.0) -> VhubLoss:
     """Kill it twice in each run of ten seconds, in as many runs as fit into the time."""
     outages: list[float] = []
     for _ in range(max(1, round(seconds / 10.0))):
-        over = threading.Event()
-        killer = threading.Thread(target=_kill, args=(over,), name="killer")
-        killer.start()
-        try:
-            run = watch("realtime", 10.0)
-        finally:
-            over.set()
-            killer.join()
+        run = watch("realtime", 10.0, on_look=Killer(kill_vhub))
         told = [entry for entry in run.result["recoveries"] if entry["what"] == VHUB]
         if len(told) != KILLS:
             raise BenchError(f"the vHub was killed {KILLS} times, and the run tells of {len(told)}")
@@ -51,20 +62,10 @@ def vhub_loss(seconds: float = 30.0) -> VhubLoss:
     return VhubLoss(outages, round(median(outages), 1), max(outages))
 
 
-def _kill(over: threading.Event) -> None:
-    """Kill the vHub whenever it has lived for a while beside players."""
-    left, known = KILLS, 0
-    while left and not over.wait(0.1):
-        try:
-            pids = {name_of(command): pid for pid, command in children().items()}
-        except OSError:  # a thread of this process has ended meanwhile
-            continue
-        if VHUB not in pids or "player-red" not in pids or pids[VHUB] == known:
-            continue
-        known = pids[VHUB]
-        if not over.wait(CALM_S):
-            os.kill(known, signal.SIGKILL)
-            left -= 1
+def kill_vhub() -> None:
+    """Kill this process's vHub."""
+    (pid,) = (pid for pid, command in children().items() if name_of(command) == VHUB)
+    os.kill(pid, signal.SIGKILL)
 
 
 def lines(found: VhubLoss) -> list[str]:

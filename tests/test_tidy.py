@@ -358,6 +358,58 @@ def is_open(tree: ast.Module, name: str) -> bool:
     return "allow_interpreted_subclasses" in ast.dump(found)
 
 
+INTERPRETED_BENCHES = {
+    "bench/gate.py",
+    *(str(path.relative_to(ROOT)) for path in (ROOT / "bench/mutants").rglob("*.py")),
+}
+"""They plant bugs, and run where nothing is compiled."""
+
+
+def test_no_bench_replaces_what_is_compiled() -> None:
+    """`make bench` runs compiled: a class's methods cannot be replaced there, and what replaces a module's function is
+    not called."""
+    modules = compiled()
+    wrong = []
+    for path in python_files("bench"):
+        if name_of(path) in INTERPRETED_BENCHES:
+            continue
+        named = {
+            alias.asname or alias.name
+            for node in ast.walk(tree_of(path))
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+            if node.module in modules or f"{node.module}.{alias.name}" in modules
+        }
+        wrong += [
+            f"{name_of(path)}:{target.lineno}: {ast.unparse(target)}"
+            for target in replaced(tree_of(path))
+            if root_of(target) in named or any(root_of(target).startswith(module) for module in modules)
+        ]
+    assert not wrong, "\n".join(wrong)
+
+
+def replaced(tree: ast.Module) -> Iterator[ast.expr]:
+    """Yield what a module assigns or deletes attributes of, and what it has `mock` or `setattr` replace."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store | ast.Del):
+            yield node.value
+        elif (
+            isinstance(node, ast.Call)
+            and node.args
+            and re.search(r"\b(patch|setattr|delattr)\b", ast.unparse(node.func))
+        ):
+            yield node.args[0]
+
+
+def root_of(expression: ast.expr) -> str:
+    """Return the name that an expression begins with, or the text that it is."""
+    while isinstance(expression, ast.Attribute):
+        expression = expression.value
+    if isinstance(expression, ast.Constant):
+        return str(expression.value)
+    return expression.id if isinstance(expression, ast.Name) else ""
+
+
 def test_no_compiled_constant_is_a_tuple_of_floats_of_a_fixed_length() -> None:
     """Those of mypyc 2.4 count as not set."""
     fixed = re.compile(r"Final(?!.*\.\.\.).*")

@@ -1,0 +1,24 @@
+"""What benches decide themselves, without a run."""
+
+from bench import hot
+from bench.vhub_loss import CALM_S, KILLS, Killer
+
+
+def test_the_vhub_is_killed_by_simulated_time() -> None:
+    """A run that starts slowly is left alone until it plays, and one that is not back yet is not hit again."""
+    killed: list[float] = []
+    looks = [0.0, CALM_S / 2, CALM_S, CALM_S, CALM_S + 0.1, 2 * CALM_S - 0.1, 2 * CALM_S, 3 * CALM_S, 9 * CALM_S]
+    killer = Killer(lambda: killed.append(looks[0]))
+    while looks:
+        killer(looks[0])
+        looks.pop(0)
+    assert killed == [CALM_S, 2 * CALM_S] and len(killed) == KILLS
+
+
+def test_the_table_of_hot_modules_says_what_is_left_to_the_interpreter() -> None:
+    listed = hot.compiled()
+    assert {"vhub/state", "node/core"} <= listed
+    shares = {"one": {"vhub/state": 60.0, "vhub/rows": 39.9, "vhub/seldom": 0.1}, "two": {"vhub/rows": 100.0}}
+    _, *rows, left = (line.split() for line in hot.lines(shares, 0.3, listed))
+    assert rows == [["vhub/rows", "39.90", "100.00"], ["*", "vhub/state", "60.00", "0.00"]]
+    assert left[-2:] == ["40.00", "100.00"]
