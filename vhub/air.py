@@ -117,21 +117,25 @@ class Air:
         hears: dict[str, bool] = {}
         contending: set[str] = set()
         turns: list[Turn] = []
+        open_turns = self._open
         for known in self.state.on_air:
             other, until_ns, is_open = known.source, known.until_ns, known.turn_ns >= 0
             if other == source:
-                waiting += known.end_ns > now_ns
+                if known.end_ns > now_ns:
+                    waiting += 1
                 continue
             if until_ns <= ready_ns and not is_open:
                 continue
-            if other not in hears:
-                hears[other] = of.hears(of.place_at(other, known.position), place, known.power_cdbm)
-            if not hears[other]:
+            is_heard = hears.get(other)
+            if is_heard is None:
+                is_heard = of.hears(of.place_at(other, known.position), place, known.power_cdbm)
+                hears[other] = is_heard
+            if not is_heard:
                 continue
             if until_ns > ready_ns:
                 contending.add(other)
             if is_open:
-                turns.append(self._open[other, known.sequence, known.copy])
+                turns.append(open_turns[other, known.sequence, known.copy])
             elif until_ns > free_ns:
                 free_ns = until_ns
         if waiting > 1:
@@ -140,7 +144,7 @@ class Air:
 
     def _with_as_many(self, waiting: int, hears: Mapping[str, bool]) -> set[str]:
         """Return who is heard and has at least three quarters as many packets waiting or on air."""
-        counts = Counter(known.source for known in self.state.on_air)
+        counts = Counter([known.source for known in self.state.on_air])
         return {other for other, is_heard in hears.items() if is_heard and 4 * counts[other] >= 3 * waiting}
 
     def take_turn(self, contest: Contest, turn_ns: int, busy_ns: int, slot_ns: int) -> None:

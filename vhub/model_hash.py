@@ -19,7 +19,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.impairments import TableJitter
 from foosim.vhub.memory import RadioState, Transmission
 from foosim.vhub.radio.airtime import lora_airtime_ns, lrwpan_airtime_ns, wifi_ack_ns, wifi_airtime_ns
-from foosim.vhub.radio.contention import sensing, wifi_contention
+from foosim.vhub.radio.contention import sensing, wifi_access, wifi_contention
 from foosim.vhub.radio.errors import (
     LORA_FACTORS,
     LORA_GATEWAY_SENSITIVITY_DBM,
@@ -82,15 +82,23 @@ def _errors() -> Iterator[object]:
 
 
 def _airtimes() -> Iterator[object]:
-    """Yield times on the air (ns), how likely attempts collide, whose turn is first, and what a duty cycle leaves."""
+    """Yield times on the air (ns), how likely attempts collide, what is counted down (ns), whose turn is first, and
+    what a duty cycle leaves."""
     for timing in (WIFI_2_4, WIFI_5, DOT11P):
         family = "ofdm10" if timing is DOT11P else "ofdm"
         modes = sorted(name for name, mode in MODES.items() if mode.family == family)
         yield [(name, wifi_airtime_ns(name, 300, timing), wifi_ack_ns(name, timing)) for name in modes]
         yield [wifi_contention(n, timing, unicast=n % 2 == 0).threshold >> _PPM_SHIFT for n in range(1, 20)]
+        yield [wifi_access(_collides_once, n, 0, 136_000, 28_000, timing).backoff_ns for n in range(1, 20)]
     yield lrwpan_airtime_ns(50), [sensing(n, lrwpan_airtime_ns(50), True).threshold >> _PPM_SHIFT for n in range(1, 9)]
     yield [lora_airtime_ns(factor, 20) for factor in LORA_FACTORS]
     yield list(_turns()), [packets_an_hour(0.01, seconds * 1_000_000_000, 56_576_000) for seconds in (20, 3600)]
+
+
+def _collides_once(block: int) -> tuple[int, ...]:
+    """Return the draws of a packet that collides once if others contend; each attempt draws half its window."""
+    half, most = 1 << 63, (1 << 64) - 1
+    return half, 0, 0, 0, half, most, most, 0
 
 
 def _turns() -> Iterator[int]:

@@ -29,6 +29,8 @@ from foosim.vhub.radio.path_loss import (
 from foosim.vhub.radio.shadowing import Shadowing
 from foosim.vhub.world import World
 
+OLDER_MAX: Final = 1024
+"""So many former places are remembered; then they are forgotten."""
 BLOCKED: Final = "blocked"
 OUT_OF_RANGE: Final = "out_of_range"
 NEVER_CDB: Final = 10**6
@@ -158,6 +160,8 @@ class Propagation:
         self.sense_cdbm = centi(settings.sense_dbm)
         self._places: dict[str, Place] = {}
         """Of each endpoint, the newest that somebody has asked for."""
+        self._older: dict[tuple[str, Vector], Place] = {}
+        """Where others were when they sent what is still on air: asked for again with each packet."""
         self._ways: dict[tuple[str, str], _Way] = {}
         self._reaches = [-1.0] * (LOSS_MAX_DB + 1)
         """The square of the distance (m2) within which walls and distance take no more than so many dB; below 0 before
@@ -184,7 +188,14 @@ class Propagation:
         if found.at == at:
             return found
         before = found.before
-        return before if before is not None and before.at == at else Place(found.body, at)
+        if before is not None and before.at == at:
+            return before
+        older = self._older.get((endpoint, at))
+        if older is None:
+            if len(self._older) >= OLDER_MAX:
+                self._older.clear()
+            older = self._older[endpoint, at] = Place(found.body, at)
+        return older
 
     def path(self, one: Place, other: Place) -> Path:
         """Return the way between the places of two antennas.

@@ -11,7 +11,8 @@ Neighbours: `air` (who is on it), `stages.medium` (draws), `radio.contention` (h
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from operator import attrgetter
+from typing import TYPE_CHECKING, Final
 
 from foosim.vhub.memory import RadioState, Transmission
 from foosim.vhub.packet import Flight
@@ -38,7 +39,8 @@ class Turn:
         known, sender = self.known, self.sender
         if by_ns:
             old_ns = known.until_ns
-            known.ready_ns += ready_by_ns
+            if ready_by_ns:
+                known.ready_ns += ready_by_ns
             known.turn_ns += by_ns
             known.start_ns += by_ns
             known.end_ns += by_ns
@@ -46,21 +48,22 @@ class Turn:
             if sender.free_ns == old_ns:
                 sender.free_ns = new_ns
             waiting = sender.waiting
-            for place in range(len(waiting)):
-                if waiting[place][0] == old_ns:
-                    waiting[place] = new_ns, waiting[place][1]
+            for place, (until_ns, size) in enumerate(waiting):
+                if until_ns == old_ns:
+                    waiting[place] = new_ns, size
                     break
         for flight, _, delay in self.packets:
             if not flight.cause:
-                flight.air_start_ns += by_ns
-                flight.air_end_ns += by_ns
-                flight.queue_ns += ready_by_ns
-                flight.access_ns += by_ns - ready_by_ns
+                if by_ns:
+                    flight.air_start_ns += by_ns
+                    flight.air_end_ns += by_ns
+                    flight.access_ns += by_ns - ready_by_ns
+                    if ready_by_ns:
+                        flight.queue_ns += ready_by_ns
                 delay.put_off(flight, by_ns, last_ns)
 
 
-def _order(turn: Turn) -> tuple[int, str]:
-    return turn.known.turn_ns, turn.known.source
+_ORDER: Final = attrgetter("known.turn_ns", "known.source")
 
 
 class Contest:
@@ -77,7 +80,7 @@ class Contest:
         """Return when the station's counter is at its end, which stands at `backoff_ns` when it is ready."""
         at_ns, turns = self._at_ns, self._turns
         if len(turns) > 1:
-            turns.sort(key=_order)
+            turns.sort(key=_ORDER)
         for turn in turns:
             known = turn.known
             if known.until_ns <= at_ns:
@@ -85,7 +88,9 @@ class Contest:
             idle_ns = known.turn_ns - at_ns
             if backoff_ns < idle_ns:
                 break
-            backoff_ns = max(0, backoff_ns - max(0, idle_ns) - slot_ns)
+            if idle_ns > 0:
+                backoff_ns -= idle_ns
+            backoff_ns = backoff_ns - slot_ns if backoff_ns > slot_ns else 0
             at_ns = known.until_ns
         return at_ns + backoff_ns
 
@@ -102,12 +107,13 @@ class Contest:
         first = behind[0].known
         most_ns = busy_ns - min(slot_ns, first.turn_ns - max(first.ready_ns, turn_ns))
         heard = {turn.known.source for turn in behind}
-        if len(of_all) > len(behind):
+        if len(of_all) > len(self._turns):  # of those that it hears all are in `_turns`
+            hears = set(self.hears)
             others = [
-                turn for turn in of_all.values() if turn.known.turn_ns > turn_ns and turn.known.source not in self.hears
+                turn for turn in of_all.values() if turn.known.turn_ns > turn_ns and turn.known.source not in hears
             ]
             if others:
-                behind = sorted([*behind, *others], key=_order)
+                behind = sorted([*behind, *others], key=_ORDER)
         over_ns = turn_ns
         moved: dict[str, tuple[int, int, Transmission]] = {}
         last_ns: dict[int, int] = {}

@@ -2,8 +2,10 @@
 
 n stations always have a frame. Each draws its backoff uniformly from its window, counts one down in each slot, idle or
 busy, and sends at zero; two or more at once collide, double their windows, and give a frame up after the last retry.
-Whoever is done, or has given up, draws from the least window. This is the process of which Bianchi's chain is the mean
-field; here it is played, with numpy and a fixed seed.
+Whoever is done, or has given up, draws from the least window. A busy slot is counted by those who wait, too, as by the
+categories of 802.11e and in Bianchi's chain; plain DCF keeps it. A collision takes as long as a frame with its
+acknowledgement: who sent waits for one that does not come, and who heard it waits for EIFS, as long at the lowest rate.
+This is the process of which Bianchi's chain is the mean field; here it is played, with numpy and a fixed seed.
 """
 
 from __future__ import annotations

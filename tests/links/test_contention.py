@@ -6,6 +6,7 @@ import heapq
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from math import sqrt
 from typing import NamedTuple
@@ -133,6 +134,7 @@ def test_what_packets_of_saturated_stations_take(proof: Proof, n: int) -> None:
         proof.normal("T16", stations + "retries", (mean - retries) / spread, packets)
 
 
+slot_by_slot = lru_cache(maxsize=1)(dcf.play)
 BEST_EFFORT = with_category(WIFI_5, CATEGORIES["best_effort"])
 
 
@@ -181,12 +183,11 @@ def closed_loop(n: int, packets: int, depth: int, seed: int) -> tuple[list[Fligh
     return done[n:], done[-1].air_end_ns - done[n - 1].air_end_ns
 
 
-@pytest.mark.parametrize("depth", [1, 2])
-@pytest.mark.parametrize("n", [1, 2, 3, 8, 20])
+@pytest.mark.parametrize(("n", "depth"), [(n, depth) for n in (1, 2, 3, 8, 20) for depth in (1, 2)])
 def test_saturated_stations_on_their_links(proof: Proof, n: int, depth: int) -> None:
     """Stations that have one packet ready, or another one behind it: Bianchi's throughput, and the delays of stations
     that are played slot by slot: a few win several times in a row, others wait for long."""
-    packets = proof.size(4_000, 200_000 if n <= 3 else 40_000)
+    packets = proof.size(12_000 if n <= 3 else 4_000, {2: 200_000, 3: 200_000, 8: 100_000}.get(n, 50_000))
     flights, spent_ns = closed_loop(n, packets, depth, proof.seed)
     assert {f.cause for f in flights} <= {"", "collision"} and {f.airtime_ns for f in flights} == {AIRTIME_NS}
     rate = saturation_rate_hz(n, AIRTIME_NS, ACK_NS, BEST_EFFORT)
@@ -203,16 +204,28 @@ def test_saturated_stations_on_their_links(proof: Proof, n: int, depth: int) -> 
     tail_ns = timing.sifs_ns + ACK_NS
     exchange_ns = timing.difs_ns + AIRTIME_NS + tail_ns
     cw = timing.cw_min, timing.cw_max
-    played = dcf.play(n, 4 * packets, exchange_ns, timing.slot_ns, cw, timing.retries, proof.seed)
+    played = slot_by_slot(n, 4 * packets, exchange_ns, timing.slot_ns, cw, timing.retries, proof.seed)
     proof.ratio("T16", stations + "packets/s as played", len(arrived) / spent_ns * 1e9, played.rate_hz, 0.02, packets)
     delays_ms = np.array([f.access_ns + f.airtime_ns + tail_ns for f in arrived]) / 1e6
-    for what, of, off in (("mean", np.mean, 0.05), ("deviation", np.std, 0.15), ("99 % quantile", _late, 0.15)):
+    longest_ms = float(np.quantile(played.delays_ms, 0.999))
+    figures: tuple[tuple[str, Figure], ...] = (
+        ("mean", np.mean),
+        ("99 % quantile", _late),
+        ("deviation", np.std),
+        ("deviation, cut at the 99.9 % quantile", lambda of: _cut(of, longest_ms)),
+    )
+    for what, of in figures:
         measured, expected = float(of(delays_ms)), float(of(played.delays_ms))
         chance = proof.z * sqrt(_error(of, delays_ms) ** 2 + _error(of, played.delays_ms) ** 2)
-        proof.ratio("T16", f"{stations}access delay in ms, {what}", measured, expected, off + chance, packets)
+        proof.ratio("T16", f"{stations}access delay in ms, {what}", measured, expected, max(0.05, chance), packets)
 
 
 Figure = Callable[[NDArray[np.float64]], np.floating]
+
+
+def _cut(delays_ms: NDArray[np.float64], longest_ms: float) -> np.floating:
+    """The deviation without its heavy tail: that of the few longest decides on the whole one, and needs millions."""
+    return np.std(np.minimum(delays_ms, longest_ms))
 
 
 def _late(delays_ms: NDArray[np.float64]) -> np.floating:

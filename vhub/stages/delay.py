@@ -85,7 +85,9 @@ class Delay(Stage):
         if self._fifo and not (self._extra_ns and self.is_late(flight)):
             memory = self._memory
             link = id(memory)
-            due_ns = max(due_ns, last_ns.get(link, -1) + 1)
+            before_ns = last_ns.get(link, -1)
+            if due_ns <= before_ns:
+                due_ns = before_ns + 1
             last_ns[link] = due_ns
             memory.last_due_ns = max(memory.last_due_ns, due_ns)
         flight.put_off_ns += due_ns - flight.due_ns
