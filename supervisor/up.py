@@ -102,6 +102,8 @@ class Up:
         self._status: dict[str, Any] = {}
         """The last that the supervisor has told."""
         self._stopped: set[str] = set()
+        self._wanted: set[str] = set()
+        """Nodes that are to be started when they have ended."""
         """Nodes that somebody stopped."""
         self._starts: dict[str, int] = {}
         """How often somebody asked for a node to be started, as far as it was done."""
@@ -278,7 +280,10 @@ class Up:
             self._restarts.forget(name)
             if child.exit_code is not None:
                 self._start_child(name, child.command, child.log)
+            else:  # it was stopped, and has not ended yet
+                self._wanted.add(name)
         self._starts = starts
+        self._wanted -= self._stopped
 
     def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
         """Say what is new, once it is over."""
@@ -337,9 +342,10 @@ class Up:
     def _restart_later(self, child: Child, now_s: float) -> None:
         at_once = child.name in (SUPERVISOR, VHUB)
         wait_s = None
-        if child.exit_code == REFUSED:
+        if child.exit_code == REFUSED and child.name not in self._wanted:
             self._restarts.give_up(child.name)
         else:
+            self._wanted.discard(child.name)
             wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
         after = f"starts again in {wait_s:g} s" if wait_s else "starts again"
         if wait_s is None:

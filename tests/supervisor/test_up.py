@@ -12,6 +12,7 @@ from typing import Final
 import pytest
 
 from foosim.protocol.channels import SUPERVISOR
+from foosim.protocol.command import REFUSED
 from foosim.protocol.session import ConnectError
 from foosim.supervisor import control
 from foosim.supervisor.display import Display
@@ -199,6 +200,27 @@ def test_a_player_is_started_again_when_a_signal_has_ended_it(
     if not ends_run:
         assert [go_on() for _ in range(5)][-1] == 6 and ended()
         assert "player-red was killed by SIGKILL" in said.getvalue() and "is given up; its log" in said.getvalue()
+    up._launcher.close()
+
+
+def test_a_node_that_is_started_before_it_has_ended_starts_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was stopped, which its process hears as a refusal, and somebody was quick."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    waits = 'while [ ! -e "$0.go" ]; do sleep 0.01; done'
+    (tmp_path / "node").write_text(f'#!/bin/sh\necho started >>"$0.log"\n{waits}\nexit {REFUSED}\n')
+    (tmp_path / "node").chmod(0o755)
+    up._launch("red", [str(tmp_path / "node")])
+    up._has_begun = True
+    up._start_wanted({"red": 1})
+    (tmp_path / "node.go").touch()
+    for now_s in (0.0, max(WAITS_S), 2 * max(WAITS_S), 3 * max(WAITS_S)):
+        up._launcher.children["red"].process.wait()
+        up._restart_ended(now_s, knows=True)
+    up._launcher.children["red"].process.wait()
+    assert (tmp_path / "node.log").read_text().count("started") == 2, "once for the word, and then it is refused"
     up._launcher.close()
 
 

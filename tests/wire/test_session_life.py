@@ -10,10 +10,16 @@ from collections.abc import Iterator
 import pytest
 import zenoh
 
+from foosim.protocol import channels
 from foosim.protocol import session as sessions
+from foosim.protocol.channels import SUPERVISOR, Plane
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.errors import BadValue
 from foosim.protocol.inbox import Inbox, Item
+from foosim.protocol.loop import Wire
+from foosim.protocol.messages import Answer, Request
 from foosim.protocol.session import ConnectError, ListenError, Session
+from foosim.supervisor.control import Control
 
 LONG_S = 900.0
 ANY_PORT = "tcp/127.0.0.1:0"
@@ -213,3 +219,30 @@ def free_port() -> int:
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         return int(listener.getsockname()[1])
+
+
+def test_a_second_control_of_a_process_comes_and_goes_beside_the_first(router: Session) -> None:
+    """As in a notebook that holds one open, and calls the functions that open one each."""
+    inbox, ended = Inbox(100), threading.Event()
+    wire = Wire(router, Plane.SIMULATION, inbox, SUPERVISOR)
+    wire.read([(channels.REQUEST, False)])
+
+    def answer() -> None:
+        while not ended.is_set():
+            for _, name, payload in inbox.take(LONG_S):
+                request = decode(Request, payload, channels.REQUEST.bytes_max)
+                wire.put(channels.ANSWER, name, encode(Answer(SUPERVISOR, request.id, True, 0, request.verb, b"{}")))
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    try:
+        with Control(router.locator) as first:
+            for turn in range(5):
+                with Control(router.locator) as second:
+                    assert second.ask("pause", LONG_S).text == "pause"
+                    assert first.ask("resume", LONG_S).text == "resume", turn
+                assert first.status(LONG_S) == {}
+    finally:
+        ended.set()
+        inbox.wake()
+        thread.join()
