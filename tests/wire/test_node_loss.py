@@ -52,7 +52,8 @@ def test_a_node_is_stopped_and_started_from_another_terminal(house: House) -> No
     code, out, err = house.ask("foosim-supervisor", "stop", "red")
     assert (code, err) == (0, "") and out.startswith("red stopped at tick "), err
     with Control(house.info().simulation) as control:
-        house.wait_for("red to be gone", lambda: not house.processes_with("--name red"))
+        red = f"--name red --connect {house.info().simulation}"  # and no other run's on this machine
+        house.wait_for("red to be gone", lambda: not house.processes_with(red))
         status = control.status()
         assert status["processes"]["red"]["stopped"] and status["nodes"]["red"]["owned"] == []
         assert house.run("foosim-supervisor", "start", "red")[0] == 0
