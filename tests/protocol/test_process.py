@@ -111,3 +111,20 @@ def test_a_line_of_the_log_has_its_time_in_utc(capsys: pytest.CaptureFixture[str
 
 def test_two_starts_have_two_boots() -> None:
     assert len({new_boot() for _ in range(100)}) == 100
+
+
+def test_a_process_starts_with_what_it_needs() -> None:
+    """Most runs have no certificates, and few vHubs read a capture. What was imported, no garbage collection visits."""
+    program = """
+import atexit, gc, sys
+from foosim.client import main as player
+from foosim.node import main as node
+from foosim.vhub import main as vhub
+print([name for name in ("ssl", "cryptography", "foosim.vhub.capture_reader") if name in sys.modules])
+atexit.register(lambda: print(gc.get_freeze_count() > len(gc.get_objects())))
+sys.argv = ["foosim-node", "--version"]
+node.main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    nothing, version, is_left_out = done.stdout.splitlines()
+    assert (nothing, is_left_out) == ("[]", "True"), version
