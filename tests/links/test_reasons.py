@@ -19,6 +19,7 @@ from foosim.vhub.model_hash import model_hash
 from foosim.vhub.rows import PACKETS, PacketRow
 from foosim.vhub.to_rows import DECIDING
 from tests.links.offered import TABLE
+from tests.turns import BY_PERIOD
 
 NETWORK: Final = """network={
   radios: {
@@ -56,7 +57,7 @@ def capture(tmp_path_factory: pytest.TempPathFactory) -> CaptureData:
 
 
 def captured(network: str, path: Path) -> CaptureData:
-    text = apply_sets(TABLE.read_text(), "t.yaml", [network])
+    text = apply_sets(TABLE.read_text(), "t.yaml", [*BY_PERIOD, network])
     rehearse(text, "t.yaml", 260, 1, ["engine=pure"], Settings(), capture=path)
     return open_capture(path)
 
