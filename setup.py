@@ -9,6 +9,7 @@ install is never compiled, so that what is edited is what runs. All else about t
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sys
 import time
@@ -38,16 +39,10 @@ COMPILED: Final = {
     "node/engines/pure_shapes": "distances of each pair of shapes, at each substep",
     "node/engines/rovers": "each rover's motion and contacts, at each substep",
     "node/hall_world": "a node's tick in the hall",
-    "node/held": "what came of an epoch that has not begun, at each message",
     "node/inputs": "what reaches the robots, at each tick",
     "node/rules": "goals and the ball's return, at each tick",
     "node/sensors/__init__": "samples that are due, at each tick; the class that sensors derive from",
-    "node/sensors/ball": "each sample of the ball",
-    "node/sensors/battery": "each sample of a battery",
     "node/sensors/encoder": "each sample of a rod or wheel",
-    "node/sensors/fitting": "where a sensor sits, for each sample",
-    "node/sensors/odometry": "each sample of a rover's way",
-    "node/sensors/pose": "each sample of a pose",
     "node/sensors/proximity": "the rays of each rover's sensors",
     "node/solver": "the engine's turn, at each tick",
     "node/step": "load, command, step and read of each island",
@@ -62,7 +57,6 @@ COMPILED: Final = {
     "protocol/frame": "reads and digests each frame",
     "protocol/layout": "the places in a frame of each body: compiled modules read them",
     "protocol/limits": "the project's limits: compiled modules read them",
-    "protocol/member": "the handshake and heartbeat of each process, at each turn",
     "protocol/obstacles": "distances from what stands in the hall",
     "protocol/patience": "deadlines, asked at each message",
     "protocol/refusals": "what became of each message",
@@ -72,18 +66,13 @@ COMPILED: Final = {
     "rehearsal/bounds": "what the swarm checks at each message",
     "rehearsal/bus": "each message of a rehearsal",
     "rehearsal/clock": "each turn of a rehearsal",
-    "rehearsal/hub_journal": "each record of a rehearsal's vHub",
     "rehearsal/laws": "what the swarm checks at each frame",
-    "rehearsal/machines": "machines that are lost, at each turn of a rehearsal",
     "rehearsal/packet_laws": "what the swarm checks at each packet",
-    "rehearsal/people": "what people ask of a rehearsal, at each turn",
     "rehearsal/replica": "the world computed again, at each tick",
     "rehearsal/settings": "the processes of a rehearsal: compiled modules read them at each turn",
     "rehearsal/system": "turns of all processes of a rehearsal",
     "rehearsal/whatif": "judges each captured packet again",
-    "rehearsal/world_bounds": "what the swarm checks of each world",
     "supervisor/arrivals": "each part of a frame that arrives",
-    "supervisor/closing": "when a run that has ended is over, at each turn",
     "supervisor/core": "the supervisor's tick: orders, parts, commits",
     "supervisor/head": "what the supervisor's core stands on: compiled modules read it",
     "supervisor/issued": "what was ordered at each tick",
@@ -101,7 +90,6 @@ COMPILED: Final = {
     "vhub/numbers": "powers and decibels of each radio packet",
     "vhub/packet": "each packet on its way",
     "vhub/propagation": "what is between two radios, for each packet",
-    "vhub/radio/airtime": "the time on air of each radio packet",
     "vhub/radio/contention": "who may send on a shared medium, for each packet",
     "vhub/radio/errors": "the odds of each radio frame",
     "vhub/radio/fading": "the fading of each radio packet",
@@ -114,13 +102,10 @@ COMPILED: Final = {
     "vhub/room": "room for what is on its way, for each packet",
     "vhub/sendings": "each broadcast's one sending",
     "vhub/solids": "boxes and cylinders that a line of sight may meet",
-    "vhub/stages/__init__": "the table of stages that each packet goes through",
     "vhub/stages/admit": "the first stage of each packet",
-    "vhub/stages/capacity": "how many packets are on a link, for each packet",
     "vhub/stages/channel": "the radio channel, for each packet",
     "vhub/stages/delay": "the delay, for each packet",
     "vhub/stages/medium": "the shared medium, for each radio packet",
-    "vhub/stages/policy": "partitions, filters and the age of each packet",
     "vhub/stages/queue": "the sender's queue, for each packet",
     "vhub/stages/receiver": "the receiver, for each packet",
     "vhub/stages/residual": "loss and bursts, for each packet",
@@ -133,9 +118,10 @@ COMPILED: Final = {
 }
 """Modules by path, each with what it does so often that it is compiled.
 
-Each is in the path of a tick or of a packet, or has a class that such modules read: of an interpreted class compiled
-code looks each attribute up by name. All are in one library, since they call each other. What starts a run, what people
-are told, and the types of msgspec, which are compiled already, are left out.
+`python -m bench.hot` shows the share that each has of a run's time: one that has less than 0.3 % of every run is here
+only where compiled modules derive from its classes or read them, since of an interpreted class they look each attribute
+up by name. All are in one library, since they call each other. What starts a run, what people are told, and the types
+of msgspec, which are compiled already, are left out.
 """
 PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
 TYPED: Final = Path("build", "typed")
@@ -156,6 +142,12 @@ EXACT: Final = (
     *(f"-fno-builtin-{name}" for name in ("exp", "log", "sin", "cos", "tan", "pow", "fmod")),
 )
 """One rounding for each operation, and no function of the mathematical library worked out by the compiler."""
+LEVEL: Final = ("-O1", "-w")
+LIGHT: Final = ("-fno-tree-dominator-opts", "-fno-tree-pta", "-fno-asynchronous-unwind-tables")
+"""Takes passes from gcc that cost it a quarter of its time and hardly speed up what mypyc makes."""
+ONCE: Final = '__attribute__((cold, optimize("O0")))'
+"""What runs only when a module is imported is a fifth of all C: it is not optimised."""
+IMPORTED: Final = re.compile(r"^char CPyDef_\w+___top_level__\(void\)", re.MULTILINE)
 UNITS: Final = 8
 """So many files go to the compiler, of about the same size: each reads the headers once, and cores share them."""
 
@@ -178,10 +170,23 @@ class CompileOrLeave(build_ext):
 
     def build_extension(self, ext: Extension) -> None:
         """Compile an extension's sources side by side, then link them."""
+        if len(ext.sources) > 1 and choice() != "quick" and self.takes(LIGHT):
+            ext.extra_compile_args += LIGHT
         with ThreadPoolExecutor(cores()) as pool:
             ext.extra_objects = [*pool.map(lambda source: self.object_of(ext, source), ext.sources)]
         ext.sources = []
         super().build_extension(ext)
+
+    def takes(self, options: Sequence[str]) -> bool:
+        """Return whether the compiler knows some options."""
+        MADE.mkdir(parents=True, exist_ok=True)
+        empty = MADE / "empty.c"
+        empty.write_text("")
+        try:
+            self.compiler.compile([str(empty)], self.build_temp, extra_postargs=["-Werror", *options])
+        except CCompilerError:
+            return False
+        return True
 
     def object_of(self, ext: Extension, source: str) -> str:
         """Compile one source; return the path of the object."""
@@ -227,8 +232,8 @@ def extensions() -> list[Extension]:
     files = [str(TYPED / "foosim" / f"{name}.py") for name in COMPILED]
     library, *shims = mypycify([*MYPY, *files], multi_file=True, target_dir=str(MADE), group_name=LIBRARY)
     library.sources = units(library.sources)
-    level = "-O0" if choice() == "quick" else "-O1"
-    library.extra_compile_args = [*library.extra_compile_args, level, *EXACT]
+    level = ("-O0", "-w") if choice() == "quick" else LEVEL
+    library.extra_compile_args = [*library.extra_compile_args, *level, *EXACT]
     for shim in shims:
         shim.extra_compile_args = ["-O0", "-g0"]
     say(f"that took {time.monotonic() - begun_s:.0f} s; the C compiler runs on {cores()} cores")
@@ -244,7 +249,10 @@ def units(sources: Sequence[str]) -> list[str]:
     made = [whole]
     for number, share in enumerate(shares, 1):
         unit = MADE / f"part_{number}_of_{UNITS}.c"
-        unit.write_text("".join(f'#include "{path.name}"\n' for path in share))
+        once = (name for path in share for name in IMPORTED.findall(path.read_text()))
+        unit.write_text(
+            "".join([*(f"{name} {ONCE};\n" for name in once), *(f'#include "{path.name}"\n' for path in share)])
+        )
         made.append(str(unit))
     return made
 
