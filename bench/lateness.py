@@ -117,6 +117,8 @@ def _lateness(run: Watched, received_ns: dict[tuple[str, int], int]) -> Lateness
     way_ns = [
         received_ns[key] - at_ns for key, at_ns in zip(keys, released_ns.tolist(), strict=True) if key in received_ns
     ]
+    if not way_ns:
+        raise BenchError(f"nothing that was released later than {WARM_NS / 1e9:g} s after the first reached the client")
     lag = run.result["lag_ms"]
     return Lateness(
         len(packets),

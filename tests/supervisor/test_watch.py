@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -280,8 +280,14 @@ def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
 
 
 def test_a_lockstep_client_whose_connection_closes_is_lost() -> None:
-    seen = Seen(ticks=400, sets=(*LONG, "deadlines.client_back=300 ms", "players.player-blue.restart=false"))
-    seen.prepare = lambda system: system.at_tick(60, lambda: system.hub.client_gone("player-blue", system.bus.now_ns))
+    short = ("deadlines.client_back=300 ms", "deadlines.lockstep_realtime=300 ms")
+    seen = Seen(ticks=400, sets=(*LONG, *short, "players.player-blue.restart=false"))
+
+    def close(system: System) -> None:
+        system.pause("player-blue", 3_600_000_000_000)  # nothing comes of it, as of one that is gone
+        system.hub.client_gone("player-blue", system.bus.now_ns)
+
+    seen.prepare = lambda system: system.at_tick(60, partial(close, system))
     reason, _ = ended(seen.go())
     assert reason == "lost player-blue: its connection closed"
 
