@@ -16,11 +16,11 @@ from foosim.rehearsal.whatif import what_if
 from foosim.vhub.branching import read_branch
 from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import open_capture
-from tests.replay.conftest import TABLE, TICKS, disturb, replay
+from tests.replay.conftest import SETS, TABLE, TICKS, disturb, replay
 
 
 def captured(path: Path, *sets: str) -> Path:
-    sets = ("engine=pure", "capture.split_time=100 ms", *sets)
+    sets = (*SETS, "capture.split_time=100 ms", *sets)
     rehearsed = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, sets, prepare=disturb, capture=path)
     assert rehearsed.json["capture"] == str(files_from(path)[0]), "a file that is there"
     return path
