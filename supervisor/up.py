@@ -102,9 +102,9 @@ class Up:
         self._status: dict[str, Any] = {}
         """The last that the supervisor has told."""
         self._stopped: set[str] = set()
+        """Nodes that somebody stopped."""
         self._wanted: set[str] = set()
         """Nodes that are to be started when they have ended."""
-        """Nodes that somebody stopped."""
         self._starts: dict[str, int] = {}
         """How often somebody asked for a node to be started, as far as it was done."""
         self._told = 0

@@ -191,8 +191,7 @@ class Fold:
     """Computes again what the records of a journal, the first of which is a head, are about.
 
     Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then those behind
-    it. Raises
-    Malformed when the records are not those of one run of this version.
+    it. Raises Malformed when the records are not those of one run of this version.
     """
 
     def __init__(self, deployment: Deployment, records: Iterable[bytes]) -> None:
