@@ -23,14 +23,13 @@ from foosim.client.packets import Outgoing, check_packet, check_subscription, sp
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
-from foosim.protocol.client_messages import Failure
+from foosim.protocol.client_messages import ClientRefusal, Failure
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.messages import (
     ClientHello,
-    ClientRefusal,
     ClientWelcome,
     Done,
     Down,
@@ -103,7 +102,7 @@ class ClientCore:
         self._now_ns = now_ns
         self._again_ns = now_ns
         self._again_after_ns = AGAIN_NS
-        self._join = b""
+        self._join: Join | None = None
         self._lost_ns = NEVER_NS
         self._gone = 0
         """How often the vHub was gone. What one of before said to a hello of before is no answer."""
@@ -153,7 +152,7 @@ class ClientCore:
             if self.welcome is None or self.is_away:
                 self._say_hello()
             else:
-                self._publish(self._join)
+                self._say_join()
                 self._again_after_ns = min(2 * self._again_after_ns, limits.WANT_EVERY_NS_MAX)
             self._again_ns = now_ns + self._again_after_ns
         if now_ns >= self._resend_ns:
@@ -162,7 +161,7 @@ class ClientCore:
     @property
     def _hello_ns(self) -> int:
         """When hello or Join is said next."""
-        waits = self.welcome is None or self.is_away or self._join
+        waits = self.welcome is None or self.is_away or self._join is not None
         return self._again_ns if waits and not self.refusal and not self.ended else NEVER_NS
 
     def deadline_ns(self) -> int:
@@ -227,10 +226,10 @@ class ClientCore:
         items = [Subscription(source, channel) for source, channel in wanted]
         calling = [Subscription(source, channel) for source, channel in sorted(set(arrivals))]
         assert all(item in items for item in calling), (calling, items)
-        self._join = encode(Join(self.name, self.boot, period_ticks, items, offset_ticks, calling))
+        self._join = Join(self.name, self.boot, period_ticks, items, offset_ticks, calling)
         self._period, self._offset, self._on_arrival = period_ticks, offset_ticks, bool(calling)
         if not self.is_away:
-            self._publish(self._join)
+            self._say_join()
         self._again_after_ns = AGAIN_NS
         self._again_ns = self._now_ns + AGAIN_NS
 
@@ -310,8 +309,8 @@ class ClientCore:
         self.is_away = False
         self._lost_ns = NEVER_NS
         self._returns += 1
-        if self._join:
-            self._publish(self._join)
+        if self._join is not None:
+            self._say_join()
             self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
         self._recorded(welcome.sequence)
         if welcome.branch != self.branch:
@@ -347,7 +346,8 @@ class ClientCore:
         return is_sent and packet.due_ns <= self.branch_ns
 
     def _on_refusal(self, refusal: ClientRefusal) -> None:
-        if not self._is_for_me(refusal) or (self.welcome is not None and not self.is_away) or self.refusal:
+        is_in = self.welcome is not None and not self.is_away
+        if not self._is_for_me(refusal) or is_in != refusal.joins or self.refusal:
             self._repeated += 1
             return
         self._refused(refusal.reason)
@@ -474,6 +474,10 @@ class ClientCore:
         who = self.name, self.boot, limits.PROTOCOL_VERSION, self._world
         hello = ClientHello(*who, received, self._gone, self.branch)
         self.actions.append(Publish(channels.CLIENT_HELLO, self.name, encode(hello)))
+
+    def _say_join(self) -> None:
+        assert self._join is not None and self.welcome is not None
+        self._publish(encode(structs.replace(self._join, hub=self.welcome.hub)))
 
     def _count_sent(self, sent: Sequence[Sent]) -> None:
         self._sequence += len(sent)

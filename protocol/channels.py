@@ -112,7 +112,7 @@ ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named 
 
 CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
-CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
+CLIENT_REFUSAL: Final = _radio("refusal", client_messages.ClientRefusal, "vhub", "the named one", "an answer")
 _SAID: Final = messages.Join | messages.Up | messages.Done | client_messages.Failure
 UP: Final = _radio("up", _SAID, "client", "vhub", "the client's rate")
 DOWN: Final = _radio("down", messages.Go | messages.Down | messages.Heard, "vhub", "the named one", "the client's rate")

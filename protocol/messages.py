@@ -401,14 +401,6 @@ class ClientWelcome(Message, frozen=True):
     returns: Counter = 0
 
 
-class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
-    """The vHub will not have this client, and why."""
-
-    name: Name
-    boot: Name
-    reason: Text
-
-
 class Sent(Item, frozen=True):
     """One packet of a client: to all subscribers without a `destination`. `stamp_ns`, its own clock, is not judged."""
 
@@ -424,7 +416,10 @@ Subscriptions = Annotated[list[Subscription], Meta(max_length=limits.ENTITIES_MA
 
 
 class Join(Message, frozen=True):
-    """A client takes part: with period and offset in ticks (0: free-running), or when a packet of `arrivals` comes."""
+    """A client takes part: with period and offset in ticks (0: free-running), or when a packet of `arrivals` comes.
+
+    `hub` is the vHub's process whose welcome it answers; where it is empty, any.
+    """
 
     name: Name
     boot: Name
@@ -432,6 +427,7 @@ class Join(Message, frozen=True):
     subscriptions: Subscriptions
     offset: Counter = 0
     arrivals: Subscriptions = field(default_factory=list)
+    hub: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
 
 
 class Up(Message, frozen=True):

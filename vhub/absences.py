@@ -57,6 +57,15 @@ class Absences:
             if before != boot:
                 self._note("player", name, reason, tick)
 
+    def deny(self, name: str) -> None:
+        """A player is here that a hello of another process had told to be lost while the vHub was away."""
+        self._away.pop(name)
+        self.is_new = True
+
+    def is_away(self, name: str) -> bool:
+        """Whether a player is away."""
+        return name in self._away
+
     def leave(self, name: str, tick: int) -> None:
         """The run goes on without a player that was waited for, from a tick on, which is written."""
         if name in self._away:

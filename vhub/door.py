@@ -9,7 +9,7 @@ Neighbours: `core` closes the ticks, `sessions` has the clients.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from foosim.protocol import limits
 from foosim.protocol.actions import Journal, Say
@@ -29,6 +29,9 @@ from foosim.vhub.state import HubState
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore
+
+
+LOST_MEANWHILE: Final = "its process was lost while the vHub was away"
 
 
 class Door:
@@ -119,13 +122,14 @@ class Door:
                 core.repeated += 1
                 return
             if session is not None and not session.boot and not hello.returns and known is not None and known.active:
-                self._miss(hello.name, "", "its process was lost while the vHub was away")
+                session.is_missed = not self.absences.is_away(hello.name)
+                self._miss(hello.name, "", LOST_MEANWHILE)
             core.sessions.hello(hello, core.member.build, core.deployment, core.state, self._said(hello.name))
 
     def join(self, join: Join, payload: bytes, now_ns: int) -> None:
         """A client takes part, from a tick that suits it; one that does already is told what it has missed."""
         core = self._core
-        session = self._session(join)
+        session = self._joining(join)
         if session is None or core.state is None:
             return
         if session.is_gone:  # said before it went
@@ -136,6 +140,7 @@ class Door:
         _check_timing(join)
         core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
         self.absences.end(join.name, join.boot)
+        session.is_missed = False
         self.tell()
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
@@ -150,7 +155,7 @@ class Door:
         session = self._session(up)
         if session is None or core.state is None:
             return
-        if up.branch != core.state.branch:
+        if up.branch != core.state.branch or core.sessions.is_in_doubt(session, core.state.deployment):
             core.repeated += 1
             return
         if not core.sessions.admits(session, len(up.packets), len(payload)):
@@ -168,7 +173,8 @@ class Door:
         if session is None:
             return
         is_of_another = core.state is None or done.branch != core.state.branch
-        if is_of_another or not core.waits_for(done.name) or done.tick != session.go_tick:
+        is_asked = core.waits_for(done.name) and done.tick == session.go_tick
+        if is_of_another or not is_asked or not session.is_present:
             core.repeated += 1
             return
         self.take_done(done.name)
@@ -185,14 +191,35 @@ class Door:
     def failure(self, failure: Failure, payload: bytes, now_ns: int) -> None:
         """A client says that it has failed. Without a player the run cannot go on."""
         core = self._core
-        session = self._session(failure)
-        if session is None or core.deployment is None:
+        session = core.sessions.by_name.get(failure.name)
+        if session is None or core.deployment is None or not session.may_fail(failure.boot):
+            core.repeated += 1
             return
         if failure.name not in core.deployment.players:
             raise Malformed(f"{failure.name} says that it has failed, it is no player")
         core.give_up(failure.reason)
 
-    def _session(self, message: Join | Up | Done | Failure) -> Session | None:
+    def _joining(self, join: Join) -> Session | None:
+        """Return the session of a process that joins. One that was welcomed while another one had its name gets it
+        where that has not joined, and is refused where it has."""
+        core = self._core
+        session = core.sessions.by_name.get(join.name)
+        if core.sessions.is_for_another(join):
+            core.repeated += 1
+            return None
+        if session is None or session.boot == join.boot or join.boot not in session.claims:
+            return self._session(join)
+        assert core.state is not None
+        if not core.sessions.take_over(join, core.state.deployment, core.state, self._said(join.name)):
+            return None
+        known = core.state.members.get(join.name)
+        if session.returns and session.is_missed and self.absences.is_away(join.name):
+            self.absences.deny(join.name)
+        elif not session.returns and known is not None and known.active:
+            self._miss(join.name, "", LOST_MEANWHILE)
+        return session
+
+    def _session(self, message: Join | Up | Done) -> Session | None:
         session = self._core.sessions.by_name.get(message.name)
         if session is None or session.boot != message.boot:
             self._core.repeated += 1

@@ -2,22 +2,27 @@
 
 A lockstep client gets `Go(k)` and answers `Done(k)`, stop and wait; a free-running one gets numbered `Down`s. What is
 said to a client is numbered and kept, so that it can go on after it was away. Sessions are about processes; what the
-world must remember of a client is in `state`. Neighbours: `core`, `door` (what clients say), `downlinks`.
+world must remember of a client is in `state`.
+
+A hello reserves a name, a Join takes it. A hello may come late, of a process whose end this vHub has not seen: it was
+away, or its news came first. Where that can be, a reservation keeps nobody out: all are welcomed, and the first that
+joins has the name. Neighbours: `core`, `door` (what clients say), `downlinks`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish
+from foosim.protocol.client_messages import ClientRefusal
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import (
     Build,
     ClientHello,
-    ClientRefusal,
     ClientWelcome,
     Done,
     Down,
@@ -31,6 +36,14 @@ from foosim.vhub.downlinks import Downlinks
 from foosim.vhub.members import may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.state import HubState
+
+
+class Claim(NamedTuple):
+    """A hello that was welcomed, and the numbers that its process was told."""
+
+    hello: ClientHello
+    sequence: int
+    downlink: int
 
 
 @dataclass(slots=True)
@@ -52,6 +65,10 @@ class Session:
     """How often its process had lost the vHub when it said hello."""
     before: set[str] = field(default_factory=set)
     """Boots of processes that are gone for good: what comes late of them is of nobody."""
+    is_missed: bool = False
+    """Whether its hello has told that the process before it was lost while the vHub was away."""
+    claims: dict[str, Claim] = field(default_factory=dict)
+    """Processes that were welcomed to the name and are not known to be gone, by boot."""
     away_ns: int = -1
     """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
     here."""
@@ -84,13 +101,22 @@ class Session:
     def come(self, boot: str, received: int, sequence: int, joins_first: bool = False) -> None:
         """A process of the client is here; it goes on behind these numbers. It may be away until it `joins_first`."""
         if boot != self.boot:
-            if self.boot:
+            if self.boot and self.is_gone:
                 self.before.add(self.boot)
+                self.claims.pop(self.boot, None)
             self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
         self.is_present = self.is_present and boot == self.boot
         self.boot, self.received, self.is_behind, self.is_gone = boot, received, True, False
         self.away_ns = self.away_ns if joins_first else -1
         self.next_sequence = max(self.next_sequence, sequence + 1)
+
+    def may_fail(self, boot: str) -> bool:
+        """Whether a process has the name, or may get it still."""
+        return boot == self.boot or (boot in self.claims and not self.is_present)
+
+    def is_held_against(self, boot: str) -> bool:
+        """Whether another process has the name that is not known to be gone."""
+        return self.boot not in ("", boot) and not self.is_gone
 
     @property
     def lost_ns(self) -> int:
@@ -150,6 +176,8 @@ class Sessions:
         """Of what all of them sent between closings."""
         self._left_behind: dict[str, list[Sent]] = {}
         """What clients had sent before they went."""
+        self._goes_on = False
+        """Whether this vHub goes on with a run: it does not know who has ended while it was away."""
         self._hub_boot = hub_boot
         self._actions = actions
 
@@ -162,34 +190,20 @@ class Sessions:
         """
         reason = self._reason_against(hello, deployment)
         if reason:
-            refusal = encode(ClientRefusal(hello.name, hello.boot, reason))
-            self._actions.append(Publish(channels.CLIENT_REFUSAL, hello.name, refusal))
+            self._refuse(ClientRefusal(hello.name, hello.boot, reason))
             return
-        member = state.members.get(hello.name)
-        sequence = 0 if member is None else member.sequence
-        downlink = 0 if member is None else member.downlink if said is None else said
         session = self.by_name.get(hello.name)
         if session is None:
             session = self.by_name[hello.name] = Session(hello.name, hello.boot)
-        if hello.returns:
-            has = hello.received
-            if hello.branch != state.branch:
-                has = min(has, 0 if member is None else member.branched)
-            downlink = min(has, downlink)
-        else:  # another process: the numbers of what the one before has sent are taken
-            waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
-            waiting += [] if session.done is None else session.done.packets
-            sequence = max([sequence, *(packet.sequence for packet in waiting)])
-        if session.boot != hello.boot:
-            self._left_behind.setdefault(hello.name, []).extend(session.inbox)
-        session.returns = hello.returns
-        session.come(hello.boot, downlink, sequence, hello.returns == 0 and may_restart(deployment, hello.name))
+        claim = session.claims[hello.boot] = self._claim(session, hello, state, said)
+        if not session.is_held_against(hello.boot):
+            self._take(session, claim, deployment)
         welcome = ClientWelcome(
             hello.name,
             hello.boot,
             self._hub_boot,
-            sequence,
-            downlink,
+            claim.sequence,
+            claim.downlink,
             build.deployment_name,
             build.deployment,
             build.run,
@@ -198,6 +212,53 @@ class Sessions:
             hello.returns,
         )
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
+
+    def take_over(self, join: Join, deployment: Deployment, state: HubState, said: int | None) -> bool:
+        """Let a process join that was welcomed while another one had its name; False where it comes too late.
+
+        It does where another one has joined and is here, or has sent something since this one was told its numbers.
+        """
+        session = self.by_name[join.name]
+        claim = session.claims[join.boot]
+        is_taken = session.is_present and not session.is_gone
+        if is_taken or claim.sequence != self._claim(session, claim.hello, state, said).sequence:
+            self._refuse(ClientRefusal(join.name, join.boot, _already_here(join.name), joins=True))
+            return False
+        self._take(session, claim, deployment)
+        return True
+
+    def is_for_another(self, join: Join) -> bool:
+        """Whether a Join answers another vHub's welcome: it comes late, perhaps of a process that is gone."""
+        return join.hub not in ("", self._hub_boot)
+
+    def _claim(self, session: Session, hello: ClientHello, state: HubState, said: int | None) -> Claim:
+        """Return with which numbers a process goes on."""
+        member = state.members.get(hello.name)
+        sequence = 0 if member is None else member.sequence
+        downlink = 0 if member is None else member.downlink if said is None else said
+        if hello.returns:
+            has = hello.received
+            if hello.branch != state.branch:
+                has = min(has, 0 if member is None else member.branched)
+            return Claim(hello, sequence, min(has, downlink))
+        # another process: the numbers of what the one before has sent are taken
+        waiting = [*self._left_behind.get(hello.name, ()), *(session.inbox if session.boot == hello.boot else ())]
+        waiting += [] if session.done is None else session.done.packets
+        return Claim(hello, max([sequence, *(packet.sequence for packet in waiting)]), downlink)
+
+    def _take(self, session: Session, claim: Claim, deployment: Deployment) -> None:
+        """Give the name to a process."""
+        hello = claim.hello
+        if session.boot != hello.boot:
+            self._left_behind.setdefault(hello.name, []).extend(session.inbox)
+        session.returns = hello.returns
+        # A process that is started anew takes its time, and one that says that it is back may be gone since.
+        is_unsure = self._goes_on and not session.is_present
+        joins_first = is_unsure if hello.returns else may_restart(deployment, hello.name)
+        session.come(hello.boot, claim.downlink, claim.sequence, joins_first)
+
+    def _refuse(self, refusal: ClientRefusal) -> None:
+        self._actions.append(Publish(channels.CLIENT_REFUSAL, refusal.name, encode(refusal)))
 
     def _reason_against(self, hello: ClientHello, deployment: Deployment) -> str:
         if hello.version != limits.PROTOCOL_VERSION:
@@ -210,9 +271,14 @@ class Sessions:
             hint = f", nearest is {nearest}" if nearest else ""
             return f"no client {hello.name} is declared; declared are {', '.join(sorted(declared)) or 'none'}{hint}"
         session = self.by_name.get(hello.name)
-        if session is not None and session.boot not in ("", hello.boot) and not session.is_gone:
-            return f"a client {hello.name} is already here"
+        if session is not None and session.is_held_against(hello.boot) and not self.is_in_doubt(session, deployment):
+            return _already_here(hello.name)
         return ""
+
+    def is_in_doubt(self, session: Session, deployment: Deployment) -> bool:
+        """Whether the process that has the name may be gone, its hello having come late: it has not joined, and
+        another process may have been started in its place."""
+        return not session.is_present and (self._goes_on or may_restart(deployment, session.name))
 
     def missing(self, deployment: Deployment, state: HubState) -> list[str]:
         """Return the declared lockstep clients that have not joined yet, in name order."""
@@ -222,6 +288,7 @@ class Sessions:
 
     def expect(self, names: Iterable[str], back_ns: int, now_ns: int) -> None:
         """These clients come back, by then, to this vHub, which is another one."""
+        self._goes_on = True
         for name in sorted(names):
             self.by_name[name] = Session(name, "")
             self.by_name[name].leave(back_ns, now_ns)
@@ -343,3 +410,7 @@ class Sessions:
                     self._actions.append(Publish(channels.DOWN, name, session.go))
                 session.again_after_ns = min(2 * session.again_after_ns, limits.WANT_EVERY_NS_MAX)
                 session.again_ns = now_ns + session.again_after_ns
+
+
+def _already_here(name: str) -> str:
+    return f"a client {name} is already here"

@@ -16,13 +16,13 @@ from foosim.client.packets import Outgoing
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish, Say
 from foosim.protocol.channels import CLIENT_READS, Plane
+from foosim.protocol.client_messages import ClientRefusal
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import (
     Build,
-    ClientRefusal,
     ClientWelcome,
     Commit,
     Deliveries,
@@ -174,7 +174,8 @@ def test_hello_is_said_until_it_is_answered_and_join_until_something_new_has_com
         core.wake(core.deadline_ns())
         joins += published(core)
     assert {join.payload for join in joins} == {joins[0].payload}, "byte for byte"
-    assert decode_any(Join | Up | Done, joins[0].payload) == Join("ear", "one", 0, decode_join(joins[0]).subscriptions)
+    wanted = decode_join(joins[0]).subscriptions
+    assert decode_any(Join | Up | Done, joins[0].payload) == Join("ear", "one", 0, wanted, hub="boot")
     gaps = [later - sooner for sooner, later in pairwise(waits)]
     assert gaps == sorted(gaps) and gaps[-1] == limits.WANT_EVERY_NS_MAX
     half_ns, now_ns = limits.WANT_EVERY_NS_MAX // 2, waits[-1]

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Final
+
+import msgspec
 import pytest
 
 from foosim.protocol import channels, limits
-from foosim.protocol.client_messages import Failure
-from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Join
+from foosim.protocol.actions import Journal
+from foosim.protocol.client_messages import ClientRefusal, Failure
+from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.hub_messages import Proceed
+from foosim.protocol.messages import ClientHello, ClientWelcome, Epoch, Join
+from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep
-from tests.vhub.test_sessions import MS, PERIODS, Hub, sent
+from foosim.vhub.resume import recall
+from tests.vhub.test_sessions import BUILD, FRAME, MS, OWNERS, PERIODS, TABLE, Hub, sent
+
+PLAYERS: Final = apply_sets(TABLE.read_text(), TABLE.name, ("network.links=[]",))
+RED: Final = "player-red"
+BLUE: Final = "player-blue"
 
 
 @pytest.mark.parametrize("answers", [False, True])
@@ -109,3 +121,99 @@ def test_a_client_that_is_no_player_does_not_end_the_run_by_saying_so() -> None:
     hub = Hub().begin()
     hub.say(channels.UP, "hand", Failure("hand", "one", "hand failed at tick 0: it says so"))
     assert not hub.core.lost and hub.core.statistics().malformed == 1
+
+
+# --- hellos of which it is not known who lives -----------------------------------------------------------------------
+
+
+def table() -> Hub:
+    """A vHub of a table whose players are started again when they end."""
+    return Hub(msgspec.structs.replace(BUILD, deployment=PLAYERS))
+
+
+def playing() -> Hub:
+    """One whose players wait for their second tick."""
+    hub = table()
+    for name in (RED, BLUE):
+        hub.enter(name, 5)
+    hub.say(channels.EPOCH, "supervisor", Epoch(1, 0, FRAME.digest, ["n1"], OWNERS, [], b""))
+    for tick in range(5):
+        hub.commit(tick)
+        if not tick:
+            hub.done(RED, tick)
+            hub.done(BLUE, tick)
+    assert hub.state.closed == 4
+    return hub
+
+
+def restarted(hub: Hub) -> Hub:
+    """The vHub is started again."""
+    records = [action.record for action in hub.core.actions if isinstance(action, Journal)]
+    hub.core = HubCore("boot-2", bytes(32), 0)
+    hub.say(channels.BUILD, "vhub", msgspec.structs.replace(BUILD, deployment=PLAYERS, boot="boot-2"))
+    hub.core.begin(recall(load_deployment(PLAYERS, TABLE.name), BUILD.run, records, None, 0), 0)
+    hub.say(channels.PROCEED, "vhub", Proceed("vhub", "boot-2", 0))
+    return hub
+
+
+def join(hub: Hub, name: str, boot: str) -> list[ClientRefusal]:
+    hub.said()
+    hub.say(channels.UP, name, Join(name, boot, 5, []))
+    return hub.said(channels.CLIENT_REFUSAL)
+
+
+def test_a_player_that_is_started_again_joins_where_a_late_hello_has_its_name() -> None:
+    """The hello of a process that has ended comes behind the news of its end."""
+    hub = table()
+    hub.core.client_gone(RED, 0)
+    for boot in ("dead", "living"):
+        (welcome,) = hello(hub, RED, boot)
+        assert isinstance(welcome, ClientWelcome)
+    assert join(hub, RED, "living") == []
+    assert (hub.core.sessions.by_name[RED].boot, hub.core.waiting_for) == ("living", f"join of {BLUE}")
+    (refusal,) = join(hub, RED, "dead")
+    assert (refusal.reason, refusal.joins) == (f"a client {RED} is already here", True)
+
+
+def test_a_player_that_fails_before_it_joins_is_heard_whoever_has_its_name() -> None:
+    hub = table()
+    hello(hub, RED, "dead")
+    hello(hub, RED, "living")
+    hub.say(channels.UP, RED, Failure(RED, "living", "no such class"))
+    assert hub.core.lost == "no such class"
+    hub = table()
+    hello(hub, RED, "living")
+    hello(hub, RED, "twin")
+    join(hub, RED, "living")
+    hub.say(channels.UP, RED, Failure(RED, "twin", "no such class"))
+    assert not hub.core.lost, "another one plays"
+
+
+@pytest.mark.parametrize(
+    ("late", "living", "entries"),
+    [(("dead", 1), ("two", 0), 1), (("dead", 0), ("one", 1), 0), (("dead", 0), ("two", 0), 1), (None, ("one", 1), 0)],
+)
+def test_the_account_tells_of_the_process_that_joins(
+    late: tuple[str, int] | None, living: tuple[str, int], entries: int
+) -> None:
+    """A player was lost while the vHub was away where another process joins, whatever a late hello says."""
+    hub = restarted(playing())
+    for who in (late, living):
+        if who is not None:
+            hello(hub, RED, *who)
+    assert join(hub, RED, living[0]) == []
+    report = hub.core.door.absences.report()
+    assert (report["away"], len(report["over"])) == ([], entries)
+
+
+def test_what_comes_late_of_a_process_that_has_not_joined_is_no_answer() -> None:
+    """It may be of a dead one, whose numbers the living one would not know of."""
+    hub = restarted(playing())
+    hub.commit(5)
+    hello(hub, RED, "one", 1)
+    hello(hub, RED, "two", 0)
+    hub.done(RED, 5, sent(1))
+    assert RED in hub.core.waited
+    join(hub, RED, "two")
+    hub.done(RED, 5, sent(1), boot="two")
+    assert RED not in hub.core.waited
