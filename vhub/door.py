@@ -372,6 +372,11 @@ class Door:
             self.absences.leave(name, closing.frame.tick)
         self._owing = []
 
+    def say_unsaid(self, closing: Closing, now_ns: int) -> None:
+        """Behind the record of a tick, say what its Go had for those who left owing and were never told it."""
+        for name in closing.owing:
+            self._core.sessions.say_unsaid(name, now_ns)
+
     def _is_waited_for(self, name: str) -> bool:
         """Whether the run waits for a client: it is in lockstep, or a tick still waits for its Done."""
         known = self._known(name)

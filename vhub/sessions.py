@@ -18,7 +18,7 @@ from typing import NamedTuple
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish
 from foosim.protocol.client_messages import ClientRefusal
-from foosim.protocol.codec import encode
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import (
     Build,
@@ -81,6 +81,8 @@ class Session:
     heard_ns: int = 0
     go: bytes = b""
     go_tick: int = -1
+    is_go_said: bool = False
+    """Whether that Go was said to any process of the client."""
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
@@ -355,8 +357,18 @@ class Sessions:
         session.go = encode(go)
         session.go_tick = go.tick
         session.done = None
+        session.is_go_said = session.is_present
         if session.is_present:
             self._actions.append(Publish(channels.DOWN, session.name, session.go))
+
+    def say_unsaid(self, name: str, now_ns: int) -> None:
+        """Say what a Go has that was never said, and keep it: it counts as delivered, and nobody is to answer it."""
+        session = self.by_name[name]
+        if not session.is_go_said:
+            go = decode(Go, session.go)
+            payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.branch))
+            self.downlinks.keep(name, go.number, payload, now_ns)
+            self._actions.append(Publish(channels.DOWN, name, payload))
 
     def say_down(self, name: str, down: Down, now_ns: int) -> None:
         """Give a client what is released to it outside of lockstep, or the news of the end; and keep it."""
@@ -372,6 +384,7 @@ class Sessions:
         session.is_present = True
         session.away_ns = -1
         if session.is_behind:
+            session.is_go_said = session.is_go_said or waits
             session.deadline_ns = now_ns + session.allowed_ns if waits else 0
             session.is_behind = False
             missed = [*self.downlinks.behind(session.name, session.received), *([session.go] if waits else [])]

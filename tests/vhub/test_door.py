@@ -8,13 +8,15 @@ import msgspec
 import pytest
 
 from foosim.protocol import channels, limits
-from foosim.protocol.actions import Journal
+from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.client_messages import ClientRefusal, Failure
+from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.hub_messages import Proceed
-from foosim.protocol.messages import ClientHello, ClientWelcome, Epoch, Join
+from foosim.protocol.messages import ClientHello, ClientWelcome, Down, Epoch, Join, Tempo
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep
+from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.resume import recall
 from tests.vhub.test_sessions import BUILD, FRAME, MS, OWNERS, PERIODS, TABLE, Hub, sent
 
@@ -217,3 +219,36 @@ def test_what_comes_late_of_a_process_that_has_not_joined_is_no_answer() -> None
     join(hub, RED, "two")
     hub.done(RED, 5, sent(1), boot="two")
     assert RED not in hub.core.waited
+
+
+@pytest.mark.parametrize("is_started", [False, True], ids=["ends before its hello", "is welcomed and joins late"])
+def test_what_a_player_that_leaves_owing_was_not_told_is_said_behind_the_record(is_started: bool) -> None:
+    """Its Go was for a process that had not joined: it counts as delivered, and has its number among its downlinks."""
+    hub = restarted(playing())
+    hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
+    hub.core.client_gone(RED, 0)
+    if is_started:
+        hello(hub, RED, "two")
+    hub.commit(5)
+    hello(hub, BLUE, "one", 1)
+    join(hub, BLUE, "one")
+    hub.done(BLUE, 5)
+    assert hub.core.waited == [RED] and not hub.said(channels.DOWN)
+    hub.now_ns = 30_000 * MS
+    hub.core.wake(hub.now_ns)
+    hub.core.advance(hub.now_ns)
+    actions = hub.core.actions
+    (written,) = (at for at, action in enumerate(actions) if isinstance(action, Journal) and _is_of_tick(action, 5))
+    (said,) = (at for at, action in enumerate(actions) if isinstance(action, Publish) and action.name == RED)
+    assert written < said and hub.state.closed == 5
+    number = hub.state.members[RED].downlink
+    (down,) = hub.said(channels.DOWN)
+    assert down == Down(number, 5, 0, [], False, 0)
+    if is_started:
+        hub.say(channels.UP, RED, Join(RED, "two", 5, []))
+        assert hub.said(channels.DOWN) == [down], "it may not have heard it before"
+
+
+def _is_of_tick(action: Journal, tick: int) -> bool:
+    record = decode_any(HubRecord, action.record)
+    return isinstance(record, TickRecord) and (record.tick, record.owing) == (tick, [RED])
