@@ -5,8 +5,6 @@ Those of deploy/table.yaml act when the camera's picture comes, at ticks that th
 
 from typing import Final
 
-BY_PERIOD: Final = tuple(
-    f"players.{name}.{key}"
-    for name in ("player-red", "player-blue")
-    for key in ("act=period", "arrivals={}", "rate=100 Hz")
-)
+from foosim.rehearsal.swarm import BY_PERIOD as KEYS
+
+BY_PERIOD: Final = tuple(f"players.{name}.{key}" for name in ("player-red", "player-blue") for key in KEYS)
