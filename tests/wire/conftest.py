@@ -127,8 +127,15 @@ class House:
         raise AssertionError(f"the output ended without {text!r}")
 
     def live(self) -> RunFolder:
-        """The run that is live, as soon as one is."""
-        return wait_for("a live run", live_runs)[0]
+        """The run that is live, as soon as one is; a start that failed has none and says why."""
+
+        def begun() -> list[RunFolder]:
+            folders = live_runs()
+            if not folders and self.started and self.started[-1].poll() is not None:
+                raise AssertionError("\n".join(self.end(self.started[-1])[1:]))
+            return folders
+
+        return wait_for("a live run", begun)[0]
 
     def info(self) -> RunInfo:
         """Its run file, once clients can find it."""
