@@ -66,6 +66,7 @@ SHELLS = {
     "rehearsal/capture_commands.py",
     "rehearsal/diff.py",
     "rehearsal/export.py",
+    "rehearsal/new_file.py",
     "rehearsal/interrupts.py",
     "rehearsal/play.py",
     "rehearsal/play_command.py",

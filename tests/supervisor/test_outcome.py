@@ -123,7 +123,7 @@ def damage(path: Path) -> None:
 
 @pytest.mark.parametrize(
     "what",
-    ["whole", "supervisor gone", "supervisor", "no supervisor's", "vhub gone", "vhub", "capture", "another", "finished"],
+    ["whole", "supervisor gone", "supervisor", "no journal", "vhub gone", "vhub", "capture", "another", "finished"],
 )
 def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: Left, what: str) -> None:
     folder, capture = left.folder, left.folder.path.parents[3] / "run.mcap"
@@ -131,7 +131,7 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
         "whole": "",
         "supervisor gone": f"run mine has no journal to go on from in {folder.journals}",
         "supervisor": f"{left.journal(SUPERVISOR)}: byte ",
-        "no supervisor's": f"run mine cannot go on: {left.journal(SUPERVISOR)}: no journal of this version",
+        "no journal": f"run mine cannot go on: {left.journal(SUPERVISOR)}: no journal of this version",
         "vhub gone": f"the vHub's journal is gone from {folder.journals}",
         "vhub": f"{left.journal(VHUB)}: ",
         "capture": f"{capture}: no MCAP file",
@@ -148,7 +148,7 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
         capture.write_bytes(run.capture.read_bytes())
     elif what.endswith(" gone"):
         left.journal(what.removesuffix(" gone")).unlink()
-    elif what == "no supervisor's":
+    elif what == "no journal":
         left.journal(SUPERVISOR).write_bytes(b"something else that is no journal")
     elif what != "whole":
         damage(left.journal(what))
