@@ -228,7 +228,8 @@ class PlayerLoop:
         deployment, declared = self.core.deployment, self._declaration
         assert deployment is not None and declared is not None
         if not isinstance(commands, Mapping):
-            raise PlayerError(f"{where}: act gave a {type(commands).__name__}, not a mapping from robots to Commands")
+            kind = type(commands).__name__
+            raise PlayerError(f"{where}: act gave a value of type {kind}, not a mapping from robots to Commands")
         packets = []
         for robot, command in sorted(commands.items(), key=_by_name):
             if robot not in declared.robots:

@@ -50,14 +50,14 @@ def place_sets(tree: Tree, sets: Sequence[str]) -> tuple[Tree, list[Problem]]:
 
 
 def nested(sets: Sequence[str]) -> dict[str, Any]:
-    """Return settings `a.b=VALUE` as nested plain data; raises DeploymentError with all problems."""
+    """Return arguments `a.b=VALUE` as nested plain data; raises DeploymentError with all problems."""
     tree = Fields(_place(1, 1))
-    problems: list[Problem] = []
+    problems: list[str] = []
     for number, text in enumerate(sets, 1):
         try:
             steps, start = _read_path(text)
             value, value_problems = _read_value(text, start, number)
-            problems += value_problems
+            problems += [_of_argument(text, problem.text) for problem in value_problems]
             node = tree
             for step, column in steps[:-1]:
                 inner = node.values.setdefault(step, Fields(_place(number, column)))
@@ -67,12 +67,18 @@ def nested(sets: Sequence[str]) -> dict[str, Any]:
             if value is not None:
                 node.values[steps[-1][0]] = value
         except _Misplaced as misplaced:
-            problems.append(Problem(_place(number, misplaced.column), misplaced.text))
+            problems.append(_of_argument(text, misplaced.text))
     if problems:
-        raise DeploymentError([str(problem) for problem in problems])
+        raise DeploymentError(problems)
     content = plain(tree)
     assert isinstance(content, dict), "a mapping"
     return content
+
+
+def _of_argument(text: str, problem: str) -> str:
+    """Say what is wrong with an argument, which is shown once."""
+    line = f"KEY=VALUE: {problem}"
+    return line if line.endswith(show(text)) else f"{line}, {show(text)}"
 
 
 def _place(number: int, column: int) -> Place:

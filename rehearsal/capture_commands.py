@@ -31,7 +31,7 @@ def export(
     ],
     what: Annotated[str, typer.Option(help=f"The table: {_TABLES}.")] = "packets",
     form: Annotated[
-        str | None, typer.Option("--format", help="csv or parquet; by default what the file's name ends with.")
+        str | None, typer.Option("--format", help="csv or parquet; by default as the file's name ends, csv for -.")
     ] = None,
     json: Json = False,
 ) -> None:

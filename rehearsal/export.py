@@ -1,22 +1,22 @@
 """Write a table of a capture to a file: CSV with the standard library, Parquet with pyarrow where it is installed.
 
 The typed function behind `foosim-replay export`. The capture is read once, and what is held of the table is one batch.
-A file that could not be written to its end does not stay. Neighbours: `tables` has what is written.
+Neighbours: `tables` has what is written, `new_file` the file.
 """
 
 from __future__ import annotations
 
 import csv
-import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol, TextIO
 
-from foosim.protocol.errors import BadValue, Failed, Refused
+from foosim.protocol.errors import BadValue, Failed
+from foosim.rehearsal.new_file import check_name, new_file
 from foosim.rehearsal.tables import COMMANDS_TABLE, Column, Kind, Table, table_of
 from foosim.vhub.capture_reader import Scan, deployment_of
 from foosim.vhub.payload_hash import check_payloads
@@ -31,10 +31,6 @@ BATCH_BYTES: Final = 8 * 1024 * 1024
 
 class NoParquet(Failed):
     """The library that writes Parquet is not installed."""
-
-
-class Existing(Refused):
-    """There is a file already where one is to be written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +56,9 @@ def export_capture(path: Path, what: str, out: Path, form: Format | None = None)
     Without `form` the name of `out` decides. Raises BadValue for an unknown table or format, NoParquet, Existing,
     CaptureError when the capture cannot be read, Failed when the file cannot be written.
     """
-    form = form or ("parquet" if out.suffix == ".parquet" else "csv")
+    if form is None and out != STANDARD_OUTPUT:
+        check_name("--out", out, "a table without --format", tuple(f".{known}" for known in FORMATS))
+    form = form or ("parquet" if out.suffix.lower() == ".parquet" else "csv")
     if form not in FORMATS:
         raise BadValue(f"--format: not one of {', '.join(FORMATS)}", form)
     if form == "parquet" and out == STANDARD_OUTPUT:
@@ -98,10 +96,7 @@ def _sink(table: Table, out: Path, form: Format) -> Iterator[Sink]:
         yield CsvSink(sys.stdout, table.columns)
         sys.stdout.flush()
         return
-    if os.path.lexists(out):
-        raise Existing(f"{out}: exists already, and is not overwritten")
-    part = out.with_name(f".{out.name}.part")
-    try:
+    with new_file(out) as part:
         if form == "parquet":
             sink: Sink = ParquetSink(part, table)
         else:
@@ -110,12 +105,6 @@ def _sink(table: Table, out: Path, form: Format) -> Iterator[Sink]:
             yield sink
         finally:
             sink.close()
-        part.rename(out)
-    except OSError as error:
-        raise Failed(f"{out}: cannot be written, {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 class CsvSink:

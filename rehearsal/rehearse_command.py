@@ -25,6 +25,7 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.swarm import Flown, fly
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.display import score_text
+from foosim.supervisor.new_capture import check_rooms
 from foosim.supervisor.plan import Plan, RunOptions, check_models_here, check_players_here, make_plan
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
@@ -66,7 +67,8 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     waited for the most. A Ctrl-C ends the rehearsal in order, a second one at once; the last line says how far it came
     and where the capture is. A player that does not answer within `deadlines.lockstep_fast` ends the run.
 
-    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, 130 second Ctrl-C.
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, or its
+    disk has no room, 130 second Ctrl-C.
     """
     if swarm:
         raise typer.Exit(_swarm(file, duration, 1 if seed is None else seed, seeds, json))
@@ -82,6 +84,8 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
         raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))
 
     check_players_here(plan)
+    for warning in check_rooms(plan.deployment.capture, capture, None):
+        _note(f"warning: {warning}")
     if not json:
         for line in (*([plan.branch.text] if plan.branch else []), *start_lines(meanings(plan.deployment), str(file))):
             typer.echo(line)
@@ -136,6 +140,8 @@ def _told(result: dict[str, Any]) -> str:
         f"{seconds:.2f} s simulated at {result['rtf']}x{score}\n"
         f"{handovers}packets {packets}\n"
         f"digest of all ticks {result['digest']['chain']}"
+        + (f"\nthe rehearsal has failed: {result['reason']}" if result["failed"] else "")
+        + (f"\ncapture {result['capture']}" if result["capture"] else "")
     )
 
 

@@ -9,9 +9,8 @@ from typing import Annotated
 import typer
 
 from foosim.protocol.codec import encode_json
-from foosim.protocol.errors import Failed
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
-from foosim.rehearsal.export import Existing
+from foosim.rehearsal.new_file import check_name, new_file
 from foosim.rehearsal.report import gather
 from foosim.rehearsal.report_page import page
 from foosim.vhub.capture_reader import open_capture
@@ -19,7 +18,7 @@ from foosim.vhub.capture_reader import open_capture
 
 def report(
     capture: Capture,
-    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write, HTML.", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write, NAME.html.", show_default=False)],
     json: Json = False,
 ) -> None:
     """Write a page about the network of a captured run.
@@ -28,17 +27,11 @@ def report(
     airtime, events, what was configured beside what was measured, and a map. The page is one file that needs nothing
     else. --json prints what is on it. An existing file is not overwritten.
     """
-    if out.exists() or out.is_symlink():
-        raise Existing(f"{out}: exists already, and is not overwritten")
+    check_name("--out", out, "the page", (".html", ".htm"))
     with reading():
         found = gather(open_capture(capture), capture.name)
-    try:
-        with out.open("x", encoding="utf-8") as file:
-            file.write(page(found))
-    except FileExistsError:
-        raise Existing(f"{out}: exists already, and is not overwritten") from None
-    except OSError as error:
-        raise Failed(f"{out}: cannot be written, {error.strerror or error}") from None
+    with new_file(out) as part:
+        part.write_text(page(found), encoding="utf-8")
     if json:
         typer.echo(encode_json(asdict(found)).decode())
     else:

@@ -14,8 +14,9 @@ from foosim.protocol.assets import read_files
 from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text, with_network
-from foosim.protocol.errors import BadValue, Failed
+from foosim.protocol.errors import BadValue
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
+from foosim.rehearsal.new_file import check_name, new_file
 from foosim.rehearsal.whatif import CHANGED_KEPT, LinkChange, PacketChange, WhatIf, what_if
 from foosim.rehearsal.whatif_picture import picture
 from foosim.vhub.capture_reader import CaptureData, open_capture
@@ -36,7 +37,7 @@ def whatif(
     ] = None,
     packets: Annotated[bool, typer.Option("--packets", help="Name each packet that changed.")] = False,
     drawing: Annotated[
-        Path | None, typer.Option("--picture", help="Draw what changed per link, as SVG.", show_default=False)
+        Path | None, typer.Option("--picture", help="Draw what changed per link, as NAME.svg.", show_default=False)
     ] = None,
     json: Json = False,
 ) -> None:
@@ -46,6 +47,8 @@ def whatif(
     is delivered, its delay, and the age of information; per channel how old it is when its receiver acts. Without
     another network every fate is the captured one.
     """
+    if drawing is not None:
+        check_name("--picture", drawing, "the picture", (".svg",))
     with reading():
         opened = open_capture(capture)
         deployment = _deployment(opened, network, settings or [])
@@ -55,7 +58,8 @@ def whatif(
     for line in found.caveats:
         typer.echo(f"warning: {capture}: {line}", err=True)
     if drawing is not None:
-        _draw(drawing, found, capture.name)
+        with new_file(drawing) as part:
+            part.write_text(picture(found, capture.name), encoding="utf-8")
     if json:
         content = asdict(found)
         typer.echo(encode_json(content if packets else {**content, "changes": []}).decode())
@@ -86,14 +90,6 @@ def _deployment(capture: CaptureData, network: Path | None, settings: list[str])
     lacking = {path: digest for path, digest in deployment.files().items() if path not in about.files}
     folder = Path() if network is None else network.parent
     return deployment.with_assets({**about.files, **(read_files(folder, ".", lacking) if lacking else {})})
-
-
-def _draw(path: Path, found: WhatIf, title: str) -> None:
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(picture(found, title))
-    except OSError as error:
-        raise Failed(f"{path}: cannot be written, {error.strerror or error}") from None
 
 
 def _show_links(found: WhatIf) -> None:

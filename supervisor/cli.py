@@ -15,11 +15,12 @@ import typer
 from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
-from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.errors import BadValue, Refused, read_at
 from foosim.protocol.hosts import places
 from foosim.protocol.messages import Answer
 from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import has_launcher
+from foosim.protocol.units import parse_pace
 from foosim.protocol.usage import BadUsage
 from foosim.supervisor import control
 from foosim.supervisor.detach import detach
@@ -119,9 +120,11 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     begun: Up | Outcome | None = None
     try:
         if resumed is not None:
-            begins = pace, duration, seed, sets, engine, listen, branch, run, capture
-            if file is not None or insecure or balance or no_capture or detached or any(map(bool, begins)):
-                raise BadValue("--resume takes FILE and its options from the run", resumed)
+            own = {"FILE": file, "--pace": pace, "--for": duration, "--seed": seed, "--set": sets, "--engine": engine}
+            own |= {"--listen": listen, "--insecure": insecure, "--from": branch, "--balance": balance, "--run": run}
+            own |= {"--capture": capture, "--no-capture": no_capture, "--detach": detached}
+            if given := [name for name, value in own.items() if value is not None and value is not False]:
+                raise BadValue(f"--resume takes FILE and options from the run, it goes without {', '.join(given)}")
             begun = _go_on(open_run(resumed), display)
         elif file is None:
             raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
@@ -265,13 +268,14 @@ def step(
     _show(control.step(count, run), json)
 
 
-@app.command()
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
 def rate(
     pace: Annotated[str, typer.Argument(help="realtime, fast, or a factor such as 2x.", show_default=False)],
     run: Run = None,
     json: Json = False,
 ) -> None:
     """Change how fast simulated time passes."""
+    read_at("foosim-supervisor rate PACE", parse_pace, pace)
     _show(control.rate(pace, run), json)
 
 

@@ -108,9 +108,19 @@ def closing_text(status: dict[str, Any]) -> str:
     return f"closing the capture: {left:,} rows are left, {megabytes(recording['bytes'])} are written"
 
 
+def packets_text(status: dict[str, Any]) -> str:
+    """`packets 22510 offered, 22390 delivered, 113 dropped`; empty where there were none.
+
+    A vHub that was started again has told of none before its first report.
+    """
+    packets = status["packets"]
+    if not packets["offered"]:
+        return ""
+    return f"packets {packets['offered']} offered, {packets['delivered']} delivered, {packets['dropped']} dropped"
+
+
 def plain_line(status: dict[str, Any]) -> str:
     """Return one line for a log or a pipe."""
-    packets = status["packets"]
     if status["state"] == "starting":
         return f"starting, waiting for {status['waiting_for'] or 'the first tick'}"
     parts = [
@@ -118,7 +128,7 @@ def plain_line(status: dict[str, Any]) -> str:
         pace_text(status),
         lag_text(status),
         *world_texts(status),
-        f"packets {packets['offered']} offered, {packets['delivered']} delivered, {packets['dropped']} dropped",
+        packets_text(status),
         recording_text(status),
         "load " + " ".join(f"{name} {process['busy']:.0%}" for name, process in status["processes"].items()),
     ]

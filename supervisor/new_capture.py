@@ -75,13 +75,16 @@ def place_of(settings: Capture, folder: Path, *, is_capture: bool = False) -> Pl
     return Place(folder, there, room, then, not goes_on)
 
 
-def check_rooms(settings: Capture, capture: Path | None, runs: Path) -> list[str]:
+def check_rooms(settings: Capture, capture: Path | None, runs: Path | None) -> list[str]:
     """Return warnings where disks have less than twice the reserve; raises Refused where a run would end at once.
 
-    `capture` is the file, None where none is written here; `runs` is the folder of runs, or of the one to go on.
+    `capture` is the file, None where none is written here; `runs` is the folder of runs, or of the one to go on, None
+    where no journal is written.
     """
     warnings = []
-    for folder, is_capture in (*([] if capture is None else [(capture.parent, True)]), (runs, False)):
+    for folder, is_capture in ((None if capture is None else capture.parent, True), (runs, False)):
+        if folder is None:
+            continue
         try:
             place = place_of(settings, folder, is_capture=is_capture)
         except OSError:

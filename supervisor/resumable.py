@@ -5,6 +5,9 @@ Looked at are both journals, whole (`journal_check`), and the capture's files. N
 
 from __future__ import annotations
 
+import shlex
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +17,7 @@ from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.journal import JournalError, journal_files, read_records
 from foosim.supervisor.journal_check import check_journals
 from foosim.supervisor.run_folder import RunFolder
+from foosim.vhub.branching import branch_command
 from foosim.vhub.capture_parts import files_from, first_there, has_end, head_of, parts_at
 from foosim.vhub.records import HeadRecord, HubRecord
 from foosim.vhub.rows import CaptureError
@@ -28,17 +32,26 @@ def check_resumable(folder: RunFolder, options: RunOptions, capture: Path | None
     `options` are those that it was started with. The vHub's journal and the capture are looked at where it runs on this
     machine.
     """
-    begins = f"foosim-supervisor up {options.file}"
     if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
-        raise Refused(f"run {folder.name} has no journal to go on from in {folder.journals}; {begins} begins a new run")
-    if capture is not None and parts_at(capture):
-        begins += f" --from {first_there(capture)}"
-    check_journals(folder, options)
+        where = f"run {folder.name} has no journal to go on from in {folder.journals}"
+        raise Refused(f"{where}{_new_run(folder, options, capture)}")
     try:
+        check_journals(folder, options)
         if has_hub_here:
             _check_hub(folder, capture)
     except (JournalError, CaptureError, Malformed) as error:
-        raise Refused(f"run {folder.name} cannot go on: {error}; {begins} begins a new run") from None
+        then = _new_run(folder, options, capture)
+        raise Refused(f"run {folder.name} cannot go on: {error}{then}") from None
+
+
+def _new_run(folder: RunFolder, options: RunOptions, capture: Path | None) -> str:
+    """Return how a new run begins: with the last frame of the capture, where it is this run's and has one."""
+    if capture is not None and parts_at(capture):
+        first = first_there(capture)
+        with suppress(CaptureError):
+            if head_of(first).get("run") == folder.name:
+                return f". {branch_command(replace(options, branch=None).arguments(), first)}"
+    return f"; foosim-supervisor up {shlex.join(options.arguments())} begins a new run"
 
 
 def _check_hub(folder: RunFolder, capture: Path | None) -> None:

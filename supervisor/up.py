@@ -463,18 +463,19 @@ class Up:
             with suppress(OSError):
                 self.folder.write_result(result)
         lines = [*map(recovery_text, result["recoveries"][self._told :]), line]
-        return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(), *self._capture_lines()))
+        return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(result), *self._capture_lines()))
 
     def unended(self, reason: str) -> dict[str, Any]:
         """Return the result of a run that nobody has ended."""
         known = {"run": self.folder.name, **plan_facts(self.plan.deployment), **self._status}
         return with_capture(result_without_supervisor(known, reason), self.capture)
 
-    def _lost_lines(self) -> list[str]:
-        """Say which child ended before the run did, and show the end of its log."""
+    def _lost_lines(self, result: Mapping[str, Any]) -> list[str]:
+        """Say which child ended before the run did, and show the end of its log; where the log of one to blame is."""
         child = self._lost
         if child is None:
-            return []
+            blamed = self._launcher.children.get(result["reason"].partition(" ")[0])
+            return [] if blamed is None else [f"the log of {blamed.name} is {blamed.log}"]
         return [f"{child.name} {child.ending}; its log is {child.log}", *(f"    {line}" for line in child.last_lines())]
 
     def _capture_lines(self) -> list[str]:

@@ -67,6 +67,7 @@ SHELLS = {
     "rehearsal/diff.py",
     "rehearsal/export.py",
     "rehearsal/interrupts.py",
+    "rehearsal/new_file.py",
     "rehearsal/play.py",
     "rehearsal/play_command.py",
     "rehearsal/play_place.py",

@@ -14,7 +14,7 @@ from typing import BinaryIO, Final
 
 from mcap import records
 
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, Failed
 from foosim.protocol.frame import chain_next
 from foosim.protocol.units import format_ns
 from foosim.vhub.capture_file import CHUNK_BYTES, check_new, declare_topics
@@ -68,7 +68,7 @@ def cut_capture(path: Path, out: Path, from_ns: int | None = None, to_ns: int | 
 
     It begins with the newest captured frame at or before `from_ns`, or else with the first one; it has all that was
     recorded of the ticks up to `to_ns`. Raises BadValue for times that the capture does not have, CaptureError when it
-    cannot be read, has no frame, or `out` exists or cannot be written.
+    cannot be read, has no frame, or `out` exists, Failed when `out` cannot be written.
     """
     if from_ns is not None and to_ns is not None and to_ns < from_ns:
         raise BadValue(f"--to: before --from, which is {format_ns(from_ns)}", format_ns(to_ns))
@@ -83,7 +83,7 @@ def cut_capture(path: Path, out: Path, from_ns: int | None = None, to_ns: int | 
         return Cut(out, start.tick, stop_tick, tick_ns, mcap.messages, mcap.offset)
     except OSError as error:
         out.unlink(missing_ok=True)
-        raise CaptureError(f"{out}: cannot be written, {error.strerror}") from None
+        raise Failed(f"{out}: cannot be written, {error.strerror}") from None
     except BaseException:
         out.unlink(missing_ok=True)
         raise

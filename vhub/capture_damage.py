@@ -152,7 +152,7 @@ class _Walk:
 
     def _go(self, stream: BinaryIO, size: int) -> None:
         if stream.read(len(MAGIC)) != MAGIC:
-            raise CaptureError(f"{self.path}: no MCAP file, it does not start with {MAGIC!r}")
+            raise CaptureError(f"{self.path}: no MCAP file, it does not start as one")
         at, stop = len(MAGIC), size - len(MAGIC)
         self._crc = crc32(MAGIC)
         while at < stop:

@@ -128,7 +128,7 @@ class McapFile:
     def contents(self) -> Iterator[Content]:
         """Yield messages, metadata and attachments in the order of the file."""
         if self._stream.read(len(MAGIC)) != MAGIC:
-            raise CaptureError(f"{self._name}: no MCAP file, it does not start with {MAGIC!r}")
+            raise CaptureError(f"{self._name}: no MCAP file, it does not start as one")
         self._at = len(MAGIC)
         self._crc = crc32(MAGIC)
         while not self._ended:

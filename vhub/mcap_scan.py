@@ -121,7 +121,7 @@ class _Scan:
     def run(self, trusted: memoryview = NOTHING) -> Scanned:
         start = self._stream.read(len(MAGIC))
         if not MAGIC.startswith(start):
-            raise CaptureError(f"{self._name}: no MCAP file, it does not start with {MAGIC!r}")
+            raise CaptureError(f"{self._name}: no MCAP file, it does not start as one")
         self._book.offset = len(MAGIC) if start == MAGIC else 0
         if self._book.offset and trusted:
             self._pass_over(trusted)

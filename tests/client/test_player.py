@@ -160,8 +160,8 @@ def test_a_free_running_player_acts_at_its_rate() -> None:
         ({"red.goal": Command(0.0, "up")}, "position.spin is not a number, 'up'"),  # type: ignore[arg-type]
         ({"red.goal": Command(0.0, 0.0), 7: None}, "not one of its robots (there are: camera, red.attack, red.defence,"
          " red.goal, red.midfield), 7"),
-        (None, "act gave a NoneType, not a mapping from robots to Commands"),
-        ([Command(0.0, 0.0)], "act gave a list, not a mapping from robots to Commands"),
+        (None, "act gave a value of type NoneType, not a mapping from robots to Commands"),
+        ([Command(0.0, 0.0)], "act gave a value of type list, not a mapping from robots to Commands"),
         ({"red.goal": Command(0.5, 0.0)}, "slide of red.goal is not within -0.123 to 0.123 m, 0.5"),
         ({"camera": Command(0.0, 0.0)}, "no rod (there are: blue.attack, blue.defence, blue.goal, blue.midfield,"
          " red.attack, red.defence, red.goal, red.midfield), 'camera'"),

@@ -97,7 +97,7 @@ def test_packets_leave_before_commands_in_their_order() -> None:
         (Turn({}, [Outgoing("", "", b"")]), "channel '': not 1 to 32 characters"),
         (Turn({}, [Outgoing("", "beacon", "text")]), "a payload is a str, not bytes"),  # type: ignore[arg-type]
         (Turn({}, b"x"), "a turn's packets are a bytes, not a sequence of Outgoing"),  # type: ignore[arg-type]
-        (Turn(None), "act gave a NoneType, not a mapping"),  # type: ignore[arg-type]
+        (Turn(None), "act gave a value of type NoneType, not a mapping"),  # type: ignore[arg-type]
     ],
 )
 def test_a_turn_that_must_not_be_ends_the_player(turn: Turn, text: str) -> None:

@@ -20,6 +20,8 @@ from typer.testing import CliRunner
 
 from foosim.client.player import Commands, Samples
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.disk import free_bytes
+from foosim.protocol.errors import Refused
 from foosim.protocol.units import Pace
 from foosim.rehearsal import attendant, onlooker, rehearse_command
 from foosim.rehearsal.attendant import INTERRUPTS_MAX
@@ -156,6 +158,23 @@ def test_a_player_that_hangs_ends_the_run_in_order(how: Any, tmp_path: Path) -> 
     assert (ran.exit_code, result["reason"], result["ticks"]) == (1, reason, HANGS_AT + 1)
     assert "in act" in ran.stderr and "Hangs.how()" in ran.stderr, "the stack where it hangs"
     assert f"reason: {reason}" in CliRunner().invoke(replay_app, ["info", str(capture)]).stdout
+
+
+def test_a_rehearsal_that_has_failed_says_why_and_where_its_capture_is(tmp_path: Path) -> None:
+    Hangs.how, capture = {}.popitem, tmp_path / "run.mcap"
+    ran = rehearsed("--for", "0.2 s", "--capture", str(capture))
+    failed, where = ran.stdout.splitlines()[-2:]
+    assert failed.startswith(f"the rehearsal has failed: player-red failed at tick {HANGS_AT}: KeyError: ")
+    assert (ran.exit_code, where) == (1, f"capture {capture}")
+
+
+def test_a_capture_without_room_is_refused_before_the_rehearsal_begins(tmp_path: Path) -> None:
+    ran = rehearsed("--for", "0.2 s", "--capture", str(tmp_path / "run.mcap"), "--set", "capture.reserve=1000 TiB")
+    assert isinstance(ran.exception, Refused) and "the reserve is 1000 TiB" in str(ran.exception)
+    assert not list(tmp_path.iterdir())
+    low = f"capture.reserve={int(0.7 * free_bytes(tmp_path))} B"
+    ran = rehearsed("--for", "2 ms", "--capture", str(tmp_path / "run.mcap"), "--set", low)
+    assert ran.exit_code == 0 and ran.stderr.startswith("warning: room gets little, at the reserve the run ends: ")
 
 
 @pytest.mark.usefixtures("only_hanging_counts")

@@ -126,7 +126,7 @@ def test_bad_input_is_named_and_leaves_no_file(run: Path, tmp_path: Path, bad_fi
     before = sorted(tmp_path.iterdir())
     for arguments, text in refusals(run, tmp_path):
         done = replay("cut", *arguments)
-        assert done.code == 2 and text in done.err, done
+        assert done.code == (1 if "cannot be written" in text else 2) and text in done.err, done
     for bad in bad_files:
         done = replay("cut", bad, "-o", tmp_path / "o.mcap")
         assert done.code == 2 and str(bad) in done.err

@@ -144,6 +144,7 @@ def refusals(run: Path, tmp_path: Path) -> Iterator[tuple[tuple[str | Path, ...]
     yield (run, "--what", "packet", "-o", out), 2, "nearest is 'packets'"
     yield (run, "--format", "parqet", "-o", out), 2, "nearest is 'parquet'"
     yield (run, "--format", "parquet", "-o", "-"), 2, "not written to standard output"
+    yield (run, "-o", tmp_path / "o.txt"), 2, "--out: the name of a table without --format ends with .csv or .parquet, "
     yield (run, "-o", tmp_path / "none" / "o.csv"), 1, "cannot be written, No such file"
     yield (run, "-o", tmp_path / "none" / "o.parquet"), 1, "cannot be written"
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import resource
+import signal
 from dataclasses import replace
 from html import escape
 from html.parser import HTMLParser
@@ -14,6 +16,7 @@ import pytest
 from msgspec.structs import replace as replace_row
 
 from foosim.protocol.scene import Box, Cylinder, Shape, turn
+from foosim.rehearsal import report_command
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
 from foosim.rehearsal.report_asked import moves
@@ -306,6 +309,25 @@ def test_the_command_writes_a_page_and_overwrites_none(radio_run: Path, tmp_path
     assert again.code == 3 and "exists already" in again.err and out.read_text() == before
     nowhere = replay("report", radio_run, "-o", tmp_path / "none" / "page.html")
     assert nowhere.code == 1 and "cannot be written" in nowhere.err
+    for name in ("page.pdf", "-"):
+        other = replay("report", radio_run, "-o", tmp_path / name)
+        assert other.code == 2 and "--out: the name of the page ends with .html or .htm, " in other.err
+
+
+def test_a_page_that_the_disk_does_not_take_leaves_no_file(
+    radio_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report_command, "page", lambda found: "x" * 100_000)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))
+    try:
+        full = replay("report", radio_run, "-o", tmp_path / "page.html")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert full.code == 1 and "page.html: cannot be written, File too large" in full.err
+    assert not list(tmp_path.iterdir())
 
 
 def test_bad_files_are_refused_and_leave_no_page(bad_files: list[Path], run: Path, tmp_path: Path) -> None:

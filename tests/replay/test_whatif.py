@@ -131,7 +131,9 @@ def test_the_command_shows_links_and_draws_them(run: Path, tmp_path: Path) -> No
     root = ElementTree.fromstring(drawing.read_text())
     assert root.tag.endswith("svg") and len(root) > 50
     again = replay("whatif", run, "--picture", drawing)
-    assert again.code == 1 and "File exists" in again.err
+    assert again.code == 3 and "exists already, and is not overwritten" in again.err
+    other = replay("whatif", run, "--picture", tmp_path / "changed.png")
+    assert other.code == 2 and "--picture: the name of the picture ends with .svg, " in other.err
 
 
 def test_a_picture_of_many_links_is_bounded(run: Path) -> None:

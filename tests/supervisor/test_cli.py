@@ -216,13 +216,21 @@ def test_a_number_that_is_none_is_bad_input(command: Command) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("rate", "quick"), "not a pace (realtime, fast or a factor such as 2x), 'quick'"),
-        (("rate", "0x"), "out of range 0.001x to 1000x, '0x'"),
+        (
+            ("rate", "quick"),
+            "foosim-supervisor rate PACE: not a pace (realtime, fast or a factor such as 2x), 'quick'",
+        ),
+        (("rate", "0x"), "foosim-supervisor rate PACE: out of range 0.001x to 1000x, '0x'"),
+        (("rate", "-1x"), "foosim-supervisor rate PACE: out of range 0.001x to 1000x, '-1x'"),
         (("push", "0", "nan", "0"), "impulse: not a finite number, nan"),
         (("push", "0", "-1"), "impulse: three numbers are needed, X Y Z in N s; here are 2, '0 -1'"),
         (
             ("push", "0", "1", "x"),
             "impulse: three numbers are needed, X Y Z in N s; not all of these are numbers, '0 1 x'",
+        ),
+        (
+            ("up", "a.yaml", "--resume", "mine", "--seed", "0", "--no-capture"),
+            "--resume takes FILE and options from the run, it goes without FILE, --seed, --no-capture",
         ),
         (("up",), "a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN"),
         (("add", "--position", "0", "0", "inf"), "position: not a finite number, inf"),

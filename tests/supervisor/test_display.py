@@ -20,7 +20,7 @@ from foosim.supervisor.display import (
     render_text,
 )
 from foosim.supervisor.plan import RunSettings
-from foosim.supervisor.status import status
+from foosim.supervisor.status import NO_PACKETS, status
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 HERE = {"host": "", "lost": False, "stopped": False}
@@ -138,6 +138,12 @@ def test_the_plain_line_has_the_same_in_short(running: dict[str, Any]) -> None:
         "ball at +0.123 -0.045 +0.018 m, solved by red | packets 22510 offered, 22390 delivered, 113 dropped | "
         "load blue 31% vhub 22% supervisor 11%"
     )
+
+
+def test_a_vhub_that_was_started_again_and_has_not_told_has_no_count_of_packets(running: dict[str, Any]) -> None:
+    assert "packets" in plain_line(running)
+    running["packets"] = NO_PACKETS
+    assert "packets" not in plain_line(running)
 
 
 def test_fast_has_no_lag_and_a_pause_says_so(running: dict[str, Any]) -> None:

@@ -122,7 +122,8 @@ def damage(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "what", ["whole", "supervisor gone", "supervisor", "vhub gone", "vhub", "capture", "another", "finished"]
+    "what",
+    ["whole", "supervisor gone", "supervisor", "no journal", "vhub gone", "vhub", "capture", "another", "finished"],
 )
 def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: Left, what: str) -> None:
     folder, capture = left.folder, left.folder.path.parents[3] / "run.mcap"
@@ -130,6 +131,7 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
         "whole": "",
         "supervisor gone": f"run mine has no journal to go on from in {folder.journals}",
         "supervisor": f"{left.journal(SUPERVISOR)}: byte ",
+        "no journal": f"run mine cannot go on: {left.journal(SUPERVISOR)}: no journal of this version",
         "vhub gone": f"the vHub's journal is gone from {folder.journals}",
         "vhub": f"{left.journal(VHUB)}: ",
         "capture": f"{capture}: no MCAP file",
@@ -146,6 +148,8 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
         capture.write_bytes(run.capture.read_bytes())
     elif what.endswith(" gone"):
         left.journal(what.removesuffix(" gone")).unlink()
+    elif what == "no journal":
+        left.journal(SUPERVISOR).write_bytes(b"something else that is no journal")
     elif what != "whole":
         damage(left.journal(what))
     if what == "whole":
@@ -155,8 +159,11 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
     with pytest.raises(Refused) as refused:
         plan_again(folder)
     assert problems[what] in str(refused.value), refused.value
-    begins = "A new run begins with the last captured frame" if what in ("supervisor", "vhub") else " begins a new run"
-    assert f"foosim-supervisor up {TABLE}" in str(refused.value) and begins in str(refused.value)
+    command = f"foosim-supervisor up {TABLE} --for '120 ms' --set engine=pure"
+    if what in ("capture", "another"):
+        assert str(refused.value).endswith(f"; {command} begins a new run"), "what is there has no frame of this run"
+    else:
+        assert f". A new run begins with the last captured frame: {command} --from {capture}@" in str(refused.value)
 
 
 def test_a_supervisor_goes_on_from_no_journal_that_has_nothing_and_from_none_that_is_damaged(left: Left) -> None:

@@ -130,6 +130,19 @@ def test_what_follows_when_the_supervisor_ends(
     up._launcher.close()
 
 
+def test_of_a_player_that_hangs_it_is_said_where_its_stack_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    up = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run")
+    for name in (SUPERVISOR, "player-red"):
+        up._launch(name, ["true"])
+        up._launcher.children[name].process.wait()
+    reason = "player-red has not answered tick 101 for 2 s (deadlines.lockstep_fast)"
+    up.folder.write_result({**up.unended(reason), "reason": reason, "failed": True})
+    log = up._launcher.children["player-red"].log
+    assert up._outcome().lines[:2] == (f"the run has ended: {reason}", f"the log of player-red is {log}")
+    up._launcher.close()
+
+
 def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     said = io.StringIO()

@@ -63,7 +63,8 @@ def test_a_run_goes_on_after_the_death_of_its_launcher(house: House) -> None:
     (journal,) = journal_files(folder.journals, channels.VHUB)
     journal.rename(journal.with_suffix(".away"))
     code, out, err = house.ask("foosim-supervisor", "up", "--resume", "far", "--json")
-    why = f"run far cannot go on: the vHub's journal is gone from {folder.journals}; foosim-supervisor up {house.table}"
+    why = f"run far cannot go on: the vHub's journal is gone from {folder.journals}. A new run begins with the last "
+    why += f"captured frame: foosim-supervisor up {house.table} "
     assert code == 3 and err.startswith(why) and last_json(out)["reason"] == err.strip()
     assert last_json(out)["capture"] == str(house.folder / "far.mcap")
     journal.with_suffix(".away").rename(journal)
