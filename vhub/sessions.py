@@ -81,8 +81,6 @@ class Session:
     heard_ns: int = 0
     go: bytes = b""
     go_tick: int = -1
-    is_go_said: bool = False
-    """Whether that Go was said to any process of the client."""
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
@@ -357,18 +355,22 @@ class Sessions:
         session.go = encode(go)
         session.go_tick = go.tick
         session.done = None
-        session.is_go_said = session.is_present
         if session.is_present:
             self._actions.append(Publish(channels.DOWN, session.name, session.go))
 
-    def say_unsaid(self, name: str, now_ns: int) -> None:
-        """Say what a Go has that was never said, and keep it: it counts as delivered, and nobody is to answer it."""
-        session = self.by_name[name]
-        if not session.is_go_said:
-            go = decode(Go, session.go)
-            payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.branch))
-            self.downlinks.keep(name, go.number, payload, now_ns)
-            self._actions.append(Publish(channels.DOWN, name, payload))
+    def say_owed(self, name: str, now_ns: int) -> None:
+        """Say what the Go has whose Done is owed, and keep it: it counts as delivered, and nobody is to answer it.
+
+        Whether any process has heard that Go, and whether the one that joins next has, is not known.
+        """
+        go = decode(Go, self.by_name[name].go)
+        payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.branch))
+        self.downlinks.keep(name, go.number, payload, now_ns)
+        self._actions.append(Publish(channels.DOWN, name, payload))
+
+    def say_again(self, name: str, number: int) -> None:
+        """Say a client's downlinks from a number on, which the vHub before may have written and not said."""
+        self._actions += [Publish(channels.DOWN, name, said) for said in self.downlinks.behind(name, number - 1)]
 
     def say_down(self, name: str, down: Down, now_ns: int) -> None:
         """Give a client what is released to it outside of lockstep, or the news of the end; and keep it."""
@@ -384,7 +386,6 @@ class Sessions:
         session.is_present = True
         session.away_ns = -1
         if session.is_behind:
-            session.is_go_said = session.is_go_said or waits
             session.deadline_ns = now_ns + session.allowed_ns if waits else 0
             session.is_behind = False
             missed = [*self.downlinks.behind(session.name, session.received), *([session.go] if waits else [])]

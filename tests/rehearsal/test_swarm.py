@@ -20,9 +20,9 @@ from foosim.rehearsal.faults import (
     HEALED_TICK,
     HOUR_NS,
     KINDS,
-    PLAYERS_EVERY,
     TICKS,
     Dice,
+    loses_players,
 )
 from foosim.rehearsal.rehearse_command import app
 from foosim.rehearsal.swarm import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
@@ -60,16 +60,19 @@ def test_the_laws_hold_where_links_make_copies() -> None:
 
 def test_a_seed_is_a_plan() -> None:
     assert plan_of(7) != plan_of(8)
+    worlds = set()
     for seed in range(200):
         plan = plan_of(seed)
         players = [fault for fault in plan.faults if fault.kind == "player"]
-        assert bool(players) == (seed % PLAYERS_EVERY == PLAYERS_EVERY - 1)
+        assert bool(players) == loses_players(seed)
+        worlds |= {seed % WORLDS == WORLDS - 1} if players else set()
         assert plan.nodes in NODES and FAULTS[0] - 3 <= len(plan.faults) - len(players) <= FAULTS[1]
         assert len(plan.kinds) >= 3 and len(plan.faults) >= 5
         assert all(0 < fault.tick < HEALED_TICK for fault in plan.faults)
         again = plan_of(seed)
         assert [(f.tick, f.what) for f in plan.faults] == [(f.tick, f.what) for f in again.faults]
     assert {fault.kind for seed in range(200) for fault in plan_of(seed).faults} == {*KINDS, "player"}
+    assert worlds == {False, True}, "where players act at arrival, and where they have ticks of their own"
 
 
 def test_clocks_decide_nothing() -> None:
