@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish
@@ -36,6 +36,10 @@ from foosim.vhub.downlinks import Downlinks
 from foosim.vhub.members import may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.state import HubState
+
+T = TypeVar("T")
+BOOTS_KEPT: Final = 32
+"""Of how many processes of one name it is kept that they were here: what comes late comes within seconds."""
 
 
 class Claim(NamedTuple):
@@ -63,12 +67,12 @@ class Session:
     """Whether its process has gone, and has not come back, nor another one."""
     returns: int = 0
     """How often its process had lost the vHub when it said hello."""
-    before: set[str] = field(default_factory=set)
-    """Boots of processes that are gone for good: what comes late of them is of nobody."""
+    before: dict[str, None] = field(default_factory=dict)
+    """Boots of the last processes that are gone for good: what comes late of them is of nobody."""
     is_missed: bool = False
     """Whether its hello has told that the process before it was lost while the vHub was away."""
     claims: dict[str, Claim] = field(default_factory=dict)
-    """Processes that were welcomed to the name and are not known to be gone, by boot."""
+    """The last processes that were welcomed to the name and are not known to be gone, by boot."""
     away_ns: int = -1
     """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
     here."""
@@ -102,7 +106,7 @@ class Session:
         """A process of the client is here; it goes on behind these numbers. It may be away until it `joins_first`."""
         if boot != self.boot:
             if self.boot and self.is_gone:
-                self.before.add(self.boot)
+                _remember(self.before, self.boot, None)
                 self.claims.pop(self.boot, None)
             self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
         self.is_present = self.is_present and boot == self.boot
@@ -195,7 +199,8 @@ class Sessions:
         session = self.by_name.get(hello.name)
         if session is None:
             session = self.by_name[hello.name] = Session(hello.name, hello.boot)
-        claim = session.claims[hello.boot] = self._claim(session, hello, state, said)
+        claim = self._claim(session, hello, state, said)
+        _remember(session.claims, hello.boot, claim)
         if not session.is_held_against(hello.boot):
             self._take(session, claim, deployment)
         welcome = ClientWelcome(
@@ -428,3 +433,11 @@ class Sessions:
 
 def _already_here(name: str) -> str:
     return f"a client {name} is already here"
+
+
+def _remember(by_boot: dict[str, T], boot: str, what: T) -> None:
+    """Note something of a process, as the newest of the `BOOTS_KEPT` that are kept."""
+    by_boot.pop(boot, None)
+    by_boot[boot] = what
+    while len(by_boot) > BOOTS_KEPT:
+        del by_boot[next(iter(by_boot))]

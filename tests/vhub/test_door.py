@@ -18,6 +18,7 @@ from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep
 from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.resume import recall
+from foosim.vhub.sessions import BOOTS_KEPT
 from tests.vhub.test_sessions import BUILD, FRAME, MS, OWNERS, PERIODS, TABLE, Hub, sent
 
 PLAYERS: Final = apply_sets(TABLE.read_text(), TABLE.name, ("network.links=[]",))
@@ -220,6 +221,22 @@ def test_what_comes_late_of_a_process_that_has_not_joined_is_no_answer() -> None
     join(hub, RED, "two")
     hub.done(RED, 5, sent(1), boot="two")
     assert RED not in hub.core.waited
+
+
+def test_of_processes_that_come_and_go_under_one_name_the_last_are_kept() -> None:
+    """However long a run is, and whether they join or not; what comes late of the last ones is of nobody still."""
+    hub = table()
+    for number in range(3 * BOOTS_KEPT):
+        hub.enter(RED, 5, f"joins {number}")
+        hub.core.client_gone(RED, 0)
+        assert hello(hub, RED, f"joins {number}") == []
+    session = hub.core.sessions.by_name[RED]
+    for number in range(3 * BOOTS_KEPT):
+        hello(hub, RED, "lives")
+        hello(hub, RED, f"ends {number}")
+        assert len(session.before) <= BOOTS_KEPT and len(session.claims) <= BOOTS_KEPT and "lives" in session.claims
+    assert hello(hub, RED, "joins 94") == [] and join(hub, RED, "lives") == []
+    assert session.boot == "lives"
 
 
 @pytest.mark.parametrize("is_started", [False, True], ids=["ends before its hello", "is welcomed and joins late"])
