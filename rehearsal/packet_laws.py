@@ -194,7 +194,7 @@ class PacketLaws:
         """A lockstep client's answer to a tick is one; a process that takes another's place answers for itself."""
         said = self._dones.setdefault((done.name, done.boot, done.branch, done.tick), raw)
         hold(said == raw, f"{done.name} has two Dones of {done.tick}")
-        if done.tick > self.closed:
+        if done.tick > self.closed and done.branch == self._branch:
             self._answered.setdefault(done.tick, {})[done.name] = done.packets
 
     # --- a machine is lost -------------------------------------------------------------------------------------------
@@ -224,6 +224,7 @@ class PacketLaws:
     def branch(self, number: int) -> None:
         """What is said from now on names this branch; what was said and is not written any more is void."""
         self._branch = number
+        self._answered.clear()
         self.said = {tick: raw for tick, raw in self.said.items() if tick in self._written}
         self._delivered = {key: tick for key, tick in self._delivered.items() if tick in self._written}
         self._name(number)
