@@ -377,9 +377,15 @@ FAULT_OF: Final[Mapping[str, Callable[[Dice, Sequence[str]], Fault]]] = {
     "machine": _machine,
 }
 KINDS: Final = list(FAULT_OF)
-PLAYERS_EVERY: Final = 8
-"""One of so many seeds, the last, also has players that are lost: by dice of their own, so that others are the same."""
+LOSES_PLAYERS: Final[tuple[int, ...]] = (7, 10, 15)
+"""Of sixteen seeds those, by their remainder, that also have players that are lost: by dice of their own, so that
+others are the same. Those of 7 and 15 are in the last world, where players act at arrival, those of 10 are not."""
 CHANGES_THE_WORLD: Final = frozenset({"add", "push", "machine", "player"})
 """Kinds after which the world is another one. After all others it is the one that would have been."""
 ONCE: Final[tuple[str, ...]] = ("flip",)
 """Kinds of which one a seed is enough: if all nodes had other frames, none would be right."""
+
+
+def loses_players(seed: int) -> bool:
+    """Whether a seed also has players that are lost."""
+    return seed % 16 in LOSES_PLAYERS

@@ -62,6 +62,8 @@ class PacketLaws:
         """What robots were told by the deliveries behind a tick."""
         self._received: dict[int, dict[str, list[Key]]] = {}
         """What clients were told at a tick."""
+        self._owed: dict[tuple[str, int], list[Key] | None] = {}
+        """Of who left owing, by client and tick, whose Go was not said: what it had, None until the tick is kept."""
         self._fates: dict[Key, tuple[int, str]] = {}
         """By packet: the tick at which its fate was final, and the cause."""
 
@@ -76,6 +78,8 @@ class PacketLaws:
         wrong = [message.node for message in samples if message.tick != tick or message.digest != digest]
         hold(not wrong, f"the samples of {wrong} at tick {tick} are not of its frame")
         self._samples[tick] = samples
+        for client in record.owing:
+            self._owes(client, tick)
         for client, sent in record.admitted:
             for packet in sent:
                 known = self._sequences.get(client, 0)
@@ -143,6 +147,9 @@ class PacketLaws:
                 of_it = robots if to in self._deployment.robots else clients.setdefault(to, [])
                 of_it.append((flight.source, to, flight.sequence, flight.copy))
         hold(robots == self._reached.get(tick, []), f"deliveries {tick + 1} are not what counts as delivered")
+        for name, owed in self._owed:
+            if owed == tick:
+                self._owed[name, tick] = clients.pop(name, [])
         told = {name: keys for name, keys in self._received.get(tick, {}).items() if keys}
         hold(clients == told, f"what clients were told at tick {tick} is not what counts as delivered")
         self._reached.pop(tick - LOST_TICKS_MAX, None)
@@ -163,6 +170,8 @@ class PacketLaws:
         if down.number not in known:
             keys = [(packet.source, client, packet.sequence, packet.copy) for packet in down.packets]
             self._received.setdefault(down.tick, {}).setdefault(client, []).extend(keys)
+            owed = self._owed.pop((client, down.tick), None)
+            hold(owed is None or owed == keys, f"downlink {down.number} of {client} is not what its Go had")
         hold(down.number <= len(known) + 1, f"downlink {down.number} of {client} after {len(known)}")
         hold(known.setdefault(down.number, raw) == raw, f"downlink {down.number} of {client} says two things")
         if isinstance(down, Go):
@@ -171,11 +180,21 @@ class PacketLaws:
             hold(down.tick >= known_tick, f"Go {down.tick} of {client} after {known_tick}")
             self._go_ticks[client] = down.tick
 
+    def _owes(self, client: str, tick: int) -> None:
+        """A client has left owing the Done of a tick: what its Go had is said from here on as what needs no answer."""
+        known = self._downlinks.setdefault(client, {})
+        number, raw = next(reversed(known.items()), (0, b""))
+        said = decode_any(Go | Down, raw) if raw else None
+        if said is None or said.tick < tick:
+            self._owed.setdefault((client, tick))
+        elif isinstance(said, Go):
+            known[number] = encode(Down(number, tick, said.acknowledged, said.packets, False, said.branch))
+
     def answers(self, done: Done, raw: bytes) -> None:
         """A lockstep client's answer to a tick is one; a process that takes another's place answers for itself."""
         said = self._dones.setdefault((done.name, done.boot, done.branch, done.tick), raw)
         hold(said == raw, f"{done.name} has two Dones of {done.tick}")
-        if done.tick > self.closed:
+        if done.tick > self.closed and done.branch == self._branch:
             self._answered.setdefault(done.tick, {})[done.name] = done.packets
 
     # --- a machine is lost -------------------------------------------------------------------------------------------
@@ -191,6 +210,7 @@ class PacketLaws:
                 self.closes(record, decode(Commit, record.commit).digest)
         self._answered.clear()
         self._received = {tick: told for tick, told in self._received.items() if tick <= self.closed}
+        self._owed = {key: keys for key, keys in self._owed.items() if key[1] <= self.closed}
         for state, _ in fold(self._deployment, journal):
             last = state
         for client, known in self._downlinks.items():
@@ -204,6 +224,7 @@ class PacketLaws:
     def branch(self, number: int) -> None:
         """What is said from now on names this branch; what was said and is not written any more is void."""
         self._branch = number
+        self._answered.clear()
         self.said = {tick: raw for tick, raw in self.said.items() if tick in self._written}
         self._delivered = {key: tick for key, tick in self._delivered.items() if tick in self._written}
         self._name(number)
@@ -232,6 +253,7 @@ class PacketLaws:
         state = system.hub.state
         assert state is not None
         self.account(state)
+        hold(not self._owed, f"what these had left owing was never said: {sorted(self._owed)}")
         hold(state.packets.refused == 0, f"lockstep clients repeat nothing, {state.refusals} were refused")
         counted = {DELIVERED: 0, DROPPED: 0, IN_FLIGHT: 0}
         fates = {key: cause for key, (_, cause) in self._fates.items() if key[3] == 0}

@@ -32,12 +32,12 @@ from foosim.rehearsal.faults import (
     KINDS,
     MS,
     ONCE,
-    PLAYERS_EVERY,
     TICKS,
     Dice,
     Fault,
     ask,
     lose_player,
+    loses_players,
     revive,
     when_answered,
 )
@@ -124,7 +124,7 @@ def plan_of(seed: int, ticks: int = TICKS) -> Plan:
     once = [kind for place, kind in enumerate(chosen) if kind not in ONCE or kind not in chosen[:place]]
     late = max(0, ticks - TICKS)
     faults = [_later(FAULT_OF[kind](dice, names), dice.between(0, late) if late else 0) for kind in once]
-    if seed % PLAYERS_EVERY == PLAYERS_EVERY - 1:
+    if loses_players(seed):
         of_players = Dice(seed, "players")
         lost = [lose_player(of_players, names) for _ in range(of_players.between(1, 3) * times)]
         faults += [_later(fault, of_players.between(0, late) if late else 0) for fault in lost]

@@ -24,8 +24,8 @@ WORDS_MAX: Final = 300
 class Ending:
     """How a process ended: its exit code (-N: signal N), the end of its log, and what else is known.
 
-    `killed_by_us` is why its launcher killed it, empty when it did not; `out_of_memory` says that the kernel has killed
-    processes for want of memory while this one lived.
+    `killed_by_us` is why its launcher killed it, empty when it did not; `oom_killed` says where the kernel has killed
+    processes for want of memory while this one lived, which may have been others; empty for nowhere.
     """
 
     code: int
@@ -33,7 +33,7 @@ class Ending:
     """The name of the signal that ended it."""
     log: Sequence[str] = ()
     killed_by_us: str = ""
-    out_of_memory: bool = False
+    oom_killed: str = ""
     is_remote: bool = False
 
     @property
@@ -47,9 +47,10 @@ class Ending:
         if self.killed_by_us:
             return f"was killed by up: {self.killed_by_us}"
         if self.code < 0:
-            if self.out_of_memory or self._lacked_memory:
+            if self._lacked_memory:
                 return f"was killed by {self.signal}: too little memory"
-            return f"was killed by {self.signal}, not by foosim"
+            meanwhile = f"; too little memory: the kernel has killed for that {self.oom_killed} while it ran"
+            return f"was killed by {self.signal}, not by foosim{meanwhile * bool(self.oom_killed)}"
         if self._lacked_memory:
             return f"ended with exit code {self.code}: too little memory"
         if self.code == REFUSED and self.last_words:

@@ -25,7 +25,7 @@ from foosim.protocol.errors import Failed
 from foosim.protocol.process import STACK_SIGNAL
 from foosim.supervisor.children import GRACE_S, child_environment, script
 from foosim.supervisor.ending import Ending
-from foosim.supervisor.memory import oom_kills
+from foosim.supervisor.memory import OomKills, oom_kills
 from foosim.supervisor.remote import Remote
 
 POLL_S: Final = 0.02
@@ -48,8 +48,10 @@ class Child:
     """The machine that it runs on when that is another one: `process` is the ssh that holds it."""
     begin: int = 0
     """Where its log begins, behind what those before it said."""
-    oom_kills: int = 0
+    oom_kills: OomKills = field(default_factory=OomKills)
     """How many processes the kernel had killed for want of memory when it was started."""
+    oom_killed: str | None = None
+    """Where the kernel had killed for that by the time that its end was noticed; None before."""
     killed: str = ""
     """Why the launcher killed it; empty when it did not."""
 
@@ -64,8 +66,10 @@ class Child:
         code = self.exit_code
         assert code is not None, f"{self.name} lives"
         name = signal.Signals(-code).name if code < 0 else ""
-        ran_out = code == -signal.SIGKILL and self.remote is None and oom_kills() > self.oom_kills
-        return Ending(code, name, self._tail(LINES), self.killed, ran_out, self.remote is not None)
+        if self.oom_killed is None:
+            may_be = code == -signal.SIGKILL and self.remote is None
+            self.oom_killed = oom_kills().since(self.oom_kills) if may_be else ""
+        return Ending(code, name, self._tail(LINES), self.killed, self.oom_killed, self.remote is not None)
 
     @property
     def ending(self) -> str:

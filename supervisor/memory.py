@@ -1,13 +1,14 @@
-"""Whether the kernel killed processes for want of memory: its counters, and what a process says that got none.
+"""Whether the kernel killed processes for want of memory: its counters, and what they say of one that was killed.
 
-A process that the kernel kills says nothing, and ends as by anybody's SIGKILL; only the counters of the control group
-and of the machine tell. Neighbours: `launcher` compares them, `ending` has the words.
+A process that the kernel kills says nothing, and ends as by anybody's SIGKILL. Only counters tell: of its control group
+(version 2), and of the machine, where others may have been killed as well. The kernel's log names processes, and is for
+administrators. Neighbours: `launcher` compares them, `ending` has the words.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 _VMSTAT: Final = Path("/proc/vmstat")
 _OWN_GROUP: Final = Path("/proc/self/cgroup")
@@ -15,12 +16,26 @@ _GROUPS: Final = Path("/sys/fs/cgroup")
 COUNTER: Final = "oom_kill"
 
 
-def oom_kills() -> int:
-    """Return how many processes the kernel has killed for want of memory, in this control group and on this machine.
+class OomKills(NamedTuple):
+    """How many processes the kernel has killed for want of memory; 0 where it does not say."""
 
-    0 where the kernel does not say.
-    """
-    return _count(_VMSTAT) + _count(_group() / "memory.events")
+    group: int = 0
+    """Of this process's control group, in which its children are, too, without groups below it."""
+    machine: int = 0
+
+    def since(self, before: OomKills) -> str:
+        """Return what is known of one that lived since `before`: where the kernel has killed since; empty for nowhere.
+        """
+        if self.group > before.group:
+            return "in its control group"
+        return "on this machine" if self.machine > before.machine else ""
+
+
+def oom_kills() -> OomKills:
+    """Return the counters as they are. Before Linux 5.2 a group's has those of groups below it."""
+    group = _group()
+    local = group / "memory.events.local"
+    return OomKills(_count(local if local.exists() else group / "memory.events"), _count(_VMSTAT))
 
 
 def _group() -> Path:

@@ -274,7 +274,7 @@ class HubCore:
             state.members[name].downlink += 1
         record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
         self.actions.append(Journal(record))
-        self.door.say_unsaid(world.closing, now_ns)
+        self.door.say_owed(world.closing, now_ns)
         self.door.tell()
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         if not state.was_final:
@@ -376,7 +376,7 @@ class HubCore:
         self.actions += past.words()
         if past.epoch is not None:
             self._take_epoch(past.epoch)
-            self.footing.stand(past.machine, past.published)
+            self.footing.stand(past.machine, past.published, past.owing)
         self._patience.progress(self.deployment.tick_ns, now_ns)
 
     def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:

@@ -372,16 +372,17 @@ class Door:
             self.absences.leave(name, closing.frame.tick)
         self._owing = []
 
-    def say_unsaid(self, closing: Closing, now_ns: int) -> None:
-        """Behind the record of a tick, say what its Go had for those who left owing and were never told it."""
+    def say_owed(self, closing: Closing, now_ns: int) -> None:
+        """Behind the record of a tick, say what its Go had to the processes that come for those who left owing."""
         for name in closing.owing:
-            self._core.sessions.say_unsaid(name, now_ns)
+            self._core.sessions.say_owed(name, now_ns)
 
     def _is_waited_for(self, name: str) -> bool:
-        """Whether the run waits for a client: it is in lockstep, or a tick still waits for its Done."""
+        """Whether the run waits for a client: it is in lockstep, or the tick that is being closed goes by its Done."""
         known = self._known(name)
         is_here = isinstance(known, Joining) or (known is not None and known.active and name not in self._leaves)
-        return self._core.waits_for(name) or (known is not None and is_here and known.period > 0)
+        is_in_lockstep = known is not None and is_here and known.period > 0
+        return self._core.waits_for(name) or name in self._owing or is_in_lockstep
 
     @property
     def _start_ns(self) -> int:

@@ -33,6 +33,8 @@ class Footing:
         self._machine = self._written_on = machine
         self._published: list[bytes] = []
         """What is said first: the last deliveries of the vHub before, which may have been written and not said."""
+        self._owing: list[str] = []
+        """Clients that left at its last tick, owing the Done: the same holds for the packets of their Go."""
         self._from = limits.COUNTER_MAX
         """The epoch from which on it may proceed."""
 
@@ -41,9 +43,10 @@ class Footing:
         """What the journal names: the start of the machine before, until its end is known to be all there is."""
         return self._written_on if self.waits else self._machine
 
-    def stand(self, machine: str, published: bytes) -> None:
-        """Wait: the journal that is gone on with names this start of a machine, and these deliveries as the last."""
-        self.waits, self._written_on = True, machine
+    def stand(self, machine: str, published: bytes, owing: list[str]) -> None:
+        """Wait: the journal that is gone on with names this start of a machine, these deliveries as the last, and who
+        left `owing` at its last tick."""
+        self.waits, self._written_on, self._owing = True, machine, owing
         self._published = [published] if published else []
         self.lost_machine = "" != machine != self._machine != ""
 
@@ -86,6 +89,8 @@ class Footing:
             core.actions.append(Journal(core.head()))
         for payload in self._published:
             core.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
+        for name in self._owing:
+            core.sessions.say_again(name, state.members[name].downlink)
         for tick in range(state.closed + 1, state.final + 2):
             for kind in (channels.COMMIT, channels.SAMPLES):
                 want = encode(Want(channels.VHUB, kind.name, tick, core.epoch, []))

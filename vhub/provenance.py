@@ -89,9 +89,8 @@ def _wifi(settings: Radio) -> Iterator[Row]:
         if time_ns:
             yield name, _us(time_ns), timing.source.partition(";")[0]
     for category, (aifsn, low, high) in (DOT11P_CATEGORIES if is_dot11p else CATEGORIES).items():
-        if category in ("best_effort", "video", "voice"):  # those of `access`
-            source = "[S] ns-3 wifi-mac.cc" if category in _READ and not is_dot11p else "[R] IEEE 802.11: unverified"
-            yield f"AIFSN, CW of {category}", f"{aifsn}, {low} to {high}", source
+        source = "[S] ns-3 wifi-mac.cc" if category in _READ and not is_dot11p else "[R] IEEE 802.11: unverified"
+        yield f"AIFSN, CW of {category}", f"{aifsn}, {low} to {high}", source
     modes = wifi_modes(settings)
     rates = [rate_text(errors.MODES[mode].rate_bps) for mode in (modes[0], modes[-1])]
     yield "bit rates", " to ".join(rates), "[S] IEEE 802.11 OFDM; errors by ns-3's nist-error-rate-model.cc"

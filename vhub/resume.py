@@ -64,6 +64,8 @@ class Past:
     """The last deliveries that were published."""
     downlinks: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
     """Numbered downlinks outside of lockstep, by client."""
+    owing: list[str] = field(default_factory=list)
+    """Clients that left at the last tick, owing its Done."""
     known: Frame | None = None
     """The last frame that the capture has."""
     kept: list[Keep | KeepEpoch] = field(default_factory=list)
@@ -102,6 +104,7 @@ def recall(
     for folded in fold:
         _remember(past, folded.record.tick + 1, folded.record.deliveries)
         _number(past, folded)
+        past.owing = folded.record.owing
         if captured is not None and folded.record.tick > captured.tick:
             closings[folded.record.tick] = folded.closing
         elif captured is not None and folded.record.tick == captured.tick:
@@ -180,12 +183,13 @@ def _remember(past: Past, tick: int, payload: bytes) -> None:
 
 
 def _number(past: Past, folded: Folded) -> None:
-    """Note what a tick released outside of lockstep, numbered as it was."""
-    tick, members = folded.record.tick, folded.state.members
-    for name, flights in sorted(folded.released.items()):
+    """Note what a tick released outside of lockstep, numbered as it was; a Go whose Done is owed is a Down as well."""
+    tick, members, owing = folded.record.tick, folded.state.members, folded.record.owing
+    for name in sorted({*folded.released, *owing}):
         member = members[name]
-        if not member.is_due(tick):
-            down = Down(member.downlink, tick, member.sequence, received(flights), False, folded.state.branch)
+        if name in owing or not member.is_due(tick):
+            packets = received(folded.released.get(name, []))
+            down = Down(member.downlink, tick, member.sequence, packets, False, folded.state.branch)
             past.downlinks.setdefault(name, []).append((member.downlink, encode(down)))
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish
@@ -36,6 +36,10 @@ from foosim.vhub.downlinks import Downlinks
 from foosim.vhub.members import may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.state import HubState
+
+T = TypeVar("T")
+BOOTS_KEPT: Final = 32
+"""Of how many processes of one name it is kept that they were here: what comes late comes within seconds."""
 
 
 class Claim(NamedTuple):
@@ -63,12 +67,12 @@ class Session:
     """Whether its process has gone, and has not come back, nor another one."""
     returns: int = 0
     """How often its process had lost the vHub when it said hello."""
-    before: set[str] = field(default_factory=set)
-    """Boots of processes that are gone for good: what comes late of them is of nobody."""
+    before: dict[str, None] = field(default_factory=dict)
+    """Boots of the last processes that are gone for good: what comes late of them is of nobody."""
     is_missed: bool = False
     """Whether its hello has told that the process before it was lost while the vHub was away."""
     claims: dict[str, Claim] = field(default_factory=dict)
-    """Processes that were welcomed to the name and are not known to be gone, by boot."""
+    """The last processes that were welcomed to the name and are not known to be gone, by boot."""
     away_ns: int = -1
     """Until when a client that is away may come back at least, and one that was started again may join; -1 while it is
     here."""
@@ -81,8 +85,6 @@ class Session:
     heard_ns: int = 0
     go: bytes = b""
     go_tick: int = -1
-    is_go_said: bool = False
-    """Whether that Go was said to any process of the client."""
     again_ns: int = 0
     again_after_ns: int = limits.WANT_AFTER_NS
     deadline_ns: int = 0
@@ -104,7 +106,7 @@ class Session:
         """A process of the client is here; it goes on behind these numbers. It may be away until it `joins_first`."""
         if boot != self.boot:
             if self.boot and self.is_gone:
-                self.before.add(self.boot)
+                _remember(self.before, self.boot, None)
                 self.claims.pop(self.boot, None)
             self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
         self.is_present = self.is_present and boot == self.boot
@@ -197,7 +199,8 @@ class Sessions:
         session = self.by_name.get(hello.name)
         if session is None:
             session = self.by_name[hello.name] = Session(hello.name, hello.boot)
-        claim = session.claims[hello.boot] = self._claim(session, hello, state, said)
+        claim = self._claim(session, hello, state, said)
+        _remember(session.claims, hello.boot, claim)
         if not session.is_held_against(hello.boot):
             self._take(session, claim, deployment)
         welcome = ClientWelcome(
@@ -357,18 +360,22 @@ class Sessions:
         session.go = encode(go)
         session.go_tick = go.tick
         session.done = None
-        session.is_go_said = session.is_present
         if session.is_present:
             self._actions.append(Publish(channels.DOWN, session.name, session.go))
 
-    def say_unsaid(self, name: str, now_ns: int) -> None:
-        """Say what a Go has that was never said, and keep it: it counts as delivered, and nobody is to answer it."""
-        session = self.by_name[name]
-        if not session.is_go_said:
-            go = decode(Go, session.go)
-            payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.branch))
-            self.downlinks.keep(name, go.number, payload, now_ns)
-            self._actions.append(Publish(channels.DOWN, name, payload))
+    def say_owed(self, name: str, now_ns: int) -> None:
+        """Say what the Go has whose Done is owed, and keep it: it counts as delivered, and nobody is to answer it.
+
+        Whether any process has heard that Go, and whether the one that joins next has, is not known.
+        """
+        go = decode(Go, self.by_name[name].go)
+        payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.branch))
+        self.downlinks.keep(name, go.number, payload, now_ns)
+        self._actions.append(Publish(channels.DOWN, name, payload))
+
+    def say_again(self, name: str, number: int) -> None:
+        """Say a client's downlinks from a number on, which the vHub before may have written and not said."""
+        self._actions += [Publish(channels.DOWN, name, said) for said in self.downlinks.behind(name, number - 1)]
 
     def say_down(self, name: str, down: Down, now_ns: int) -> None:
         """Give a client what is released to it outside of lockstep, or the news of the end; and keep it."""
@@ -384,7 +391,6 @@ class Sessions:
         session.is_present = True
         session.away_ns = -1
         if session.is_behind:
-            session.is_go_said = session.is_go_said or waits
             session.deadline_ns = now_ns + session.allowed_ns if waits else 0
             session.is_behind = False
             missed = [*self.downlinks.behind(session.name, session.received), *([session.go] if waits else [])]
@@ -427,3 +433,11 @@ class Sessions:
 
 def _already_here(name: str) -> str:
     return f"a client {name} is already here"
+
+
+def _remember(by_boot: dict[str, T], boot: str, what: T) -> None:
+    """Note something of a process, as the newest of the `BOOTS_KEPT` that are kept."""
+    by_boot.pop(boot, None)
+    by_boot[boot] = what
+    while len(by_boot) > BOOTS_KEPT:
+        del by_boot[next(iter(by_boot))]

@@ -193,6 +193,11 @@ def _unwritten_leave(planting: Planting) -> None:
     before: Any = planting.swap(Door, "leave_owing", leave_owing)
 
 
+@register("what is owed is not said", "what the Go of who leaves owing had is said behind the record", 127)
+def _unsaid(planting: Planting) -> None:
+    planting.swap(Sessions, "say_owed", lambda self, name, now_ns: None)
+
+
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)
 def _kept_commits(planting: Planting) -> None:
     planting.swap(Commits, "forget", lambda self, tick: None)

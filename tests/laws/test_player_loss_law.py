@@ -13,13 +13,16 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.protocol.codec import decode_any
+from foosim.protocol import channels
+from foosim.protocol.actions import Publish
+from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify_capture
 from foosim.rehearsal.whatif import what_if
 from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.core import HubCore
 from foosim.vhub.records import AbsencesRecord, HubRecord, InputsRecord, TickRecord, fold
 from foosim.vhub.rows import CLIENTS, ClientRow
 from tests.turns import BY_PERIOD
@@ -37,7 +40,13 @@ class Run:
     """A rehearsal in which a player is killed at a tick, and started again after some virtual time."""
 
     def __init__(
-        self, path: Path, pace: str, back_ms: int, *sets: str, also: Callable[[System], None] | None = None
+        self,
+        path: Path,
+        pace: str,
+        back_ms: int,
+        *sets: str,
+        also: Callable[[System], None] | None = None,
+        hub: type[HubCore] = HubCore,
     ) -> None:
         self.records: list[bytes] = []
         self.path = path
@@ -54,7 +63,8 @@ class Run:
             if also is not None:
                 also(system)
 
-        settings = Settings(on_journal=lambda name, record: self.records.append(record) if name == "vhub" else None)
+        settings = Settings(hub=hub)
+        settings.on_journal = lambda name, record: self.records.append(record) if name == "vhub" else None
         kind = Pace("fast") if pace == "fast" else Pace("realtime", Fraction(1))
         told: dict[str, Any] = {"prepare": prepare, "capture": path, "pace": kind}
         self.json = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, (*SETS, *sets), settings, **told).json
@@ -86,11 +96,33 @@ def test_in_fast_the_run_waits_and_the_new_process_answers_the_open_go(tmp_path:
     assert statistics.missing == 0 and statistics.answered == (TICKS - 100) // 5, "with new memory"
 
 
-@pytest.mark.parametrize("sets", [(), AT_ARRIVAL], ids=["by period", "at arrival"])
+class LateNews(HubCore):
+    """Its heartbeats that tell at once of what is over are lost: the next one does, behind commits of many ticks, and
+    one from before it, in which a player is away, comes between."""
+
+    away, left = b"", -1
+
+    def say_heartbeat(self) -> None:
+        assert self.state is not None
+        if self.door.absences.report()["over"]:
+            self.left = self.left if self.left >= 0 else self.state.closed
+        else:
+            super().say_heartbeat()
+            self.away = encode(self.heartbeat())
+
+    def advance(self, now_ns: int) -> None:
+        super().advance(now_ns)
+        if self.left >= 0 and self.state is not None and self.state.closed == self.left + 3:
+            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, self.away))
+
+
+@pytest.mark.parametrize(
+    ("sets", "hub"), [((), HubCore), (AT_ARRIVAL, LateNews)], ids=["by period", "at arrival, with late news"]
+)
 def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_later_one(
-    sets: tuple[str, ...], tmp_path: Path
+    sets: tuple[str, ...], hub: type[HubCore], tmp_path: Path
 ) -> None:
-    run = Run(tmp_path / "run.mcap", "realtime", 500, *SOON, *sets)
+    run = Run(tmp_path / "run.mcap", "realtime", 500, *SOON, *sets, hub=hub)
     run.check()
     (joined, left, back) = run.comings()
     assert joined == (0, "joins") and left[1] == "leaves_owing" and back[1] == "joins"
@@ -99,6 +131,8 @@ def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_late
     lost, came = run.json["recoveries"]
     assert lost["reason"] == "its connection closed; the run goes on without it"
     assert (lost["what"], lost["tick"], came["what"], came["tick"]) == ("player", left[0], "return", back[0])
+    assert lost["outage_ms"] == pytest.approx(200, abs=15), "deadlines.client_back, whenever that is told"
+    assert came["outage_ms"] < 15
     found = [decode_any(HubRecord, raw) for raw in run.records]
     ticks = {record.tick: record for record in found if isinstance(record, TickRecord)}
     assert ticks[left[0]].owing == [RED]

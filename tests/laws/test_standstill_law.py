@@ -1,23 +1,40 @@
 """Who stood still itself blames nobody for that time, and a client's time runs only while the run can go on.
 
 Supervisor, vHub and players with the deadlines of every day, in virtual time; the run goes on and is the run that would
-have been. Those of nodes and of the launcher are in `test_standstill.py` of `protocol` and `supervisor`.
+have been. Those of nodes and of the launcher are in `test_standstill.py` of `protocol` and `supervisor`; that each
+process's loop tells of it is at the end, for all of them at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from functools import cache, partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Final
 
 import pytest
 
+from foosim.client.client import Link
 from foosim.client.core import ClientCore
+from foosim.client.main import PlayerProcess
+from foosim.node.main import NodeProcess
+from foosim.protocol import loop as loops
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.journal import Journal
+from foosim.protocol.orphan import Orphan
+from foosim.protocol.session import Session
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.main import SupervisorProcess
+from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.run_folder import RunFolder
+from foosim.supervisor.watch import Watch
+from foosim.vhub.door import Door
+from foosim.vhub.main import HubOptions, HubProcess
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60
@@ -201,3 +218,47 @@ def test_a_client_that_has_the_time_of_a_start_keeps_it_when_the_clock_rests() -
         system.later(1_000 * MS, partial(system.set_forward, VHUB, 3_000 * MS))
 
     assert_nobody_was_lost(fly(both, FAST, "deadlines.start=10 s", "deadlines.lockstep_fast=1 s"), "vhub")
+
+
+# --- the shells: whose loop stood still tells it to what has deadlines there -----------------------------------------
+
+
+@pytest.fixture(scope="module")
+def plane() -> Iterator[Session]:
+    with Session.router("tcp/127.0.0.1:0") as session:
+        yield session
+
+
+def supervisor_of(session: Session, inbox: Inbox, folder: Path) -> object:
+    plan = make_plan(RunOptions(TABLE, duration="1 s", sets=("engine=pure",)))
+    with Journal(folder / "journals", SUPERVISOR) as journal:
+        return SupervisorProcess(plan, RunFolder(folder), session, inbox, journal, None)
+
+
+SHELLS: Final[dict[str, tuple[Callable[[Session, Inbox, Path], Any], type]]] = {
+    "supervisor": (supervisor_of, Watch),
+    "vhub": (lambda session, inbox, _: HubProcess(session, lambda deployment: session, inbox, HubOptions()), Door),
+    "node": (lambda session, inbox, _: NodeProcess("n1", session, inbox), Orphan),
+    "players": (lambda session, inbox, _: PlayerProcess(PLAYERS, session, inbox), ClientCore),
+    "client": (lambda session, _, __: Link(ClientCore("ear", "boot", time.monotonic_ns()), session), ClientCore),
+}
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_each_process_counts_for_how_long_its_own_loop_stood_still(
+    shell: str, plane: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make, has_deadlines = SHELLS[shell]
+    told: list[tuple[int, int]] = []
+    monkeypatch.setattr(has_deadlines, "rest", lambda self, *what: told.append(what[-2:]))
+    clock = [time.monotonic_ns()]  # cores are made by the same one
+    monkeypatch.setattr(loops, "time", SimpleNamespace(monotonic_ns=lambda: clock[0]))
+    inbox = Inbox(1000)
+    process = make(plane, inbox, tmp_path)
+    for pass_ns in (60_000 * MS, 10_000 * MS):
+        told.clear()
+        clock[0] += pass_ns
+        inbox.wake()
+        process._loop.go_round()
+    assert [now_ns for _, now_ns in told] == [clock[0]] * (len(PLAYERS) if shell == "players" else 1)
+    assert all(9_000 * MS < stood_ns <= 10_000 * MS for stood_ns, _ in told), "less the time at which it meant to look"

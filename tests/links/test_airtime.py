@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from math import ceil
+from typing import get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foosim.protocol.radios import Radio
 from foosim.vhub.radio.airtime import (
     lora_airtime_ns,
     lrwpan_airtime_ns,
@@ -83,7 +85,7 @@ def test_spaces_between_frames() -> None:
     assert (best_effort.difs_ns, best_effort.cw_min, best_effort.cw_max) == (43_000, 15, 1023)
     assert (voice.difs_ns, voice.cw_min, voice.cw_max) == (34_000, 3, 7)
     assert with_category(DOT11P, DOT11P_CATEGORIES["best_effort"]).difs_ns == 110_000
-    assert with_category(WIFI_5, CATEGORIES["legacy"]) == WIFI_5
+    assert CATEGORIES.keys() == DOT11P_CATEGORIES.keys() == {*get_args(Radio.model_fields["access"].annotation)}
 
 
 def test_802154() -> None:

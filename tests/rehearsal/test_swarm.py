@@ -12,21 +12,27 @@ from typer.testing import CliRunner
 
 from foosim.node.core import NodeCore
 from foosim.node.step import Work
+from foosim.protocol.codec import encode
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.messages import Deliveries, Done, Sent
 from foosim.rehearsal.bus import CALM
 from foosim.rehearsal.clock import Clock
+from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.faults import (
     CHANGES_THE_WORLD,
     FAULT_OF,
     HEALED_TICK,
     HOUR_NS,
     KINDS,
-    PLAYERS_EVERY,
     TICKS,
     Dice,
+    loses_players,
 )
+from foosim.rehearsal.packet_laws import PacketLaws
 from foosim.rehearsal.rehearse_command import app
 from foosim.rehearsal.swarm import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
 from foosim.rehearsal.system import Settings
+from foosim.vhub.records import TickRecord
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MINUTE_TICKS: Final = 30_000
@@ -60,16 +66,34 @@ def test_the_laws_hold_where_links_make_copies() -> None:
 
 def test_a_seed_is_a_plan() -> None:
     assert plan_of(7) != plan_of(8)
+    worlds = set()
     for seed in range(200):
         plan = plan_of(seed)
         players = [fault for fault in plan.faults if fault.kind == "player"]
-        assert bool(players) == (seed % PLAYERS_EVERY == PLAYERS_EVERY - 1)
+        assert bool(players) == loses_players(seed)
+        worlds |= {seed % WORLDS == WORLDS - 1} if players else set()
         assert plan.nodes in NODES and FAULTS[0] - 3 <= len(plan.faults) - len(players) <= FAULTS[1]
         assert len(plan.kinds) >= 3 and len(plan.faults) >= 5
         assert all(0 < fault.tick < HEALED_TICK for fault in plan.faults)
         again = plan_of(seed)
         assert [(f.tick, f.what) for f in plan.faults] == [(f.tick, f.what) for f in again.faults]
     assert {fault.kind for seed in range(200) for fault in plan_of(seed).faults} == {*KINDS, "player"}
+    assert worlds == {False, True}, "where players act at arrival, and where they have ticks of their own"
+
+
+def test_what_was_answered_in_a_branch_that_is_left_is_in_no_record() -> None:
+    """The machine of the vHub is lost while an answer is on its way (seed 1658): what it answers is void."""
+    laws = PacketLaws(load_deployment(TABLE.read_text(), TABLE.name))
+    record = TickRecord(0, b"", [], [], [], [], [], encode(Deliveries(1, [], branch=1)))
+    packets = [Sent(1, "red.goal", "echo", 0, b"")]
+    laws.answers(Done("player-red", "boot", 0, packets), b"done")
+    laws.branch(1)
+    laws.answers(Done("player-red", "boot", 0, packets), b"done")
+    laws.closes(record, b"")
+    laws = PacketLaws(load_deployment(TABLE.read_text(), TABLE.name))
+    laws.answers(Done("player-red", "boot", 0, packets), b"done")
+    with pytest.raises(Broken, match="a crash has lost some"):
+        laws.closes(record, b"")
 
 
 def test_clocks_decide_nothing() -> None:

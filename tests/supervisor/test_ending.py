@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from types import SimpleNamespace
+from typing import Any, Final
 
 import pytest
 
-from foosim.supervisor import memory
+from foosim.supervisor import launcher, memory
 from foosim.supervisor.ending import Ending
-from foosim.supervisor.memory import oom_kills
+from foosim.supervisor.launcher import Child
+from foosim.supervisor.memory import OomKills, oom_kills
 
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 
@@ -19,7 +21,11 @@ REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the superviso
     [
         (Ending(-9, "SIGKILL"), "was killed by SIGKILL, not by foosim"),
         (Ending(-9, "SIGKILL", killed_by_us="it had no answer"), "was killed by up: it had no answer"),
-        (Ending(-9, "SIGKILL", out_of_memory=True), "was killed by SIGKILL: too little memory"),
+        (
+            Ending(-9, "SIGKILL", oom_killed="on this machine"),
+            "was killed by SIGKILL, not by foosim; "
+            "too little memory: the kernel has killed for that on this machine while it ran",
+        ),
         (
             Ending(-6, "SIGABRT", ["memory allocation of 4096 bytes failed"]),
             "was killed by SIGABRT: too little memory",
@@ -45,14 +51,34 @@ def test_a_signal_is_known_on_another_machine_too() -> None:
     assert not Ending(137).is_by_signal and not Ending(1, is_remote=True).is_by_signal
 
 
-def test_the_kernel_says_how_many_it_has_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_kernel_says_where_it_has_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the process's own control group it may have been this one, elsewhere on the machine anybody."""
+    group = tmp_path / "user" / "run"
+    group.mkdir(parents=True)
     (tmp_path / "vmstat").write_text("pgfault 12\noom_kill 3\n")
-    (tmp_path / "group").write_text("0::/user/run\n")
-    (tmp_path / "user" / "run").mkdir(parents=True)
-    (tmp_path / "user" / "run" / "memory.events").write_text("low 0\noom 9\noom_kill 2\n")
+    (tmp_path / "group").write_text("4:memory:/other\n0::/user/run\n")
+    (group / "memory.events").write_text("low 0\noom 9\noom_kill 2\n")
     for name, place in (("_VMSTAT", "vmstat"), ("_OWN_GROUP", "group"), ("_GROUPS", "")):
         monkeypatch.setattr(memory, name, tmp_path / place)
-    assert oom_kills() == 5
-    (tmp_path / "user" / "run" / "memory.events").unlink()
-    (tmp_path / "vmstat").unlink()
-    assert oom_kills() == 0, "where it does not say"
+    begun = oom_kills()
+    assert begun == OomKills(2, 3) and oom_kills().since(begun) == ""
+    (tmp_path / "vmstat").write_text("oom_kill 4\n")
+    assert oom_kills().since(begun) == "on this machine"
+    (group / "memory.events").write_text("oom_kill 3\n")
+    assert oom_kills().since(begun) == "in its control group"
+    (group / "memory.events.local").write_text("oom_kill 2\n")
+    assert oom_kills().since(begun) == "on this machine", "the one that was killed was in a group below"
+    for path in (*group.iterdir(), tmp_path / "vmstat"):
+        path.unlink()
+    assert oom_kills() == OomKills(0, 0), "where it does not say"
+
+
+def test_what_is_killed_on_a_machine_after_its_end_is_not_held_against_a_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counts = [OomKills(0, 5), OomKills(0, 6)]
+    monkeypatch.setattr(launcher, "oom_kills", lambda: counts.pop(0))
+    ended: Any = SimpleNamespace(poll=lambda: -9)
+    child = Child("red", ("foosim-node",), tmp_path / "log", ended, oom_kills=OomKills(0, 5))
+    for _ in range(2):
+        assert child.ending == "was killed by SIGKILL, not by foosim"

@@ -13,11 +13,12 @@ from foosim.protocol.client_messages import ClientRefusal, Failure
 from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.hub_messages import Proceed
-from foosim.protocol.messages import ClientHello, ClientWelcome, Down, Epoch, Join, Tempo
+from foosim.protocol.messages import ClientHello, ClientWelcome, Down, Epoch, Go, Join, Tempo
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep
 from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.resume import recall
+from foosim.vhub.sessions import BOOTS_KEPT
 from tests.vhub.test_sessions import BUILD, FRAME, MS, OWNERS, PERIODS, TABLE, Hub, sent
 
 PLAYERS: Final = apply_sets(TABLE.read_text(), TABLE.name, ("network.links=[]",))
@@ -148,13 +149,14 @@ def playing() -> Hub:
     return hub
 
 
-def restarted(hub: Hub) -> Hub:
+def restarted(hub: Hub, proceeds: bool = True) -> Hub:
     """The vHub is started again."""
     records = [action.record for action in hub.core.actions if isinstance(action, Journal)]
     hub.core = HubCore("boot-2", bytes(32), 0)
     hub.say(channels.BUILD, "vhub", msgspec.structs.replace(BUILD, deployment=PLAYERS, boot="boot-2"))
     hub.core.begin(recall(load_deployment(PLAYERS, TABLE.name), BUILD.run, records, None, 0), 0)
-    hub.say(channels.PROCEED, "vhub", Proceed("vhub", "boot-2", 0))
+    if proceeds:
+        hub.say(channels.PROCEED, "vhub", Proceed("vhub", "boot-2", 0))
     return hub
 
 
@@ -221,6 +223,22 @@ def test_what_comes_late_of_a_process_that_has_not_joined_is_no_answer() -> None
     assert RED not in hub.core.waited
 
 
+def test_of_processes_that_come_and_go_under_one_name_the_last_are_kept() -> None:
+    """However long a run is, and whether they join or not; what comes late of the last ones is of nobody still."""
+    hub = table()
+    for number in range(3 * BOOTS_KEPT):
+        hub.enter(RED, 5, f"joins {number}")
+        hub.core.client_gone(RED, 0)
+        assert hello(hub, RED, f"joins {number}") == []
+    session = hub.core.sessions.by_name[RED]
+    for number in range(3 * BOOTS_KEPT):
+        hello(hub, RED, "lives")
+        hello(hub, RED, f"ends {number}")
+        assert len(session.before) <= BOOTS_KEPT and len(session.claims) <= BOOTS_KEPT and "lives" in session.claims
+    assert hello(hub, RED, "joins 94") == [] and join(hub, RED, "lives") == []
+    assert session.boot == "lives"
+
+
 @pytest.mark.parametrize("is_started", [False, True], ids=["ends before its hello", "is welcomed and joins late"])
 def test_what_a_player_that_leaves_owing_was_not_told_is_said_behind_the_record(is_started: bool) -> None:
     """Its Go was for a process that had not joined: it counts as delivered, and has its number among its downlinks."""
@@ -247,6 +265,67 @@ def test_what_a_player_that_leaves_owing_was_not_told_is_said_behind_the_record(
     if is_started:
         hub.say(channels.UP, RED, Join(RED, "two", 5, []))
         assert hub.said(channels.DOWN) == [down], "it may not have heard it before"
+
+
+def told(hub: Hub, name: str) -> list[Go | Down]:
+    """What was said to a client so far."""
+    said = [action for action in hub.core.actions if isinstance(action, Publish) and action.channel is channels.DOWN]
+    return [decode_any(Go | Down, action.payload) for action in said if action.name == name]
+
+
+def left_owing() -> tuple[Hub, Go]:
+    """A player was told its Go and died; the next process was welcomed, and has not joined when the run goes on."""
+    hub = playing()
+    hub.say(channels.TEMPO, "supervisor", Tempo("realtime", False))
+    hub.commit(5)
+    go = told(hub, RED)[-1]
+    assert isinstance(go, Go) and go.tick == 5
+    hub.core.client_gone(RED, 0)
+    hub.say(channels.CLIENT_HELLO, RED, ClientHello(RED, "two", limits.PROTOCOL_VERSION, "", 0))
+    hub.now_ns = 30_000 * MS
+    hub.core.wake(hub.now_ns)
+    assert hub.core.waited == [BLUE]
+    return hub, go
+
+
+@pytest.mark.parametrize("joins", ["before the tick is closed", "late", "late, a vHub that was started again"])
+def test_the_numbers_of_who_joins_behind_a_said_go_have_no_gap(joins: str) -> None:
+    """It was welcomed when the Go was open, so it counts from there: what that had is said to it, with its number."""
+    hub, go = left_owing()
+    if joins.startswith("before"):
+        hub.say(channels.UP, RED, Join(RED, "two", 5, []))
+        assert told(hub, RED)[-1] == go, "nobody is to answer it any more"
+    hub.done(BLUE, 5)
+    assert hub.state.closed == 5
+    boot, returns = "two", 0
+    if joins.endswith("again"):
+        hub, returns = restarted(hub), 1
+        hub.say(channels.CLIENT_HELLO, RED, ClientHello(RED, boot, limits.PROTOCOL_VERSION, "", go.number - 1, returns))
+    hub.say(channels.UP, RED, Join(RED, boot, 5, []))
+    assert told(hub, RED)[-1] == Down(go.number, 5, go.acknowledged, go.packets, False, 0)
+
+
+def test_a_vhub_that_dies_behind_the_record_of_who_left_owing_leaves_nothing_unsaid() -> None:
+    """It was written and not said; the next one says it when it may proceed, as it says the deliveries."""
+    hub, go = left_owing()
+    hub.done(BLUE, 5)
+    owed = Down(go.number, 5, go.acknowledged, go.packets, False, 0)
+    (at,) = (at for at, action in enumerate(hub.core.actions) if isinstance(action, Journal) and _is_of_tick(action, 5))
+    assert owed in told(hub, RED)
+    del hub.core.actions[at + 1 :]
+    assert owed not in told(hub, RED)
+    hub = restarted(hub, proceeds=False)
+    assert told(hub, RED) == []
+    hub.say(channels.PROCEED, "vhub", Proceed("vhub", "boot-2", 0))
+    assert told(hub, RED) == [owed]
+
+
+def test_a_player_that_comes_and_goes_while_its_tick_is_closed_without_it_is_waited_for() -> None:
+    hub, go = left_owing()
+    hub.say(channels.UP, RED, Join(RED, "two", 0, []))
+    hub.core.client_gone(RED, hub.now_ns)
+    hub.done(BLUE, 5)
+    assert hub.state.closed == 5 and told(hub, RED)[-1].number == go.number
 
 
 def _is_of_tick(action: Journal, tick: int) -> bool:

@@ -66,20 +66,17 @@ DOT11P: Final = WifiTiming(
 
 CATEGORIES: Final[Mapping[str, tuple[int, int, int]]] = MappingProxyType(
     {
-        "legacy": (2, 15, 1023),
-        "background": (7, 15, 1023),
         "best_effort": (3, 15, 1023),
         "video": (2, 7, 15),
         "voice": (2, 3, 7),
     }
 )
-"""AIFSN, cw_min and cw_max of 802.11's access categories with cw_min 15; `legacy` is plain DCF.
+"""AIFSN, cw_min and cw_max of those of 802.11's access categories that a radio may have, with cw_min 15.
 
-Source: ns-3's wifi-mac (best effort and voice were read there; background and video are recalled, unverified).
+Source: ns-3's wifi-mac (best effort and voice were read there; video is recalled, unverified).
 """
 DOT11P_CATEGORIES: Final[Mapping[str, tuple[int, int, int]]] = MappingProxyType(
     {
-        "background": (9, 15, 1023),
         "best_effort": (6, 15, 1023),
         "video": (3, 7, 15),
         "voice": (2, 3, 7),
