@@ -50,8 +50,8 @@ def _forgets(planting: Planting) -> None:
 
 @register("vHub does not wait", "a vHub that goes on from a journal closes nothing until it may", 3)
 def _does_not_wait(planting: Planting) -> None:
-    def stand(self: Any, machine: str, published: bytes) -> None:
-        before(self, machine, published)
+    def stand(self: Any, machine: str, published: bytes, owing: list[str]) -> None:
+        before(self, machine, published, owing)
         self.proceed = lambda proceed, payload, now_ns: None
         self._from = 0
         self.entered()
