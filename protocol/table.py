@@ -29,9 +29,13 @@ RuleTime = Annotated[int, Quantity(units.TIME, "0 s", "1 h")]
 
 
 class Part(BaseModel):
-    """Base of all models of the deployment: unknown keys are refused, types are not guessed, values do not change."""
+    """Base of all models of the deployment: unknown keys are refused, types are not guessed, values do not change.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    A model's validator is built when it is first used: each process would otherwise build some eighty that are parts of
+    the deployment's, when it starts.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
 
 
 class Playfield(Part):

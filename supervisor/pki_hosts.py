@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from foosim.protocol import identity, wall
-from foosim.protocol.certificate_files import read_ca
 from foosim.protocol.certificates import (
     CA_FILE,
     PASSWORD_SUFFIX,
@@ -83,6 +82,8 @@ def _checked(folder: Path, name: str) -> str:
     """Return what is in a file of a folder of certificates. Raises CertificateError."""
     path = folder / name
     if name == CA_FILE:
+        from foosim.protocol.certificate_files import read_ca
+
         read_ca(folder, wall.now_utc())
     elif path.suffix == PASSWORD_SUFFIX:
         read_password(path)

@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
 from foosim.protocol.deployment_file import apply_sets
+from foosim.protocol.loop import GC_THRESHOLDS
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree, write_yaml
 from tests.meter import Burden, Meter
 
@@ -53,12 +54,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """What is collected stays: no garbage collection looks at it, while it is collected or while tests run."""
+    """What is collected stays: no garbage collection looks at it, while it is collected or while tests run.
+
+    Then collections are as rare as in the processes of a run.
+    """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(*GC_THRESHOLDS)
         gc.enable()
 
 
