@@ -1,0 +1,222 @@
+"""Who looks at a run: committed frames for people, as long as somebody has a lease on them.
+
+`watch` begins or renews a lease of the one who asks, `describe` says what one has to know to read frames. A frame goes
+out on `view` as the bytes that were journalled, at the highest rate that a lease asks for on the wall, one whose edits
+change the layout at once, and what is behind them at the next wake: of a world that is paused the last frame was shown.
+Leases are in no journal: after a loss of the supervisor they are asked for again. Neighbours: `core` commits,
+`requests` has the verbs.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from foosim.protocol import channels, limits
+from foosim.protocol.actions import Publish
+from foosim.protocol.codec import encode, encode_json
+from foosim.protocol.errors import Refused, show
+from foosim.protocol.messages import Add, Answer, Edit, Heartbeat, Remove, Request
+from foosim.protocol.view_messages import Watched
+from foosim.supervisor.choices import chosen
+
+if TYPE_CHECKING:
+    from foosim.supervisor.core import SupervisorCore
+
+LEASE_NS: Final = 5_000_000_000
+HZ_MAX: Final = 100.0
+BYTES_PER_S_MAX: Final = 5_000_000
+"""Of frames: a large world is shown less often."""
+FRAME_BYTES_MAX: Final = 384 * 1024
+"""A larger commit is not in the answer to `describe`, and comes with the lease."""
+_NS_PER_S: Final = 1_000_000_000
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Lease:
+    """What somebody wants to see: frames per second, links and readings; and until when."""
+
+    hz: float
+    links: list[Pair]
+    readings: list[Pair]
+    until_ns: int
+
+
+class Viewing:
+    """The leases, and what is published by them."""
+
+    def __init__(self, core: SupervisorCore) -> None:
+        self.is_shown = False
+        """Whether somebody wants frames: all that a commit has to ask while nobody does."""
+        self._core = core
+        self._leases: dict[str, _Lease] = {}
+        """By who asks."""
+        self._watched = Watched([], [])
+        """What the vHub was told last."""
+        self._told_at: Heartbeat | None = None
+        """Its last heartbeat before that."""
+        self._period_ns = self._due_ns = 0
+        self._unseen = b""
+        """The last commit, while it has not been shown."""
+
+    def watch(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        """Begin or renew a lease; the answer has the rate that it gets and for how long. Raises Refused."""
+        hz = _rate(arguments.get("hz"))
+        links = _pairs("links", arguments.get("links"), self._link)
+        readings = _pairs("readings", arguments.get("readings"), self._reading)
+        self._end_leases(now_ns)
+        if request.sender not in self._leases and len(self._leases) >= limits.OPERATORS_MAX:
+            raise Refused(f"{limits.OPERATORS_MAX} look at the run already")
+        known = self._leases.get(request.sender)
+        leases = {**self._leases, request.sender: _Lease(hz, links, readings, now_ns + LEASE_NS)}
+        watched = _watched_by(leases.values())
+        self._leases = leases
+        if watched != self._watched or links or readings:
+            self._say_watched(watched)
+        self._set_rate()
+        if hz and not (known is not None and known.hz):
+            self._unseen = self._last_commit
+        got = min(hz, _NS_PER_S / self._period_ns) if hz else 0.0
+        return self._answer(request, {"hz": got, "lease_s": LEASE_NS / _NS_PER_S})
+
+    def describe(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        """Say what is run, who owns what, and where the world is: what one has to know to read the frames."""
+        core, run = self._core, self._core.settings
+        commit = self._last_commit
+        has_frame = 0 < len(commit) <= FRAME_BYTES_MAX
+        what = {
+            "run": run.run,
+            "deployment_name": run.deployment_name,
+            "deployment": run.deployment_text,
+            "added": [(entity.name, entity.model) for entity in core.added_to(core.frame.layout)],
+            "layout": core.frame.layout.digest.hex(),
+            "pace": str(core.pacer.pace),
+            "owners": core.owners,
+            "epoch": core.epoch,
+            "first_tick": core.first_tick,
+            "tick": core.frame.tick,
+            "frame": base64.b64encode(commit).decode() if has_frame else None,
+        }
+        return self._answer(request, what)
+
+    def committed(self, payload: bytes, edits: Sequence[Edit], now_ns: int) -> None:
+        """Show a commit when it is due, or when another layout begins with it."""
+        self._unseen = payload
+        if now_ns >= self._due_ns or any(isinstance(edit, Add | Remove) for edit in edits):
+            self._show(now_ns)
+
+    def wake(self, now_ns: int) -> None:
+        """End leases that were not renewed; show what was committed last, if nothing came behind it."""
+        if self._leases:
+            self._end_leases(now_ns)
+        if self._hub_is_wrong():
+            self._say_watched(self._watched)
+        if self._unseen and now_ns >= self._due_ns:
+            self._show(now_ns)
+
+    def _show(self, now_ns: int) -> None:
+        self._core.actions.append(Publish(channels.VIEW, channels.SUPERVISOR, self._unseen))
+        self._unseen = b""
+        self._due_ns += self._period_ns
+        if self._due_ns <= now_ns:  # nothing is made up for
+            self._due_ns = now_ns + self._period_ns
+
+    def _end_leases(self, now_ns: int) -> None:
+        over = [name for name, lease in self._leases.items() if lease.until_ns <= now_ns]
+        for name in over:
+            self._leases.pop(name)
+        if over:
+            self._set_rate()
+            watched = _watched_by(self._leases.values())
+            if watched != self._watched:
+                self._say_watched(watched)
+
+    def hub_ready(self) -> None:
+        """Tell a vHub that was started again what is looked at."""
+        if self._is_watching:
+            self._say_watched(self._watched)
+
+    def _hub_is_wrong(self) -> bool:
+        """Whether the vHub keeps what nobody looks at: it has missed that, or another supervisor told it to."""
+        hub = self._core.roster.by_name.get(channels.VHUB)
+        keeps = hub is not None and "watched" in hub.report and hub.heartbeat is not self._told_at
+        return keeps and not self._is_watching and self._core.end is None
+
+    def _say_watched(self, watched: Watched) -> None:
+        self._watched = watched
+        hub = self._core.roster.by_name.get(channels.VHUB)
+        self._told_at = None if hub is None else hub.heartbeat
+        self._core.actions.append(Publish(channels.WATCHED, channels.SUPERVISOR, encode(watched)))
+
+    @property
+    def _is_watching(self) -> bool:
+        return bool(self._watched.links or self._watched.readings)
+
+    def _link(self, source: str, destination: str) -> None:
+        """Raise Refused for a link without ends."""
+        ends = self._core.deployment.endpoints()
+        for name in (source, destination):
+            chosen("endpoint", name, ends)
+
+    def _reading(self, robot: str, channel: str) -> None:
+        """Raise Refused for what no sensor measures."""
+        robots = self._core.deployment.robots
+        sensors = robots[chosen("robot", robot, sorted(robots))].sensors
+        chosen(f"sensor of {robot}", channel, sorted(sensors))
+
+    @property
+    def _last_commit(self) -> bytes:
+        """The last commit as it was published; empty before the first."""
+        return self._core.commits.get(self._core.frame.tick, b"")
+
+    def _set_rate(self) -> None:
+        """Show frames as often as the most eager lease wants, and as their size allows."""
+        hz = max((lease.hz for lease in self._leases.values()), default=0.0)
+        self.is_shown = hz > 0.0
+        if self.is_shown:
+            self._period_ns = round(_NS_PER_S / min(hz, BYTES_PER_S_MAX / max(1, len(self._last_commit))))
+        else:
+            self._unseen = b""
+
+    def _answer(self, request: Request, result: dict[str, Any]) -> Answer:
+        return Answer(request.sender, request.id, True, self._core.frame.tick, "", encode_json(result))
+
+
+def _rate(value: object) -> float:
+    """Return frames per second as they are asked for; 0 is none."""
+    if value is None:
+        return 0.0
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= HZ_MAX:
+        raise Refused(f"hz: a number from 0 to {HZ_MAX:g} is needed, not {show(value)}")
+    return float(value)
+
+
+def _watched_by(leases: Iterable[_Lease]) -> Watched:
+    """Return what some leases want to see together. Raises Refused when it is too much."""
+    links: set[Pair] = set()
+    readings: set[Pair] = set()
+    for lease in leases:
+        links.update(lease.links)
+        readings.update(lease.readings)
+    for what, pairs in (("links", links), ("readings", readings)):
+        if len(pairs) > limits.WATCHED_MAX:
+            raise Refused(f"{what}: at most {limits.WATCHED_MAX} are looked at at once, these would make {len(pairs)}")
+    return Watched(sorted(links), sorted(readings))
+
+
+def _pairs(what: str, value: object, check: Callable[[str, str], None]) -> list[Pair]:
+    """Return pairs of names as they are asked for. Raises Refused, as `check` does."""
+    pairs = [] if value is None else value
+    if not isinstance(pairs, list) or len(pairs) > limits.WATCHED_MAX:
+        raise Refused(f"{what}: a list of at most {limits.WATCHED_MAX} pairs of names is needed")
+    found: list[Pair] = []
+    for pair in pairs:
+        if not isinstance(pair, list) or len(pair) != 2 or not all(isinstance(name, str) for name in pair):
+            raise Refused(f"{what}: a pair of names is needed, not {show(pair)}")
+        check(*pair)
+        found.append((pair[0], pair[1]))
+    return found
