@@ -29,7 +29,7 @@ _READS: Final[dict[str, Reads]] = {
     SUPERVISOR: channels.SUPERVISOR_READS,
     "client": channels.CLIENT_READS,
     REPLAY: channels.REPLAY_READS,
-    "operator": (*channels.OPERATOR_READS, *channels.LISTENER_READS),
+    "operator": (*channels.OPERATOR_READS, *channels.VIEW_READS, *channels.LISTENER_READS),
 }
 _PLANES: Final = {
     "node": (Plane.SIMULATION,),

@@ -7,20 +7,24 @@ side, `run_folder` says where it is, `cli` shows the answers.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final, Self, TypeVar
 
 from foosim.protocol import channels
+from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.certificates import Credentials, operator_credentials
-from foosim.protocol.channels import Plane
+from foosim.protocol.channels import Channel, Plane
 from foosim.protocol.codec import decode, decode_json, encode, encode_json
 from foosim.protocol.command import PKI_VARIABLE
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Failed, Malformed, Refused
+from foosim.protocol.fetching import Fetching
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Wire
 from foosim.protocol.message_types import Vector
@@ -35,6 +39,7 @@ ANSWER_S: Final = 30.0
 AGAIN_S: Final = 0.1
 CONNECT_S: Final = 5.0
 WAITING_MAX: Final = 256
+Taken = TypeVar("Taken")
 
 
 class RequestRefused(Refused):
@@ -85,17 +90,17 @@ class Control:
         self._requests += 1
         identity = f"{self._name[-7:]}-{self._requests}"
         payload = encode(Request(self._name, identity, verb, encode_json(arguments)))
-        deadline_s = time.monotonic() + timeout_s
-        while (left_s := deadline_s - time.monotonic()) > 0 and not give_up():
-            self._wire.put(channels.REQUEST, self._name, payload)
-            answer = self._wait(identity, min(left_s, AGAIN_S))
-            if answer is None:
-                continue
-            if not answer.accepted:
-                raise RequestRefused(answer.text)
-            return answer
-        who = "" if self._credentials is None else f"; is {self._credentials.identity} an operator of this run?"
-        raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s{who}")
+
+        def take(key: str, content: bytes) -> Answer | None:
+            answer = decode(Answer, content, channels.ANSWER.bytes_max) if key == channels.ANSWER.key else None
+            return answer if answer is not None and answer.id == identity else None
+
+        answer = self._say(channels.REQUEST, payload, take, timeout_s, give_up)
+        if answer is None:
+            raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s{self._hint()}")
+        if not answer.accepted:
+            raise RequestRefused(answer.text)
+        return answer
 
     def status(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
         """Return the state of the run. Raises NoAnswer."""
@@ -103,18 +108,60 @@ class Control:
         assert isinstance(content, dict), content
         return content
 
-    def _wait(self, identity: str, timeout_s: float) -> Answer | None:
-        """Return the answer to a request when it comes in time."""
+    def describe(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
+        """Return what one has to know to read frames, as `supervisor.viewing` makes it. Raises NoAnswer."""
+        content = decode_json(self.ask("describe", timeout_s, give_up).result)
+        assert isinstance(content, dict), content
+        return content
+
+    def view(self, inbox: Inbox) -> None:
+        """Offer the frames that are shown to an inbox, as (key of `channels.VIEW`, ..., a `Commit`'s bytes). They come
+        while somebody has a lease: `ask("watch", hz=50)`, again before it is over. Once for a connection.
+        """
+        self._session.subscribe(channels.VIEW.key_for_all, channels.VIEW.key, inbox)
+
+    def files(
+        self, deployment: Deployment, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False
+    ) -> dict[str, bytes]:
+        """Return the files that a deployment (read from the text that `describe` gives) refers to, by path.
+
+        Raises NoAnswer when `timeout_s` goes by without a piece of one.
+        """
+        fetching = Fetching(deployment, {})
+        while (lacking := fetching.lacking) is not None:
+            digest, offset = lacking
+            payload = encode(Fetch(self._name, self._name, bytes.fromhex(digest), offset))
+
+            def take(key: str, content: bytes) -> bool | None:
+                return key == channels.PIECE.key and fetching.take(channels.read(channels.PIECE, self._name, content))
+
+            if not self._say(channels.FETCH, payload, take, timeout_s, give_up):
+                raise NoAnswer(f"no piece of a file of the deployment within {timeout_s:g} s{self._hint()}")
+        return fetching.contents()
+
+    def _say(
+        self,
+        channel: Channel,
+        payload: bytes,
+        take: Callable[[str, bytes], Taken | None],
+        timeout_s: float,
+        give_up: Callable[[], bool],
+    ) -> Taken | None:
+        """Say something until `take` makes something of what comes (a channel's key, the payload); None at the end."""
         deadline_s = time.monotonic() + timeout_s
-        while (left_s := deadline_s - time.monotonic()) > 0:
-            for _, _, payload in self._inbox.take(left_s):
-                try:
-                    answer = decode(Answer, payload, channels.ANSWER.bytes_max)
-                except Malformed:
-                    continue
-                if answer.id == identity:
-                    return answer
+        while (now_s := time.monotonic()) < deadline_s and not give_up():
+            self._wire.put(channel, self._name, payload)
+            again_s = min(deadline_s, now_s + AGAIN_S)
+            while (left_s := again_s - time.monotonic()) > 0:
+                for key, _, content in self._inbox.take(left_s):
+                    with contextlib.suppress(Malformed):
+                        taken = take(key, content)
+                        if taken:
+                            return taken
         return None
+
+    def _hint(self) -> str:
+        return "" if self._credentials is None else f"; is {self._credentials.identity} an operator of this run?"
 
 
 def connect(run: str | None = None) -> Control:

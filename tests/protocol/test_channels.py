@@ -30,6 +30,7 @@ READS: Final[Mapping[str, Sequence[tuple[Channel, bool]]]] = {
     "operator": channels.OPERATOR_READS,
     "replay": channels.REPLAY_READS,
     "listener": channels.LISTENER_READS,
+    "view": channels.VIEW_READS,
 }
 
 
