@@ -164,14 +164,14 @@ class Control:
         return "" if self._credentials is None else f"; is {self._credentials.identity} an operator of this run?"
 
 
-def connect(run: str | None = None) -> Control:
+def connect(run: str | None = None, give_up: Callable[[], bool] = lambda: False) -> Control:
     """Connect to the newest live run, or to the one named. Raises NoRun, and what `Control` and
     `operator_credentials` raise.
     """
     folder = find_run(run)
     info = folder.info()
     assert info is not None, "a run that was found has a run file"
-    return Control(info.simulation, operator_credentials(_pki_of(info)))
+    return Control(info.simulation, operator_credentials(_pki_of(info)), give_up)
 
 
 def _pki_of(info: RunInfo) -> Path | None:
