@@ -2,7 +2,7 @@
 #     make up ARGS='--pace fast --for 20s'
 #     make test ARGS='tests/protocol -x'
 
-PACKAGES := client node protocol rehearsal supervisor vhub
+PACKAGES := client console node protocol rehearsal supervisor vhub
 PYTHON := .venv/bin/python
 SEEDS ?= 100
 N ?=

@@ -28,12 +28,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "node": {"protocol"},
     "vhub": {"protocol"},
     "supervisor": {"protocol", "client", "node", "vhub"},
-    "rehearsal": {"protocol", "client", "node", "vhub", "supervisor"},
+    "console": {"protocol", "client", "node", "vhub", "supervisor"},
+    "rehearsal": {"protocol", "client", "node", "vhub", "supervisor", "console"},
 }
 PACKAGES = sorted(MAY_IMPORT)
 
 # The one file that knows a library which would otherwise spread.
-ONLY_IN = {"zenoh": "protocol/session.py", "pybullet": "node/engines/bullet.py"}
+ONLY_IN = {"zenoh": "protocol/session.py", "pybullet": "node/engines/bullet.py", "websockets": "console/server.py"}
 
 # The files that touch the world. Every other module is a core: it gets messages and the time and returns what to do,
 # which is why rehearsal can run all of them in one process on virtual time.
@@ -42,6 +43,7 @@ SHELLS = {
     "client/client.py",
     "client/main.py",
     "client/replay.py",
+    "console/server.py",
     "node/engines/probation.py",
     "node/main.py",
     "protocol/assets.py",
