@@ -156,6 +156,7 @@ class Board:
             curves = [curve for follows in all_follow for curve in follows.curves]
             readings = sorted({curve.reading for curve in curves if curve.reading is not None})
             wanted = Wanted(
+                len(self.readers),
                 max((follows.hz for follows in all_follow), default=0.0),
                 frozenset().union(*(follows.overlays for follows in all_follow)),
                 tuple(links[:WATCHED_MAX]),

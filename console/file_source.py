@@ -23,9 +23,9 @@ from foosim.console.compare import Where
 from foosim.console.comparing import Comparing
 from foosim.console.curves import name_and_unit
 from foosim.console.deck import ARGUMENTS, VERBS, Deck, checked
+from foosim.console.links import Links, lost_where
 from foosim.console.playhead import Playhead
 from foosim.console.recording import Look, Recording
-from foosim.console.scene_json import scene_content
 from foosim.console.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.console.whereabouts import Whereabouts
 from foosim.protocol.errors import Refused
@@ -40,6 +40,7 @@ BRANCH: Final = "branch"
 WINDOW_NS: Final = 5_000_000_000
 STATUS_S: Final = 0.25
 LINKS_S: Final = 0.5
+OVERLAY_NS: Final = 100_000_000
 REFRESH_S: Final = 1.0
 MARKS_TOLD: Final = 500
 """Of one message."""
@@ -79,6 +80,10 @@ class FileSource:
         self._look: Look | None = None
         self._world = -1
         self._compare = compare
+        self._ends = Links(self.recording.deployment)
+        self._placed = -1
+        """Number of the world whose scene they are in."""
+        self._overlay_ns = 0
         self._readings_ns = 0
         """Up to which time readings were told."""
         self._is_inexact = False
@@ -160,11 +165,15 @@ class FileSource:
         self._look = look
         paused = self.deck.playhead.paused
         feed.show(Moment(look.tick, look.poses, look.values, jump, paused))
+        now_ns = self.deck.clock_ns()
+        if self._wanted.overlays and look.frame is not None and (paused or now_ns >= self._overlay_ns):
+            self._overlay_ns = now_ns + OVERLAY_NS
+            drawing = self.recording.worlds[look.world].drawing
+            feed.tell(drawing.overlay(look.frame, self._wanted.overlays))
 
     def _describe(self, feed: Feed) -> None:
         if self._world >= 0:
-            world = self.recording.worlds[self._world]
-            feed.describe(self._about, scene_content(self.recording.deployment, world.layout, world.scene))
+            feed.describe(self._about, self.recording.worlds[self._world].drawing.content())
 
     async def _show_exactly(self, feed: Feed, look: Look) -> None:
         """Tell the frame of a tick that has none, computed again; it is told what stands in the way."""
@@ -273,10 +282,17 @@ class FileSource:
     def _link_messages(self, history: CaptureHistory, tick: int) -> list[dict[str, Any]]:
         at_ns = tick * self.recording.tick_ns
         drops = [
-            {"from": key[0], "to": key[1], "cause": cause, "count": count}
-            for key, cause, count in history.links.drops(at_ns - round(LINKS_S * 1e9), at_ns)
+            {"from": key[0], "to": key[1], "cause": cause, "where": lost_where(cause), "count": count}
+            for key, cause, count in history.links.drops(at_ns - WINDOW_NS, at_ns)
         ]
-        links = history.links.windows(at_ns, WINDOW_NS)
+        frame = history.recording.frame_up_to(tick)
+        if frame is not None:
+            world = history.recording.world_at(frame.tick)
+            if world != self._placed:
+                self._ends.turn_to(history.recording.worlds[world].drawing.scene)
+                self._placed = world
+            self._ends.move(frame)
+        links = self._ends.with_ends(history.links.windows(at_ns, WINDOW_NS))
         told: list[dict[str, Any]] = [
             {"type": "links", "at": tick, "window_s": WINDOW_NS / 1e9, "links": links, "drops": drops}
         ]
@@ -292,7 +308,7 @@ class FileSource:
 
     # --- asked -------------------------------------------------------------------------------------------------------
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any]) -> Answered:
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         if verb == BRANCH or not self.is_master:
             checked(verb, arguments, {BRANCH: {"tick": (int,)}})
             tick = arguments.get("tick", self.tick())

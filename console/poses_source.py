@@ -116,7 +116,7 @@ class PosesSource:
             period_ns = round(1e9 / (self._wanted.hz or UNSEEN_HZ))
             await self.deck.wait(None if head.paused else self.deck.clock_ns() + period_ns)
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any]) -> Answered:
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         if not self.is_master:
             raise NotAsked("recorded poses follow the first source: ask that one")
         return self.deck.ask(verb, arguments, lambda tick, later: tick + (1 if later else -1))

@@ -19,12 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.console.capture_index import CaptureIndex
-from foosim.console.poses import Poser
+from foosim.console.drawing import Drawing
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
-from foosim.protocol.scene import Scene
-from foosim.protocol.scenes import build_scene
 from foosim.vhub.capture_columns import frames_of
 from foosim.vhub.capture_reader import (
     DECODERS,
@@ -47,26 +45,25 @@ equal in its digest, or what was captured last before it."""
 
 @dataclass(frozen=True)
 class World:
-    """A layout with its scene, in force from a tick on."""
+    """A layout, as it is drawn, in force from a tick on."""
 
     tick: int
-    layout: Layout
-    scene: Scene
+    drawing: Drawing
 
-    @cached_property
-    def poser(self) -> Poser:
-        return Poser(self.layout, self.scene)
+    @property
+    def layout(self) -> Layout:
+        return self.drawing.layout
 
     @cached_property
     def links(self) -> dict[str, int]:
         """The place of each link in the order of the scene, by name."""
-        names = [link.name for body in self.scene.bodies.values() for link in body.links]
+        names = [link.name for body in self.drawing.scene.bodies.values() for link in body.links]
         return {name: place for place, name in enumerate(names)}
 
     @cached_property
     def entities(self) -> dict[str, int]:
         """The place of each entity's last link, by the entity's name."""
-        return {name: self.links[body.links[-1].name] for name, body in self.scene.bodies.items()}
+        return {name: self.links[body.links[-1].name] for name, body in self.drawing.scene.bodies.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,8 +120,8 @@ class Recording:
         """Read the rows that are few: layouts, epochs, recoveries."""
         for number in range(len(self.worlds), len(self.index.places[LAYOUT])):
             row = self.row(LAYOUT, number)
-            layout = layout_of(self.path, self.deployment, row)
-            self.worlds.append(World(row.tick, layout, build_scene(self.deployment, layout)))
+            drawing = Drawing(self.deployment, layout_of(self.path, self.deployment, row))
+            self.worlds.append(World(row.tick, drawing))
         for topic, rows in ((EPOCHS, self.epochs), (RECOVERIES, self.recoveries)):
             rows += [self.row(topic, number) for number in range(len(rows), len(self.index.places[topic]))]
 
@@ -166,7 +163,8 @@ class Recording:
     def seen(self, tick: int, frame: Frame, kind: Kind) -> Look:
         """Return what is seen of a frame."""
         world = self.world_at(frame.tick)
-        return Look(tick, frame.tick, kind, world, self.worlds[world].poser.poses(frame.values), frame, frame.values)
+        poses = self.worlds[world].drawing.poser.poses(frame.values)
+        return Look(tick, frame.tick, kind, world, poses, frame, frame.values)
 
     def frame(self, number: int) -> Frame | None:
         """Return a captured frame by its number; None for a negative one. Raises CaptureError."""

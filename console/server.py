@@ -247,7 +247,7 @@ class ConsoleServer:
                 raise NotAsked("this address only views; the other one that was printed lets you operate")
             if ask.verb not in source.about.verbs:
                 raise NotAsked(f"nothing to ask {source.about.name} for: {ask.verb}; {', '.join(source.about.verbs)}")
-            answered = await source.ask(ask.verb, ask.arguments)
+            answered = await source.ask(ask.verb, ask.arguments, reader.name)
         except Refused as refused:
             answered = Answered(str(refused), 0, accepted=False)
         finally:

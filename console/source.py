@@ -64,8 +64,10 @@ class Moment:
 class Wanted:
     """What all browsers together look at in one source."""
 
+    readers: int = 0
+    """How many browsers there are."""
     hz: float = 0.0
-    """Moments a second; 0 when nobody looks."""
+    """Moments a second; 0 when nobody draws them."""
     overlays: frozenset[str] = frozenset()
     links: tuple[Link, ...] = ()
     """Whose last drops are explained."""
@@ -124,8 +126,8 @@ class Source(Protocol):
     def want(self, wanted: Wanted) -> None:
         """Take note of what the browsers look at. Called at each change, in the event loop's thread."""
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any]) -> Answered:
-        """Have something done. Raises Refused, whose text says why it is not."""
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        """Have something done; `who` names the browser that asks. Raises Refused, whose text says why it is not."""
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         """Return name, unit and points (tick, value) of a curve so far; no points where nothing is kept of it."""

@@ -26,7 +26,10 @@ class Plane(Enum):
 
 @dataclass(frozen=True)
 class Channel:
-    """One row of the table. `express` channels are sent at once, unbatched; all block rather than drop."""
+    """One row of the table. `express` channels are sent at once, unbatched.
+
+    One that is `blocking` holds its writer when a reader is slow; of another, what a reader does not take is lost.
+    """
 
     name: str
     key: str
@@ -37,6 +40,7 @@ class Channel:
     rate: str
     express: bool
     bytes_max: int = limits.MESSAGE_BYTES_MAX
+    blocking: bool = True
 
     def key_for(self, name: str) -> str:
         """Return the key for one sender or receiver."""
@@ -56,9 +60,10 @@ def _simulation(
     rate: str,
     named: bool = True,
     bytes_max: int = limits.MESSAGE_BYTES_MAX,
+    blocking: bool = True,
 ) -> Channel:
     key = f"foosim/simulation/{name}" + ("/{name}" if named else "")
-    return Channel(name, key, message, Plane.SIMULATION, writers, readers, rate, True, bytes_max)
+    return Channel(name, key, message, Plane.SIMULATION, writers, readers, rate, True, bytes_max, blocking)
 
 
 def _radio(
@@ -85,7 +90,9 @@ _SMALL: Final = limits.SMALL_MESSAGE_BYTES_MAX
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL)
 RECALL: Final = _simulation("recall", messages.Recall, "supervisor", "node, vhub", "an unknown heartbeat", named=False)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
-FETCH: Final = _simulation("fetch", asset_messages.Fetch, "node, vhub", "supervisor", "a piece of a file")
+FETCH: Final = _simulation(
+    "fetch", asset_messages.Fetch, "node, vhub, operator, viewer", "supervisor", "a piece of a file"
+)
 PIECE: Final = _simulation("piece", asset_messages.Piece, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation(
@@ -108,7 +115,13 @@ TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a cha
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
 REQUEST: Final = _simulation("request", messages.Request, "operator", "supervisor", "a request", bytes_max=_SMALL)
+INQUIRY: Final = _simulation(
+    "inquiry", messages.Inquiry, "operator, viewer", "supervisor", "a request that only reads", bytes_max=_SMALL
+)
 ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named one", "an answer")
+VIEW: Final = _simulation(
+    "view", messages.Commit, "supervisor", "operator, viewer", "what a lease asks for", named=False, blocking=False
+)
 
 CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
@@ -144,7 +157,9 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     END,
     FAREWELL,
     REQUEST,
+    INQUIRY,
     ANSWER,
+    VIEW,
     CLIENT_HELLO,
     CLIENT_WELCOME,
     CLIENT_REFUSAL,
@@ -187,10 +202,11 @@ VHUB_READS: Final[Reads] = (*((channel, True) for channel in (
     RECALL, EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final[Reads] = tuple((channel, False) for channel in (
-    HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
+    HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST, INQUIRY
 ))  # fmt: skip
 CLIENT_READS: Final[Reads] = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
-OPERATOR_READS: Final[Reads] = ((ANSWER, True),)
+OPERATOR_READS: Final[Reads] = ((ANSWER, True), (PIECE, True))
+VIEW_READS: Final[Reads] = ((VIEW, False),)
 REPLAY_READS: Final[Reads] = ((REPLAY_REQUEST, False),)
 LISTENER_READS: Final[Reads] = ((PLAYED, False), (REPLAY_ANSWER, True))
 """What each role reads: (channel, whether only what is addressed to it by name)."""

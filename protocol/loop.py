@@ -77,7 +77,7 @@ class Wire:
         key = channel.key_for(name)
         publisher = self._publishers.get(key)
         if publisher is None:
-            publisher = self._publishers[key] = self.session.publisher(key, express=channel.express)
+            publisher = self._publishers[key] = self.session.publisher(key, channel.express, channel.blocking)
         publisher.put(payload)
 
     def declare_alive(self) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from foosim.protocol import channels
+from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode, encode_json
 from foosim.protocol.messages import Answer, Request
 from foosim.rehearsal.bus import Bus
@@ -26,7 +27,9 @@ class People:
         self._bus = bus
         self._later = later
         self._requests = 0
-        bus.subscribe(OPERATOR, channels.OPERATOR_READS)
+        self.viewed: list[bytes] = []
+        """What was shown of the run, as it came."""
+        bus.subscribe(OPERATOR, (*channels.OPERATOR_READS, *channels.VIEW_READS))
 
     def request(self, verb: str, again_ns: int, arguments: dict[str, Any]) -> str:
         """Ask for something, every `again_ns` until it is answered (0: once); return the request's id."""
@@ -42,10 +45,13 @@ class People:
         for identity in [known for known, what in self.asked.items() if what == verb and known not in self.answers]:
             self.asked.pop(identity)
 
-    def answered(self, payload: bytes) -> None:
-        """Take an answer."""
-        answer = decode(Answer, payload)
-        self.answers[answer.id] = answer
+    def hear(self, channel: Channel, payload: bytes) -> None:
+        """Take an answer, or what is shown."""
+        if channel is channels.VIEW:
+            self.viewed.append(payload)
+        elif channel is channels.ANSWER:
+            answer = decode(Answer, payload)
+            self.answers[answer.id] = answer
 
     def _ask(self, identity: str, payload: bytes, again_ns: int) -> None:
         if identity in self.answers or identity not in self.asked:

@@ -7,24 +7,28 @@ side, `run_folder` says where it is, `cli` shows the answers.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final, Literal, Self, TypeVar
 
 from foosim.protocol import channels
-from foosim.protocol.certificates import Credentials, operator_credentials
-from foosim.protocol.channels import Plane
+from foosim.protocol.asset_messages import Fetch
+from foosim.protocol.certificates import Credentials, operator_credentials, viewer_credentials
+from foosim.protocol.channels import Channel, Plane
 from foosim.protocol.codec import decode, decode_json, encode, encode_json
 from foosim.protocol.command import PKI_VARIABLE
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Failed, Malformed, Refused
+from foosim.protocol.fetching import Fetching
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Wire
 from foosim.protocol.message_types import Vector
-from foosim.protocol.messages import Answer, Request
+from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.protocol.units import parse_pace
@@ -35,6 +39,14 @@ ANSWER_S: Final = 30.0
 AGAIN_S: Final = 0.1
 CONNECT_S: Final = 5.0
 WAITING_MAX: Final = 256
+Role = Literal["operator", "viewer"]
+Taken = TypeVar("Taken")
+Take = Callable[[str, bytes], Taken | None]
+_ASKED_BY: Final[dict[str, tuple[type[Request], Channel]]] = {
+    "operator": (Request, channels.REQUEST),
+    "viewer": (Inquiry, channels.INQUIRY),
+}
+_MAY: Final = {"operator": "an operator", "viewer": "a viewer or an operator"}
 
 
 class RequestRefused(Refused):
@@ -49,14 +61,20 @@ class Control:
     """A connection to one running supervisor. Use it in `with`."""
 
     def __init__(
-        self, address: str, credentials: Credentials | None = None, give_up: Callable[[], bool] = lambda: False
+        self,
+        address: str,
+        credentials: Credentials | None = None,
+        give_up: Callable[[], bool] = lambda: False,
+        role: Role = "operator",
     ) -> None:
         """Connect to the simulation plane's address; raises ConnectError when nobody is there, or at `give_up`.
 
-        `credentials` are an operator's, where the run has certificates.
+        `credentials` are an operator's, where the run has certificates. A `viewer` (whose credentials may also be a
+        viewer's) can ask for what changes nothing: status, describe, watch.
         """
-        # Under its certificate an operator may speak by any name that begins with his own and a dot.
-        stem = f"operator-{os.getpid()}-" if credentials is None else f"{credentials.name}."
+        # Under its certificate a person may speak by any name that begins with his own and a dot.
+        stem = f"{role}-{os.getpid()}-" if credentials is None else f"{credentials.name}."
+        self._role = role
         self._name = f"{stem}{os.urandom(4).hex()[:7]}"
         self._credentials = credentials
         self._inbox = Inbox(WAITING_MAX)
@@ -84,18 +102,14 @@ class Control:
         """
         self._requests += 1
         identity = f"{self._name[-7:]}-{self._requests}"
-        payload = encode(Request(self._name, identity, verb, encode_json(arguments)))
-        deadline_s = time.monotonic() + timeout_s
-        while (left_s := deadline_s - time.monotonic()) > 0 and not give_up():
-            self._wire.put(channels.REQUEST, self._name, payload)
-            answer = self._wait(identity, min(left_s, AGAIN_S))
-            if answer is None:
-                continue
-            if not answer.accepted:
-                raise RequestRefused(answer.text)
-            return answer
-        who = "" if self._credentials is None else f"; is {self._credentials.identity} an operator of this run?"
-        raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s{who}")
+        kind, channel = _ASKED_BY[self._role]
+        payload = encode(kind(self._name, identity, verb, encode_json(arguments)))
+        answer = self._say(channel, payload, answer_to(identity), timeout_s, give_up)
+        if answer is None:
+            raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s{self._hint()}")
+        if not answer.accepted:
+            raise RequestRefused(answer.text)
+        return answer
 
     def status(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
         """Return the state of the run. Raises NoAnswer."""
@@ -103,28 +117,90 @@ class Control:
         assert isinstance(content, dict), content
         return content
 
-    def _wait(self, identity: str, timeout_s: float) -> Answer | None:
-        """Return the answer to a request when it comes in time."""
+    def describe(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
+        """Return what one has to know to read frames, as `supervisor.viewing` makes it. Raises NoAnswer."""
+        content = decode_json(self.ask("describe", timeout_s, give_up).result)
+        assert isinstance(content, dict), content
+        return content
+
+    def view(self, inbox: Inbox) -> None:
+        """Offer the frames that are shown to an inbox, as (key of `channels.VIEW`, ..., a `Commit`'s bytes). They come
+        while somebody has a lease: `ask("watch", hz=50)`, again before it is over. Once for a connection.
+        """
+        self._session.subscribe(channels.VIEW.key_for_all, channels.VIEW.key, inbox)
+
+    def files(
+        self, deployment: Deployment, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False
+    ) -> dict[str, bytes]:
+        """Return the files that a deployment (read from the text that `describe` gives) refers to, by path.
+
+        Raises NoAnswer when `timeout_s` goes by without a piece of one.
+        """
+        fetching = Fetching(deployment, {})
+        while (lacking := fetching.lacking) is not None:
+            digest, offset = lacking
+            payload = encode(Fetch(self._name, self._name, bytes.fromhex(digest), offset))
+
+            def take(key: str, content: bytes) -> bool | None:
+                is_piece = key == channels.PIECE.key
+                return (is_piece and fetching.take(channels.read(channels.PIECE, self._name, content))) or None
+
+            if not self._say(channels.FETCH, payload, take, timeout_s, give_up):
+                raise NoAnswer(f"no piece of a file of the deployment within {timeout_s:g} s{self._hint()}")
+        return fetching.contents()
+
+    def _say(
+        self,
+        channel: Channel,
+        payload: bytes,
+        take: Take[Taken],
+        timeout_s: float,
+        give_up: Callable[[], bool],
+    ) -> Taken | None:
+        """Say something until `take` makes something of what comes (a channel's key, the payload); None at the end."""
         deadline_s = time.monotonic() + timeout_s
-        while (left_s := deadline_s - time.monotonic()) > 0:
-            for _, _, payload in self._inbox.take(left_s):
-                try:
-                    answer = decode(Answer, payload, channels.ANSWER.bytes_max)
-                except Malformed:
-                    continue
-                if answer.id == identity:
-                    return answer
+        while (left_s := deadline_s - time.monotonic()) > 0 and not give_up():
+            self._wire.put(channel, self._name, payload)
+            taken = self._hear(take, min(left_s, AGAIN_S))
+            if taken is not None:
+                return taken
         return None
 
+    def _hear(self, take: Take[Taken], timeout_s: float) -> Taken | None:
+        """Return what `take` makes of something that comes in time."""
+        deadline_s = time.monotonic() + timeout_s
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            for key, _, content in self._inbox.take(left_s):
+                with contextlib.suppress(Malformed):
+                    taken = take(key, content)
+                    if taken is not None:
+                        return taken
+        return None
 
-def connect(run: str | None = None) -> Control:
-    """Connect to the newest live run, or to the one named. Raises NoRun, and what `Control` and
-    `operator_credentials` raise.
+    def _hint(self) -> str:
+        return "" if self._credentials is None else f"; is {self._credentials.identity} {_MAY[self._role]} of this run?"
+
+
+def answer_to(identity: str) -> Take[Answer]:
+    """Return what takes the answer to a request, of all that comes."""
+
+    def take(key: str, content: bytes) -> Answer | None:
+        answer = decode(Answer, content, channels.ANSWER.bytes_max) if key == channels.ANSWER.key else None
+        return answer if answer is not None and answer.id == identity else None
+
+    return take
+
+
+def connect(run: str | None = None, role: Role = "operator", give_up: Callable[[], bool] = lambda: False) -> Control:
+    """Connect to the newest live run, or to the one named. Raises NoRun, and what `Control`, `operator_credentials` and
+    `viewer_credentials` raise.
     """
     folder = find_run(run)
     info = folder.info()
     assert info is not None, "a run that was found has a run file"
-    return Control(info.simulation, operator_credentials(_pki_of(info)))
+    pki = _pki_of(info)
+    credentials = operator_credentials(pki) if role == "operator" else viewer_credentials(pki)
+    return Control(info.simulation, credentials, give_up, role)
 
 
 def _pki_of(info: RunInfo) -> Path | None:

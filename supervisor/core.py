@@ -31,6 +31,7 @@ from foosim.protocol.messages import (
     Farewell,
     Heartbeat,
     Hello,
+    Inquiry,
     Order,
     Part,
     Prepare,
@@ -59,6 +60,7 @@ from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.status import SupervisorStatistics
 from foosim.supervisor.take_over import TakeOver
+from foosim.supervisor.viewing import Viewing
 from foosim.supervisor.watch import Watch, losses
 
 PREPARE_NS: Final = 200_000_000
@@ -90,6 +92,7 @@ class SupervisorCore:
         self.watch = Watch(self.deployment, self.roster, now_ns)
         self.recovery, self.absence, self.branches = Recovery(self), Absence(self), Branches(self)
         self.balancer = Balancer(self.deployment.owners()) if settings.balance else None
+        self.viewing = Viewing(self)
         self.requests, self.handshake, self.closing = Requests(self), Handshake(self), Closing(self)
         self.frame, self.chain = first_frame(self.deployment, settings.start), first_chain(settings.origin)
         self.first_tick = self.frame.tick
@@ -127,6 +130,7 @@ class SupervisorCore:
             Deliveries: self._on_deliveries,
             Want: self._on_want,
             Request: self.requests.take,
+            Inquiry: self.requests.inquire,
             Farewell: self.handshake.farewell,
         }
         text = settings.deployment_name, settings.deployment_text
@@ -160,6 +164,7 @@ class SupervisorCore:
 
     def wake(self, now_ns: int) -> None:
         """Look for who is silent or overdue, and for the end of an ended run."""
+        self.viewing.wake(now_ns)
         if self.end is None and not self.absence.is_over(now_ns):
             lost = self.watch.lost(self, now_ns)
             if lost and self.epoch == 0:
@@ -399,6 +404,8 @@ class SupervisorCore:
         lag_ns = self.pacer.last_lag_ns if self.pacer.counts_lags else -1
         self.actions.append(Journal(encode(CommitRecord(payload, *solved, now_ns, lag_ns))))
         self.actions.append(Publish(channels.COMMIT, channels.VHUB, payload))
+        if self.viewing.is_shown:
+            self.viewing.committed(payload, edits, now_ns)
 
     @property
     def _lacks(self) -> bool:

@@ -49,6 +49,7 @@ def head_of(core: SupervisorCore) -> bytes:
         (core.branches.number, core.branches.tick),
         core.requests.issued.forgotten,
         sorted(core.requests.issued.by_tick.items()),
+        list(core.requests.asked),
     )
     return encode(head)
 
@@ -71,6 +72,7 @@ def stand_on(core: SupervisorCore, history: History) -> None:
     core.recovery.recovered, core.recovery.returns = history.recovered, dict(control.returns)
     core.branches.number, core.branches.tick = history.branch
     core.requests.resume(history.edits, history.answers, history.issued, control.disruptions)
+    core.requests.asked.extend(history.asked)
 
 
 def stand_at(core: SupervisorCore, frame: Frame, chain: bytes, commit: bytes) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Final
 
 import msgspec
 
@@ -57,6 +58,25 @@ class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbi
     disruptions: int = 0
 
 
+class Asked(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What somebody asked for to change something, and what came of it: the tick and text of the answer."""
+
+    tick: int
+    verb: str
+    text: str
+    who: str
+    accepted: bool
+
+
+ASKED_KEPT: Final = 32
+ASKED_TEXT_MAX: Final = 200
+
+
+def asked(verb: str, answer: Answer) -> Asked:
+    """Return what is kept for people of a request."""
+    return Asked(answer.tick, verb, answer.text[:ASKED_TEXT_MAX], answer.sender, answer.accepted)
+
+
 class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request", forbid_unknown_fields=True):
     """A request whose tick is chosen: what it adds to that tick's order, its answer, and what it changes beside.
 
@@ -68,6 +88,7 @@ class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request",
     answer: Answer
     control: Control
     owners: dict[str, str]
+    verb: str = ""
 
 
 class OrderedRecord(msgspec.Struct, frozen=True, array_like=True, tag="ordered", forbid_unknown_fields=True):
@@ -120,6 +141,7 @@ class HeadRecord(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     forgotten: int = -1
     issued: list[tuple[int, list[Edit]]] = []
     """What was ordered at the last ticks that have edits, and the last tick whose edits are not known any more."""
+    asked: list[Asked] = []
 
 
 Change = RequestRecord | OrderedRecord | Control | CommitRecord | RecoveredRecord | Epoch | End
@@ -153,6 +175,8 @@ class History:
     end: End | None = None
     branch: tuple[int, int] = (0, 0)
     issued: Issued = field(default_factory=Issued)
+    asked: list[Asked] = field(default_factory=list)
+    """What was asked for last."""
 
 
 Solved = tuple[list[str], str]
@@ -221,6 +245,7 @@ def _begin(deployment: Deployment, first: RunRecord | HeadRecord) -> History:
         end=first.end,
         branch=first.branch,
         issued=issued,
+        asked=list(first.asked),
     )
 
 
@@ -236,6 +261,7 @@ def _apply(history: History, record: Change) -> None:
         history.branch = record.branch, record.branch_tick
     elif isinstance(record, RequestRecord):
         history.answers[record.answer.sender, record.answer.id] = record.answer
+        history.asked = [*history.asked, asked(record.verb, record.answer)][-ASKED_KEPT:]
         history.control, history.owners = record.control, record.owners
         _order(history, record)
     elif isinstance(record, OrderedRecord):

@@ -1,18 +1,20 @@
 """What people ask of a running system: pause, resume, step, rate, add, remove, move, push, network,
-stop and start (a node), down, status.
+stop and start (a node), down; status, describe, watch.
 
 A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push at the
 first tick not yet released, network with what is sent at the one behind it, add and remove at the first not yet
 released when all nodes are ready for it, a move at the last commit, with its epoch. It is journalled when its tick is
-chosen, then answered. To add a verb: a method and a row. Neighbours: `core`, `status` (what `status` answers).
+chosen, then answered; what only reads is neither journalled nor kept. To add a verb: a method and a row. Neighbours:
+`core`, `status` (what `status` answers), `viewing` (`describe`, `watch`).
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from math import hypot
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish
@@ -20,13 +22,13 @@ from foosim.protocol.codec import decode_json, encode, encode_json
 from foosim.protocol.errors import Malformed, Refused, show
 from foosim.protocol.frame import layout_after
 from foosim.protocol.layout import BALL, Layout
-from foosim.protocol.messages import Add, Answer, Disrupt, Edit, Push, Remove, Request
+from foosim.protocol.messages import Add, Answer, Disrupt, Edit, Inquiry, Push, Remove, Request
 from foosim.protocol.names import NAME_RULE, is_name, nearest_name
 from foosim.protocol.network import EVENTS_MAX, event_of
 from foosim.protocol.network_request import event_text, told
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.issued import Issued
-from foosim.supervisor.records import OrderedRecord, RequestRecord
+from foosim.supervisor.records import ASKED_KEPT, Asked, OrderedRecord, RequestRecord, asked
 from foosim.supervisor.status import status
 
 if TYPE_CHECKING:
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 ANSWERS_KEPT = 1024
 PENDING_MAX = 256
 """Changes of layout that may wait for engines at once."""
+READS: Final = ("status", "describe", "watch")
+"""Verbs that change nothing: valid before, during and after a run."""
 TEXT_MAX = 4000
 """Characters of a refusal."""
 NUMBER_MAX = 1e100
@@ -62,8 +66,12 @@ class Requests:
         self.issued = Issued()
         self.disruptions = 0
         """Events of the network that were asked for."""
+        self.asked: deque[Asked] = deque(maxlen=ASKED_KEPT)
+        """What was asked for last, for people."""
         self._verbs: dict[str, Callable[[Request, dict[str, Any], int], Answer | None]] = {
             "status": self._status,
+            "describe": self._core.viewing.describe,
+            "watch": self._core.viewing.watch,
             "pause": self._pause,
             "resume": self._resume,
             "step": self._step,
@@ -89,14 +97,24 @@ class Requests:
         if answer is not None:
             self._say(answer)
 
+    def inquire(self, inquiry: Inquiry, payload: bytes, now_ns: int) -> None:
+        """Answer who may only look."""
+        if inquiry.verb in READS:
+            answer = self._decide(inquiry, now_ns)
+            assert answer is not None, inquiry.verb
+        else:
+            why = f"{show(inquiry.verb)} is for operators: who only looks may ask for {', '.join(READS)}"
+            answer = Answer(inquiry.sender, inquiry.id, False, self._core.frame.tick, why, b"{}")
+        self._say(answer)
+
     def _decide(self, request: Request, now_ns: int) -> Answer | None:
         try:
             verb = self._verbs.get(request.verb)
             if verb is None:
                 raise Refused(f"no verb {show(request.verb)}; there are {', '.join(self._verbs)}")
-            if self._core.end is not None and request.verb not in ("status", "down"):
+            if self._core.end is not None and request.verb not in (*READS, "down"):
                 raise Refused("the run has ended")
-            if not self._core.is_open and request.verb not in ("status", "down"):
+            if not self._core.is_open and request.verb not in (*READS, "down"):
                 if self._core.take_over is not None:
                     return None  # whoever asks asks again
                 raise Refused("the run has not started yet")
@@ -113,16 +131,15 @@ class Requests:
     def _refuse(self, request: Request, why: str) -> Answer:
         """Journal a refusal as well: asked again, a supervisor that was started again might see it otherwise."""
         answer = Answer(request.sender, request.id, False, self._core.released, why[:TEXT_MAX], b"{}")
-        return self._keep(self._write(answer, answer.tick, [], self._core.owners))
+        if request.verb in READS:
+            return answer
+        return self._write(request.verb, answer, answer.tick, [], self._core.owners)
 
-    def _write(self, answer: Answer, tick: int, edits: list[Edit], owners: dict[str, str]) -> Answer:
-        """Journal an answer and what is added to the order of `tick`."""
-        record = RequestRecord(tick, edits, answer, self._core.control(), owners)
+    def _write(self, verb: str, answer: Answer, tick: int, edits: list[Edit], owners: dict[str, str]) -> Answer:
+        """Journal an answer and what is added to the order of `tick`; keep it for when the request is repeated."""
+        record = RequestRecord(tick, edits, answer, self._core.control(), owners, verb)
         self._core.actions.append(Journal(encode(record)))
-        return answer
-
-    def _keep(self, answer: Answer) -> Answer:
-        """Keep an answer for when the request is repeated."""
+        self.asked.append(asked(verb, answer))
         self._answers[answer.sender, answer.id] = answer
         if len(self._answers) > ANSWERS_KEPT:
             self._answers.pop(next(iter(self._answers)))
@@ -148,11 +165,11 @@ class Requests:
         `effective` is the tick that the answer names, where that is not the one whose order has the edits.
         """
         answer = Answer(request.sender, request.id, True, tick if effective is None else effective, text, b"{}")
-        self._write(answer, tick, edits or [], owners or self._core.owners)
+        self._write(request.verb, answer, tick, edits or [], owners or self._core.owners)
         if edits:
             self.issued.add(tick, edits)
             self._edits.setdefault(tick, []).extend(edits)
-        return self._keep(answer)
+        return answer
 
     def edits_for(self, tick: int) -> list[Edit]:
         """Take what requests add to the order of `tick`."""

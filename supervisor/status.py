@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from msgspec.structs import asdict
+
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_json
 from foosim.protocol.frame import Frame
@@ -108,6 +110,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
                 for tick, text in core.requests.network_events()[-DISRUPTIONS_SHOWN:]
             ],
         },
+        "requests": [asdict(asked) for asked in core.requests.asked],
         "refusals": report.get("refusals", {}),
         "clients": report.get("clients", []),
     }

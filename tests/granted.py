@@ -11,6 +11,11 @@ R: Final = "foosim/radio"
 P: Final = "foosim/replay"
 
 
+def is_end_of(key: str, name: str) -> bool:
+    """Whether a key's last part is one of the many ends of a person's sessions."""
+    return key.rpartition("/")[2].startswith(f"{name}.")
+
+
 def may_put(identity: str, key: str) -> bool:
     """Whether what this identity puts on a key is let in."""
     role, _, name = identity.partition(".")
@@ -22,8 +27,10 @@ def may_put(identity: str, key: str) -> bool:
             of_vhub = ("hello", "fetch", "ready", "standing", "want", "heartbeat", "farewell")
             return key in {f"{S}/deliveries", *(f"{S}/{what}/vhub" for what in of_vhub)}
         case "operator":
-            stem = f"{P}/request/" if key.startswith(P) else f"{S}/request/"
-            return key.startswith(f"{stem}{name}.") and "/" not in key[len(stem) :]
+            asks = {f"{P}/request", f"{S}/request", f"{S}/inquiry", f"{S}/fetch"}
+            return key.rpartition("/")[0] in asks and is_end_of(key, name)
+        case "viewer":
+            return key.rpartition("/")[0] in {f"{S}/inquiry", f"{S}/fetch"} and is_end_of(key, name)
         case "client":
             return key in {f"{R}/hello/{name}", f"{R}/up/{name}"}
     return False
@@ -42,7 +49,12 @@ def may_hear(identity: str, key: str) -> bool:
             to_it = {f"{S}/{what}/vhub" for what in ("build", "piece", "refusal", "proceed", "commit")}
             return key in to_all | to_it or key.startswith((f"{S}/samples/", f"{S}/want/"))
         case "operator":
-            return key.startswith((f"{S}/answer/{name}.", f"{P}/answer/{name}.", f"{P}/played/"))
+            to_it = {f"{S}/answer", f"{S}/piece", f"{P}/answer"}
+            addressed = key.rpartition("/")[0] in to_it and is_end_of(key, name)
+            return addressed or key == f"{S}/view" or key.startswith(f"{P}/played/")
+        case "viewer":
+            addressed = key.rpartition("/")[0] in {f"{S}/answer", f"{S}/piece"} and is_end_of(key, name)
+            return addressed or key == f"{S}/view"
         case "client":
             return key in {f"{R}/{what}/{name}" for what in ("welcome", "refusal", "down")}
     return False

@@ -79,7 +79,7 @@ class MemorySource:
     def want(self, wanted: Wanted) -> None:
         self.wanted.append(wanted)
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any]) -> Answered:
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         self.asked.append((verb, arguments))
         if verb == "push":
             raise Refused("ball cannot be pushed")

@@ -79,7 +79,7 @@ def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_step
         about = Recording(run).about
         between = Between(about)
         source = FileSource(run, recompute=between)
-        source.want(Wanted(50.0, links=(("camera", "player-red"),), readings=(("camera", "ball"),)))
+        source.want(Wanted(1, 50.0, frozenset({"contacts"}), (("camera", "player-red"),), (("camera", "ball"),)))
         async with running(source) as heard:
             await heard.until(lambda: bool(heard.moments and heard.of("marks") and heard.of("links")))
             assert source.about.span == (0, TICKS) and heard.abouts[0].kind == "capture"
@@ -87,7 +87,7 @@ def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_step
             kinds = {mark["kind"] for message in heard.of("marks") for mark in message["marks"]}
             assert {"push", "add", "kickoff"} <= kinds
 
-            answer = await source.ask("seek", {"tick": 237})
+            answer = await source.ask("seek", {"tick": 237}, "me")
             assert (answer.tick, answer.accepted) == (237, True)
             await heard.until(lambda: heard.tick == 237)
             seen = [(moment.tick, moment.jump) for moment in heard.moments[-2:]]
@@ -99,13 +99,14 @@ def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_step
             assert status["ticks"] == 237 and status["score"] == {"red": 0, "blue": 0} and status["state"] == "paused"
             assert status["nodes"].keys() == {"n1", "n2"} and status["packets"]["offered"] > 100
 
-            await source.ask("step", {"count": 3})
+            await source.ask("step", {"count": 3}, "me")
             await heard.until(lambda: heard.tick == 240)
             assert np.array_equal(heard.moments[-1].poses, exact.poses)
-            assert (await source.ask("step", {"count": -1, "unit": "frames"})).tick == 230
+            assert (await source.ask("step", {"count": -1, "unit": "frames"}, "me")).tick == 230
             await heard.until(lambda: heard.tick == 230 and heard.of("links")[-1]["at"] == 230)
             links = {(link["from"], link["to"]): link for link in heard.of("links")[-1]["links"]}
-            assert links["camera", "player-red"]["offered"] > 10
+            assert links["camera", "player-red"]["offered"] > 10 and not links["camera", "player-red"]["radio"]
+            assert heard.of("overlay")[-1]["tick"] == 230
             assert heard.of("watched")[-1]["link"] == ["camera", "player-red"]
             assert heard.of("readings")[-1]["points"]
             name, unit, points = await source.history(Curve("a", status="score.red"))
@@ -118,18 +119,18 @@ def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_step
 def test_it_plays_round_and_refuses_what_it_cannot_do(run: Path) -> None:
     async def play() -> None:
         source = FileSource(run)
-        source.want(Wanted(200.0))
+        source.want(Wanted(1, 200.0))
         async with running(source) as heard:
-            await source.ask("loop", {"on": True})
-            await source.ask("rate", {"pace": "8x"})
-            assert (await source.ask("play", {})).text == "plays at tick 0, 0 s"
+            await source.ask("loop", {"on": True}, "me")
+            await source.ask("rate", {"pace": "8x"}, "me")
+            assert (await source.ask("play", {}, "me")).text == "plays at tick 0, 0 s"
             await heard.until(lambda: sum(moment.jump for moment in heard.moments) > 1)
             ticks = [moment.tick for moment in heard.moments]
             assert source.deck.playhead.jumps > 1
             assert all(tick % 10 == 0 or tick == Recording(run).worlds[1].tick for tick in ticks)
-            await source.ask("pause", {})
+            await source.ask("pause", {}, "me")
             with pytest.raises(Refused, match=r"no request of a recording, 'pase': .* nearest is pause"):
-                await source.ask("pase", {})
+                await source.ask("pase", {}, "me")
             for verb, arguments, said in (
                 ("seek", {"tick": TICKS + 1}, f"has 0 to {TICKS}"),
                 ("seek", {}, "seek needs tick"),
@@ -142,7 +143,7 @@ def test_it_plays_round_and_refuses_what_it_cannot_do(run: Path) -> None:
                 ("branch", {"tick": "1"}, "branch: tick is not a whole number"),
             ):
                 with pytest.raises(BadValue, match=said):
-                    await source.ask(verb, arguments)
+                    await source.ask(verb, arguments, "me")
 
     asyncio.run(play())
 
@@ -151,7 +152,7 @@ def test_without_a_machine_that_computes_the_last_capture_holds(run: Path) -> No
     async def look() -> None:
         source = FileSource(run, recompute=lambda frame, inputs: None)
         async with running(source) as heard:
-            await source.ask("seek", {"tick": 237})
+            await source.ask("seek", {"tick": 237}, "me")
             await heard.until(lambda: bool(heard.of("note")))
             assert "computes another world" in heard.of("note")[0]["text"]
             assert heard.moments[-1].tick == 230
@@ -162,7 +163,7 @@ def test_without_a_machine_that_computes_the_last_capture_holds(run: Path) -> No
 
 def test_what_a_branch_says_is_what_up_takes(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async def ask(tick: int) -> tuple[str, int]:
-        answer = await FileSource(run).ask("branch", {"tick": tick})
+        answer = await FileSource(run).ask("branch", {"tick": tick}, "me")
         return answer.text, answer.tick
 
     monkeypatch.chdir(run.parent)
@@ -184,7 +185,7 @@ def test_a_damaged_file_is_told_and_the_rest_is_shown(run: Path, tmp_path: Path)
         async with running(source) as heard:
             await heard.until(lambda: bool(heard.of("note") and heard.of("marks")))
             assert "damaged.mcap: byte" in heard.of("note")[0]["text"] and heard.of("note")[0]["level"] == "error"
-            await source.ask("seek", {"tick": TICKS})
+            await source.ask("seek", {"tick": TICKS}, "me")
             await heard.until(lambda: heard.tick == TICKS)
 
     asyncio.run(look())
@@ -204,7 +205,7 @@ def test_a_capture_that_grows_moves_the_end_of_the_slider(
             path.write_bytes(whole)
             await heard.until(lambda: source.about.span == (0, TICKS))
             assert heard.abouts[-1].span == (0, TICKS) != first
-            await source.ask("seek", {"tick": TICKS})
+            await source.ask("seek", {"tick": TICKS}, "me")
             await heard.until(lambda: heard.tick == TICKS)
 
     monkeypatch.setattr("foosim.console.file_source.REFRESH_S", 0.01)
@@ -224,7 +225,7 @@ def test_two_sources_have_one_clock_and_a_distance(run: Path, tmp_path: Path) ->
         csv = PosesSource(table, one.deck, deployment=one.recording.deployment, compare=one.opened(links=True))
         assert csv.about.kind == "poses" and csv.about.verbs == () and other.about.verbs == ("branch",)
         async with running(one) as ours, running(other) as theirs, running(csv) as real:
-            await one.ask("seek", {"tick": 100})
+            await one.ask("seek", {"tick": 100}, "me")
             await theirs.until(lambda: theirs.tick == 120)
             await ours.until(lambda: ours.tick == 100)
             await real.until(lambda: real.tick == 100)
@@ -240,9 +241,9 @@ def test_two_sources_have_one_clock_and_a_distance(run: Path, tmp_path: Path) ->
             assert max(metres for _, metres in near["series"] if metres is not None) < 1e-5
             assert far["series"][100][1] > 1e-3 and [tick for tick, _ in far["series"]] == [*range(TICKS + 1)]
             with pytest.raises(Refused, match="ask that one"):
-                await csv.ask("play", {})
+                await csv.ask("play", {}, "me")
             with pytest.raises(Refused, match="there are branch"):
-                await other.ask("play", {})
+                await other.ask("play", {}, "me")
             assert one.deck.time_ns() == 100 * TICK_NS
 
     asyncio.run(look())
@@ -256,7 +257,7 @@ def test_a_table_alone_is_played_as_well(tmp_path: Path) -> None:
         source = PosesSource(table)
         assert source.about.span == (1000, 2000) and "play" in source.about.verbs
         async with running(source) as heard:
-            await source.ask("seek", {"tick": 1250})
+            await source.ask("seek", {"tick": 1250}, "me")
             await heard.until(lambda: heard.tick == 1250)
             assert heard.moments[-1].poses[0].tolist() == [0.25, 0, 0, 0, 0, 0, 1]
             assert heard.scenes[0]["links"][0]["shapes"][0]["kind"] == "sphere"

@@ -42,7 +42,7 @@ def test_each_tick_shows_what_was_captured_last_and_says_what_that_is(run: Path,
             world = recording.worlds[look.world]
             assert (look.kind, look.tick) == ("frame", tick)
             assert np.array_equal(look.values, frames[tick].values)
-            assert np.array_equal(look.poses, Poser(world.layout, world.scene).poses(frames[tick].values))
+            assert np.array_equal(look.poses, Poser(world.layout, world.drawing.scene).poses(frames[tick].values))
         elif tick == added:
             assert look.kind == "poses", "poses stand where a layout begins, a frame does not"
         else:
@@ -144,7 +144,7 @@ def test_a_damaged_chunk_hides_only_what_is_in_it(run: Path, tmp_path: Path) -> 
         else:
             assert look is not None
             seen.append(tick)
-    assert len(refused) <= 2 < len(seen)
+    assert 0 < len(refused) < len(seen) // 2
 
 
 def test_files_that_are_no_capture_are_refused(bad_files: list[Path]) -> None:

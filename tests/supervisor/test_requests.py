@@ -394,7 +394,7 @@ def test_the_same_id_of_another_is_another_request() -> None:
 
 GREAT: Final = 10**400
 BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
-    ("fly", {}, "no verb 'fly'; there are status, pause, resume, step, rate, add, remove, move, push, network, stop, "),
+    ("fly", {}, "no verb 'fly'; there are status, describe, watch, pause, resume, step, rate, add, remove, "),
     ("step", {}, "count: a whole number from 1 to 1000000000 is needed, not null"),
     ("step", {"count": 0}, "not 0"),
     ("step", {"count": True}, "not true"),
