@@ -9,13 +9,14 @@ from __future__ import annotations
 from base64 import b64decode
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 from foosim.console.drawing import Drawing
 from foosim.console.links import Links
 from foosim.console.source import About, Moment, Wanted
 from foosim.console.status_marks import StatusMarks
+from foosim.console.timeline import WorldEvents
 from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
@@ -54,6 +55,7 @@ class Following:
         """The newest one that was shown."""
         self._is_paused = self._has_changed = False
         self._marks = StatusMarks()
+        self._events: WorldEvents | None = None
         self._statuses = 0
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
         """Who has asked: by the request's sender, tick and verb."""
@@ -93,6 +95,8 @@ class Following:
         is_new = before is None or before.drawing is not world.drawing
         if is_new:
             self._frame = None
+            if before is None or before.drawing.deployment is not deployment:
+                self._events = WorldEvents(deployment)
             world.links.turn_to(world.drawing.scene)
         return is_new
 
@@ -145,13 +149,14 @@ class Following:
     # --- statuses ----------------------------------------------------------------------------------------------------
 
     def watch_arguments(self, wanted: Wanted, hz_max: float) -> dict[str, Any]:
-        """Return what a lease is asked for with."""
-        asked: dict[str, Any] = {"hz": min(wanted.hz, hz_max)}
-        if wanted.links:
-            asked["links"] = wanted.links
-        if wanted.readings:
-            asked["readings"] = wanted.readings
-        return asked
+        """Return what a lease is asked for with: what this world does not have is left out."""
+        assert self._world is not None, "described first"
+        deployment = self._world.drawing.deployment
+        ends = set(deployment.endpoints())
+        links = [link for link in wanted.links if ends.issuperset(link)]
+        robots = deployment.robots
+        readings = [pair for pair in wanted.readings if pair[0] in robots and pair[1] in robots[pair[0]].sensors]
+        return {"hz": min(wanted.hz, hz_max), "links": links, "readings": readings}
 
     def asked(self, sender: str, tick: int, verb: str, who: str) -> None:
         """Remember which browser has asked for something."""
@@ -170,6 +175,8 @@ class Following:
         self._has_changed = was_paused != self._is_paused
         messages: list[dict[str, Any]] = [{"type": "status", "status": status}]
         marks = self._marks.new(status)
+        if self._events is not None and self._frame is not None:
+            marks += map(asdict, self._events.take(self._frame))
         if marks:
             messages.append({"type": "marks", "marks": marks})
         if self._statuses % LINKS_EVERY == 0 and self._world is not None:
