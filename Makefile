@@ -2,7 +2,7 @@
 #     make up ARGS='--pace fast --for 20s'
 #     make test ARGS='tests/protocol -x'
 
-PACKAGES := client node protocol rehearsal supervisor vhub
+PACKAGES := client console node protocol rehearsal supervisor vhub
 PYTHON := .venv/bin/python
 SEEDS ?= 100
 N ?=
@@ -36,7 +36,7 @@ help:
 	@echo 'make clean   remove environments, caches and builds; captures stay'
 
 up: environment
-	@.venv/bin/foosim-supervisor up deploy/table.yaml $(ARGS)
+	@.venv/bin/foosim-supervisor up deploy/table.yaml --console $(ARGS)
 
 play: environment
 	@$(PYTEST) -m campaign tests/rehearsal/test_a_minute_of_play.py tests/laws $(ARGS)

@@ -123,7 +123,7 @@ only where compiled modules derive from its classes or read them, since of an in
 up by name. All are in one library, since they call each other. What starts a run, what people are told, and the types
 of msgspec, which are compiled already, are left out.
 """
-PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES: Final = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
 TYPED: Final = Path("build", "typed")
 """Where the folders stand under the name that they are imported by, for mypyc."""
 MADE: Final = Path("build", "c")

@@ -16,6 +16,7 @@ from typing import Any, Final
 import typer.main
 
 from foosim.client.main import app as player_app
+from foosim.console.main import app as console_app
 from foosim.node.main import app as node_app
 from foosim.protocol import limits, units
 from foosim.protocol.channels import CHANNELS
@@ -37,6 +38,7 @@ COMMANDS: Final[Mapping[str, Any]] = {
     "foosim-rehearse": rehearse_app,
     "foosim-replay": replay_app,
     "foosim-net": net_app,
+    "foosim-console": console_app,
     "foosim-vhub": vhub_app,
     "foosim-node": node_app,
     "foosim-player": player_app,
@@ -144,7 +146,7 @@ def write_commands() -> Iterator[str]:
         words = [_argument(parameter) for parameter in command.params if parameter.param_type_name == "argument"]
         yield f"### `{' '.join([name, *words])}`\n\n"
         yield re.sub(r"(?m)^ +", "", command.help.strip()) + "\n\n"
-        options = [p for p in command.params if p.param_type_name == "option" and p.name != "version"]
+        options = [p for p in command.params if p.param_type_name == "option" and p.name != "version" and not p.hidden]
         if options:
             yield "| option | |\n|---|---|\n"
         for option in options:

@@ -14,12 +14,12 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from foosim.console.asked import edit_text, moves
 from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.network import event_of
 from foosim.protocol.radios import Radio
 from foosim.protocol.units import format_ns
 from foosim.rehearsal.age_tallies import AgeAtUse, AgeTallies
-from foosim.rehearsal.report_asked import edit_text, moves
 from foosim.rehearsal.report_map import Map, MapMaker
 from foosim.rehearsal.report_tallies import BinTally, LinkTally, RuleTally, SenderTally
 from foosim.vhub.capture_reader import (

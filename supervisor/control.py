@@ -191,7 +191,7 @@ def answer_to(identity: str) -> Take[Answer]:
     return take
 
 
-def connect(run: str | None = None, role: Role = "operator") -> Control:
+def connect(run: str | None = None, role: Role = "operator", give_up: Callable[[], bool] = lambda: False) -> Control:
     """Connect to the newest live run, or to the one named. Raises NoRun, and what `Control`, `operator_credentials` and
     `viewer_credentials` raise.
     """
@@ -200,7 +200,7 @@ def connect(run: str | None = None, role: Role = "operator") -> Control:
     assert info is not None, "a run that was found has a run file"
     pki = _pki_of(info)
     credentials = operator_credentials(pki) if role == "operator" else viewer_credentials(pki)
-    return Control(info.simulation, credentials, role=role)
+    return Control(info.simulation, credentials, give_up, role)
 
 
 def _pki_of(info: RunInfo) -> Path | None:

@@ -28,12 +28,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "node": {"protocol"},
     "vhub": {"protocol"},
     "supervisor": {"protocol", "client", "node", "vhub"},
-    "rehearsal": {"protocol", "client", "node", "vhub", "supervisor"},
+    "console": {"protocol", "client", "node", "vhub", "supervisor"},
+    "rehearsal": {"protocol", "client", "node", "vhub", "supervisor", "console"},
 }
 PACKAGES = sorted(MAY_IMPORT)
 
 # The one file that knows a library which would otherwise spread.
-ONLY_IN = {"zenoh": "protocol/session.py", "pybullet": "node/engines/bullet.py"}
+ONLY_IN = {"zenoh": "protocol/session.py", "pybullet": "node/engines/bullet.py", "websockets": "console/server.py"}
 
 # The files that touch the world. Every other module is a core: it gets messages and the time and returns what to do,
 # which is why rehearsal can run all of them in one process on virtual time.
@@ -42,6 +43,17 @@ SHELLS = {
     "client/client.py",
     "client/main.py",
     "client/replay.py",
+    "console/branch_text.py",
+    "console/capture_index.py",
+    "console/comparing.py",
+    "console/deck.py",
+    "console/file_source.py",
+    "console/live.py",
+    "console/main.py",
+    "console/poses_source.py",
+    "console/recording.py",
+    "console/server.py",
+    "console/serving.py",
     "node/engines/probation.py",
     "node/main.py",
     "protocol/assets.py",
@@ -77,6 +89,7 @@ SHELLS = {
     "rehearsal/rehearse_command.py",
     "rehearsal/replay_command.py",
     "rehearsal/report_command.py",
+    "rehearsal/view_command.py",
     "rehearsal/whatif_command.py",
     "rehearsal/verify.py",
     "supervisor/children.py",
@@ -107,6 +120,7 @@ SHELLS = {
     "supervisor/plan.py",
     "supervisor/resumable.py",
     "supervisor/run_folder.py",
+    "supervisor/signals.py",
     "supervisor/up.py",
     "vhub/branching.py",
     "vhub/capture_cut.py",

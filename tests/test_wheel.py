@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
 INTERPRETED = Path(sys.executable).parent
 HAS_COMPILER = any(map(shutil.which, ("cc", "gcc", "clang")))
 AIR = "radios: {air: {preset: wifi_5_indoor}}, robots: {'*': [air]}, places: {'*': [0 m, 0 m, 1 m]}"

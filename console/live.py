@@ -1,0 +1,230 @@
+"""A running system as a source: frames of the simulation plane's `view`, statuses, and requests of an operator.
+
+Looking on costs the run what its leases say: they are renewed only while a browser looks. A supervisor that dies is
+looked for again under the run's name, and what was seen stays in sight meanwhile. Asking waits in threads, one
+connection each, so that nobody waits for another's answer. Neighbours: `following` (what becomes of what arrives),
+`supervisor.control`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
+from typing import Any, Final, TypeVar
+
+from foosim.console.following import Following, World
+from foosim.console.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.frame import Frame
+from foosim.protocol.inbox import Inbox
+from foosim.supervisor.control import Control, NoAnswer
+
+VERBS: Final = (
+    *("pause", "resume", "step", "rate", "add", "remove", "move", "push", "network", "stop", "start", "down"),
+)
+POLL_S: Final = 0.25
+"""How often the status is asked for while a browser looks."""
+RENEW_S: Final = 1.5
+QUESTION_S: Final = 3.0
+"""How long a status is waited for; a supervisor that does not answer is looked for again."""
+AGAIN_S: Final = 0.5
+"""How often it is."""
+FRAMES_MAX: Final = 8
+"""That wait for us: only the newest counts."""
+HZ_MAX: Final = 100.0
+ASKS_AT_ONCE: Final = 4
+OVERLAY_S: Final = 0.1
+
+T = TypeVar("T")
+Connect = Callable[[Callable[[], bool]], Control]
+"""Makes a connection; gives up when the function says so."""
+
+
+class LiveSource:
+    """One run."""
+
+    def __init__(self, name: str, view: Connect, operate: Connect | None) -> None:
+        """`name` is the run's; `operate` None lets nobody ask for anything."""
+        self._name, self._connect_view, self._connect_operator = name, view, operate
+        self._verbs = () if operate is None else VERBS
+        self.about = About("live", name, "", 1_000_000, self._verbs)
+        self._following = Following(self.about)
+        self._overlay_s = 0.0
+        self._wanted = Wanted()
+        self._changed = asyncio.Event()
+        """Something else is wanted, or frames do not fit the layout."""
+        self._closing = threading.Event()
+        self._viewing = ThreadPoolExecutor(1, "console-view")
+        self._asking = ThreadPoolExecutor(ASKS_AT_ONCE, "console-ask")
+        self._idle: list[Control] = []
+        """Connections over which nobody is asking."""
+
+    def want(self, wanted: Wanted) -> None:
+        self._wanted = wanted
+        self._changed.set()
+
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        """Ask the supervisor. Raises RequestRefused, NoAnswer, ConnectError, BadValue."""
+        if not all(key.isidentifier() and key not in ("timeout_s", "give_up", "verb") for key in arguments):
+            raise BadValue("arguments of a request have names", ", ".join(arguments))
+        loop = asyncio.get_running_loop()
+        answered, sender = await loop.run_in_executor(self._asking, self._ask, verb, dict(arguments))
+        self._following.asked(sender, answered.tick, verb, who)
+        self._changed.set()
+        return answered
+
+    def _ask(self, verb: str, arguments: dict[str, Any]) -> tuple[Answered, str]:
+        assert self._connect_operator is not None, "a source without verbs is not asked"
+        try:
+            control = self._idle.pop()
+        except IndexError:
+            control = self._connect_operator(self._closing.is_set)
+        try:
+            answer = control.ask(verb, give_up=self._closing.is_set, **arguments)
+        except NoAnswer:
+            control.close()
+            raise
+        except Refused:
+            self._idle.append(control)
+            raise
+        self._idle.append(control)
+        return Answered(answer.text, answer.tick), answer.sender
+
+    async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
+        """Nothing is kept of a run but what its capture has: a page keeps what it has plotted."""
+        return "", "", []
+
+    # --- looking on --------------------------------------------------------------------------------------------------
+
+    async def run(self, feed: Feed) -> None:
+        is_told = False
+        try:
+            while True:
+                try:
+                    control = await self._in_thread(lambda: self._connect_view(self._closing.is_set))
+                except Refused as refused:
+                    if not is_told:
+                        feed.tell(_note("warning", f"{self._name} is not there: {refused}; it is looked for"))
+                        is_told = True
+                    await asyncio.sleep(AGAIN_S)
+                    continue
+                if is_told:
+                    feed.tell(_note("info", f"connected to {self._name} again"))
+                try:
+                    await self._follow(control, feed)
+                except Refused as refused:
+                    feed.tell(_note("warning", f"lost {self._name}: {refused}; it is looked for"))
+                    is_told = True
+                    self._forget_idle()
+                    await asyncio.sleep(AGAIN_S)
+                finally:
+                    await self._in_thread(control.close)
+        finally:
+            self._closing.set()
+            self._forget_idle()
+            self._viewing.shutdown(wait=False)
+            self._asking.shutdown(wait=False)
+
+    def _forget_idle(self) -> None:
+        """Close connections of operators that wait: the supervisor that they lead to may be gone."""
+        while self._idle:
+            with suppress(IndexError):
+                self._idle.pop().close()
+
+    async def _in_thread(self, work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._viewing, work)
+
+    async def _follow(self, control: Control, feed: Feed) -> None:
+        """Tell of a run as long as its supervisor answers. Raises Refused."""
+        await self._describe(control, feed)
+        inbox = Inbox(FRAMES_MAX)
+        control.view(inbox)
+        ended = threading.Event()
+        loop = asyncio.get_running_loop()
+        frames = threading.Thread(
+            target=self._take_frames, args=(inbox, ended, loop, feed), name="console-frames", daemon=True
+        )
+        frames.start()
+        try:
+            await self._poll(control, feed)
+        finally:
+            ended.set()
+            inbox.wake()
+            await asyncio.to_thread(frames.join)
+
+    async def _describe(self, control: Control, feed: Feed) -> None:
+        """Learn which world it is, and tell its scene where that is new."""
+
+        def ask() -> tuple[dict[str, Any], World]:
+            what = control.describe(QUESTION_S, self._closing.is_set)
+            files = partial(control.files, timeout_s=QUESTION_S, give_up=self._closing.is_set)
+            return what, self._following.world_of(what, files)
+
+        what, world = await self._in_thread(ask)
+        if self._following.turn_to(what, world):
+            self.about = self._following.about
+            feed.describe(self.about, self._following.content())
+        moment = self._following.first_moment()
+        if moment is not None:
+            feed.show(moment)
+
+    async def _poll(self, control: Control, feed: Feed) -> None:
+        """Ask for statuses, renew the lease, describe again where frames do not fit; as long as somebody looks."""
+        following, renewed_s, lease = self._following, 0.0, Wanted()
+        while True:
+            self._changed.clear()
+            wanted = self._wanted
+            if wanted.readers == 0:
+                await self._changed.wait()
+                continue
+            if following.is_stale:
+                await self._describe(control, feed)
+            now_s = time.monotonic()
+            if wanted != lease or now_s >= renewed_s + RENEW_S:
+                asked = following.watch_arguments(wanted, HZ_MAX)
+                await self._in_thread(partial(control.ask, "watch", QUESTION_S, self._closing.is_set, **asked))
+                lease, renewed_s = wanted, now_s
+            status = await self._in_thread(lambda: control.status(QUESTION_S, self._closing.is_set))
+            for message in following.take_status(status):
+                feed.tell(message)
+            moment = following.standing_moment()
+            if moment is not None:
+                feed.show(moment)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(POLL_S):
+                    await self._changed.wait()
+
+    def _take_frames(self, inbox: Inbox, ended: threading.Event, loop: asyncio.AbstractEventLoop, feed: Feed) -> None:
+        """In a thread: wait for frames, and hand what they show to the event loop."""
+        while not ended.is_set():
+            items = inbox.take(1.0)
+            if not items or ended.is_set():
+                continue
+            found = self._following.read(items[-1][2])
+            if found is None:
+                loop.call_soon_threadsafe(self._changed.set)
+            else:
+                world, frame = found
+                loop.call_soon_threadsafe(self._show, feed, world, frame, world.drawing.moment(frame))
+
+    def _show(self, feed: Feed, world: World, frame: Frame, moment: Moment) -> None:
+        """Show a frame, if it is of the world that is shown still, and from time to time what lies over it."""
+        shown = self._following.show(world, frame, moment)
+        if shown is None:
+            return
+        feed.show(shown)
+        now_s = time.monotonic()
+        if self._wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
+            self._overlay_s = now_s
+            overlay = self._following.overlay(self._wanted.overlays)
+            if overlay is not None:
+                feed.tell(overlay)
+
+
+def _note(level: str, text: str) -> dict[str, Any]:
+    return {"type": "note", "level": level, "text": text}

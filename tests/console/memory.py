@@ -1,0 +1,151 @@
+"""A source in memory: a deployment's world at rest, told moments by the test, which sees what is asked of it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from websockets.asyncio.client import ClientConnection, connect
+
+from foosim.console.poses import HEAD, Poser
+from foosim.console.scene_json import scene_content
+from foosim.console.server import ConsoleServer, Tokens
+from foosim.console.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import Refused
+from foosim.protocol.layout import build_layout
+from foosim.protocol.scenes import build_scene
+from foosim.protocol.start import initial_frame
+
+TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
+TOKENS = Tokens("look", "touch")
+
+
+def table() -> Deployment:
+    """The football table as deployed."""
+    return load_deployment(TABLE.read_text(), TABLE.name)
+
+
+class MemorySource:
+    """A world that a test moves."""
+
+    def __init__(self, deployment: Deployment, added: tuple[tuple[str, str], ...] = ()) -> None:
+        self.deployment = deployment
+        self.about = About("live", "test", deployment.world, deployment.tick_ns, ("pause", "push"))
+        self.wanted: list[Wanted] = []
+        self.asked: list[tuple[str, Mapping[str, Any]]] = []
+        self.frame = initial_frame(deployment)
+        self.feed: Feed | None = None
+        self.begun = asyncio.Event()
+        self.turn_to(added)
+
+    def turn_to(self, added: tuple[tuple[str, str], ...]) -> None:
+        """Have a layout with these entities."""
+        self.layout = build_layout(self.deployment, added)
+        self.scene = build_scene(self.deployment, self.layout)
+        self.poser = Poser(self.layout, self.scene)
+        if self.feed is not None:
+            self.describe()
+
+    def describe(self) -> None:
+        assert self.feed is not None
+        self.feed.describe(self.about, scene_content(self.deployment, self.layout, self.scene))
+
+    async def run(self, feed: Feed) -> None:
+        self.feed = feed
+        self.describe()
+        self.begun.set()
+        await asyncio.Event().wait()
+
+    def show(self, tick: int, jump: bool = False) -> Moment:
+        """Tell a moment whose numbers are tick, tick + 1, ..."""
+        assert self.feed is not None
+        values = np.arange(tick, tick + self.layout.size, dtype=np.float64)
+        moment = Moment(tick, self.poser.poses(values), values, jump)
+        self.feed.show(moment)
+        return moment
+
+    def tell(self, **message: Any) -> None:
+        assert self.feed is not None
+        self.feed.tell(message)
+
+    def want(self, wanted: Wanted) -> None:
+        self.wanted.append(wanted)
+
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        self.asked.append((verb, arguments))
+        if verb == "push":
+            raise Refused("ball cannot be pushed")
+        return Answered(f"{verb} done", 7)
+
+    async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
+        return ("the ball", "m", [(1.0, 2.0)]) if curve.id == "known" else ("", "", [])
+
+
+@dataclass
+class Console:
+    """A server that listens, and its source."""
+
+    source: MemorySource
+    server: ConsoleServer
+    port: int
+
+    def address(self, path: str = "/ws", scheme: str = "ws") -> str:
+        return f"{scheme}://127.0.0.1:{self.port}{path}"
+
+    @asynccontextmanager
+    async def browser(self, token: str = TOKENS.operate, origin: str | None = "") -> AsyncIterator[Browser]:
+        """A WebSocket that has said hello."""
+        said = f"http://127.0.0.1:{self.port}" if origin == "" else origin
+        async with connect(self.address(), origin=said, compression=None, max_queue=2) as connection:  # type: ignore[arg-type]
+            browser = Browser(connection)
+            await browser.say(type="hello", token=token)
+            yield browser
+
+
+@dataclass
+class Browser:
+    """What a page's script does, without a page."""
+
+    connection: ClientConnection
+
+    async def say(self, **message: Any) -> None:
+        await self.connection.send(json.dumps(message))
+
+    async def hear(self, kind: str) -> dict[str, Any]:
+        """The next message of a type; those before it are passed over."""
+        async with asyncio.timeout(30):
+            while True:
+                payload = await self.connection.recv()
+                if isinstance(payload, str) and (message := json.loads(payload))["type"] == kind:
+                    assert isinstance(message, dict)
+                    return message
+
+    async def moment(self) -> tuple[tuple[int, ...], np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+        """Head, poses and values of the next binary message."""
+        async with asyncio.timeout(30):
+            while True:
+                payload = await self.connection.recv()
+                if isinstance(payload, bytes):
+                    head = HEAD.unpack_from(payload)
+                    numbers = np.frombuffer(payload, "<f4", offset=HEAD.size)
+                    assert len(numbers) == 7 * head[6] + head[7]
+                    return head, numbers[: 7 * head[6]].reshape(-1, 7), numbers[7 * head[6] :]
+
+
+@asynccontextmanager
+async def console(source: MemorySource) -> AsyncIterator[Console]:
+    """A server on a port of its own, its source running."""
+    server = ConsoleServer([source], TOKENS, "1")
+    async with server.listening("127.0.0.1", 0) as port:
+        running = asyncio.create_task(server.run_sources())
+        await source.begun.wait()
+        yield Console(source, server, port)
+        running.cancel()

@@ -1,0 +1,48 @@
+"""The poses that a page draws are those of the one forward kinematics, in the order of the scene's links."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from foosim.console.poses import Poser
+from foosim.console.scene_json import scene_content
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.layout import build_layout
+from foosim.protocol.scene import forward_kinematics
+from foosim.protocol.scenes import build_scene
+from tests.console.memory import table
+
+
+def check(deployment: Deployment, added: tuple[tuple[str, str], ...] = ()) -> None:
+    layout = build_layout(deployment, added)
+    scene = build_scene(deployment, layout)
+    values = np.linspace(-3.0, 3.0, layout.size)
+    expected = [
+        (name, [*position, *turned])
+        for body in scene.bodies
+        for name, position, turned in forward_kinematics(scene.bodies[body], layout[body], values.tolist())
+    ]
+    links = scene_content(deployment, layout, scene)["links"]
+    assert [link["name"] for link in links] == [name for name, _ in expected]
+    poses = Poser(layout, scene).poses(values)
+    assert poses.tolist() == np.array([pose for _, pose in expected], np.float32).tolist()
+
+
+def test_poses_of_a_table_with_two_balls() -> None:
+    check(table(), (("ball2", "ball"),))
+
+
+def test_poses_of_a_hall(fleet_text: Callable[..., str]) -> None:
+    check(load_deployment(fleet_text(4), "hall"))
+
+
+def test_every_number_of_a_frame_belongs_to_one_field() -> None:
+    deployment = table()
+    layout = build_layout(deployment)
+    content = scene_content(deployment, layout, build_scene(deployment, layout))
+    fields = content["fields"]
+    numbers = [place for run in fields for place in range(run["index"], run["index"] + run["count"])]
+    assert numbers == list(range(layout.size))
+    rod = [(run["unit"], run["count"]) for run in fields if run["field"] == "joint_positions"]
+    assert rod[:2] == [("m", 1), ("rad", 1)]
