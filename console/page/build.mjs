@@ -8,7 +8,11 @@ if (!folder) throw new Error("node build.mjs FOLDER: where to write");
 mkdirSync(folder, { recursive: true });
 
 await build({
-  entryPoints: [{ in: "src/main.js", out: "console" }, { in: "src/console.css", out: "console" }],
+  entryPoints: [
+    { in: "src/main.js", out: "console" },
+    { in: "src/console.css", out: "console" },
+    { in: "src/report.js", out: "report" },
+  ],
   bundle: true,
   minify: true,
   format: "iife",
@@ -24,4 +28,4 @@ const licences = ["three", "uplot"].map((name) => {
   const { version, homepage } = JSON.parse(readFileSync(`node_modules/${name}/package.json`, "utf8"));
   return `${name} ${version} (${homepage})\n\n${readFileSync(`node_modules/${name}/LICENSE`, "utf8").trim()}\n`;
 });
-writeFileSync(`${folder}/licences.txt`, `console.js and console.css contain these libraries.\n\n${licences.join("\n\n")}`);
+writeFileSync(`${folder}/licences.txt`, `console.js, console.css and report.js contain code of these libraries.\n\n${licences.join("\n\n")}`);

@@ -1,4 +1,4 @@
-"""The page that is checked in is what its sources and the pinned libraries make; the linter and type checker agree with it.
+"""The page that is checked in is what its sources and the pinned libraries make, and its checkers find nothing.
 
 Where npm is. The libraries are installed once, in the folder that `tools/page.sh` works in.
 """
@@ -50,7 +50,7 @@ def test_every_library_is_pinned_and_its_licence_is_served() -> None:
 
 
 def test_the_page_holds_to_its_policy() -> None:
-    """Its Content-Security-Policy forbids scripts in the document and code out of strings; nothing is asked elsewhere."""
+    """Its Content-Security-Policy forbids scripts in the document and code out of strings."""
     index = (WWW / "index.html").read_text()
     assert re.findall(r"<script\b[^>]*>(?!</script>)", index) == []
     assert re.findall(r"\bon\w+=", index) == []

@@ -19,7 +19,7 @@ export class Control {
     this.desk = desk;
     this.play = button("Pause", () => this.toggle(), { id: "play", class: "primary", title: "Pause or resume (Space)" });
     this.step = button("Step", () => this.stepBy(1), { id: "step", title: "One tick (.)" });
-    this.steps = button("Step …", () => this.askSteps(), { title: "Several ticks" });
+    this.steps = button("…", () => this.askSteps(), { title: "Several ticks (Shift + .)", "aria-label": "Several ticks" });
     this.pace = select([], "", { id: "pace", "aria-label": "Pace", title: "How fast simulated time goes", onchange: () => this.setPace() });
     this.end = button("End run …", () => this.down(), { id: "down", class: "danger" });
     byId("tempo").append(this.play, this.step, this.steps, this.pace, this.end);
@@ -59,7 +59,8 @@ export class Control {
     byId("state").dataset.state = state;
     setText(byId("time"), time(source.seconds(source.tick)));
     setText(byId("tick"), `tick ${Math.round(source.tick)}`);
-    setText(byId("speed"), status?.rtf === undefined || status.rtf === null ? "" : `${status.rtf.toFixed(2)}× real time`);
+    byId("speed").title = "Simulated time for each second of the wall, since the start";
+    setText(byId("speed"), status?.rtf === undefined || status.rtf === null ? "" : `${status.rtf.toFixed(2)}×`);
     const held = state === "paused" || (info.kind !== "live" && source.paused);
     setText(this.play, held ? "Resume" : "Pause");
     this.play.disabled = !this.desk.may(held ? "resume" : "pause") && !this.desk.may("play");

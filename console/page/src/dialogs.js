@@ -2,9 +2,11 @@
 
 import { button, h } from "./ui.js";
 
+const PATIENCE_MS = 1500;
+
 /**
  * Show a dialog; resolves to true when its form is sent, to false when it is closed.
- * `send` may refuse by a text, which the dialog shows, and stays open.
+ * `send` may refuse by a text, which the dialog shows, and stays open; one that takes long is not waited for.
  * @param {string} title
  * @param {(Node | string)[]} content
  * @param {{action: string, danger?: boolean, wide?: boolean, send?: () => (string | void | Promise<string | void>)}} how
@@ -27,7 +29,8 @@ export function dialog(title, content, how) {
       event.preventDefault();
       send.disabled = true;
       wrong.textContent = "";
-      const text = await how.send?.();
+      // A paused run answers some requests when it goes on: the page stays usable meanwhile, the log has the answer.
+      const text = await Promise.race([how.send?.(), new Promise((later) => window.setTimeout(() => later(""), PATIENCE_MS))]);
       send.disabled = false;
       if (text) wrong.textContent = text;
       else box.close("sent");

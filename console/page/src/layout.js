@@ -102,7 +102,7 @@ export class Layout {
       splitter.setAttribute("aria-valuenow", String(width));
       return width;
     };
-    let width = set(this.memory.get("panel", Math.min(460, window.innerWidth * 0.4)));
+    let width = set(this.memory.get("panel", Math.min(480, window.innerWidth * 0.42)));
     const keep = (/** @type {number} */ px) => this.memory.set("panel", (width = set(px)));
     splitter.addEventListener("pointerdown", (event) => splitter.setPointerCapture(event.pointerId));
     splitter.addEventListener("pointermove", (event) => {
@@ -122,7 +122,8 @@ export class Layout {
   theme(name) {
     this.name = ["light", "dark"].includes(name) ? name : "auto";
     document.documentElement.dataset.theme = this.name;
-    byId("theme").textContent = { auto: "◐ Auto", light: "○ Light", dark: "● Dark" }[this.name] ?? "";
+    byId("theme").textContent = { auto: "◐", light: "○", dark: "●" }[this.name] ?? "";
+    byId("theme").setAttribute("aria-label", `Theme: ${this.name === "auto" ? "as the system" : this.name}`);
     this.memory.set("theme", this.name);
     this.store.emit("theme", this.name);
   }

@@ -19,8 +19,8 @@ export class LinkDetail {
     const charts = h("div", { class: "charts" });
     const [delay, loss] = [h("div"), h("div")];
     charts.append(delay, loss);
-    this.delay = timeChart(delay, { unit: "delay, queue (ms)", height: 150 });
-    this.loss = timeChart(loss, { unit: "loss (%)", height: 150 });
+    this.delay = timeChart(delay, { unit: "ms", height: 150 });
+    this.loss = timeChart(loss, { unit: "%", height: 150 });
     this.rings = { delay: new Ring(4000), queue: new Ring(4000), loss: new Ring(4000) };
     const plot = (/** @type {string} */ figure) => () => store.link && plots.addLink(store.link, figure);
     const actions = h("div", { class: "row" },

@@ -114,6 +114,10 @@ function drawOwners() {
   keyed(bar.owners, names, (name) => name, (name) => h("span", {}, h("i", { class: "swatch", style: `background:${colours.get(name)}` }), name));
 }
 
+function drawSigns() {
+  bar.signs.hidden = !options.radio || stat.view !== "3d" || !store.main?.links.length;
+}
+
 store.on("connected", (connected) => {
   if (!connected) return;
   show();
@@ -131,6 +135,7 @@ store.on("theme", () => view.retheme());
 store.on("move", (robot) => void entities.askMove(robot));
 store.on("tab", () => log.draw());
 for (const name of ["status", "options"]) store.on(name, drawOwners);
+for (const name of ["links", "options"]) store.on(name, drawSigns);
 store.on("poses", (source) => {
   if (source.info.id !== 0) return;
   stat.tick = source.tick;

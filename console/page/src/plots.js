@@ -25,7 +25,7 @@ function axis(label, text, size) {
     labelFont: FONT,
     label,
     labelSize: 18,
-    size,
+    ...(size === undefined ? {} : { size }),
     values: (_, splits) => splits.map((value) => (value === null ? "" : text(value))),
   };
 }

@@ -2,7 +2,7 @@
 // Of each link the half at its sender is drawn: both ways of a pair are seen.
 
 import {
-  BufferAttribute, BufferGeometry, CanvasTexture, Group, Points, PointsMaterial, Vector3,
+  BufferAttribute, BufferGeometry, CanvasTexture, Color, Group, Points, PointsMaterial, Vector3,
 } from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
@@ -50,12 +50,13 @@ export class RadioLines {
     this.material = new LineMaterial({ linewidth: 2, vertexColors: true, transparent: true, opacity: 0.85 });
     this.lines = new LineSegments2(new LineSegmentsGeometry(), this.material);
     this.lines.frustumCulled = false;
-    this.walls = signs(WALLS_MAX, signTexture("▮", "#ffffff"), 12);
+    this.walls = signs(WALLS_MAX, signTexture("▮", "#ffffff"), 10);
     this.deaths = signs(FLASHES_MAX, signTexture("✕", "#ff7a1a"), 20);
     this.group.add(this.lines, this.walls, this.deaths);
     /** @type {{place: Vector3, until: number}[]} */
     this.flashes = [];
     this.count = 0;
+    this.colour = new Color();
     this.from = new Vector3();
     this.to = new Vector3();
   }
@@ -78,8 +79,8 @@ export class RadioLines {
       const share = chosen && link.from === chosen[0] && link.to === chosen[1] ? 1 : 0.5;
       const end = to.lerp(from, 1 - share);
       positions.push(from.x, from.y, from.z, end.x, end.y, end.z);
-      const colour = lossColour(link.loss ?? 0);
-      colours.push(...colour, ...colour);
+      const { r, g, b } = this.colour.setRGB(...lossColour(link.loss ?? 0), "srgb");
+      colours.push(r, g, b, r, g, b);
       if (walls.length < WALLS_MAX * 3) walls.push(...link.walls.flat());
     }
     this.count = positions.length / 6;

@@ -3,8 +3,9 @@
 /** @param {number | null | undefined} value @param {number} [digits] */
 export function number(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  if (value !== 0 && (Math.abs(value) >= 1e6 || Math.abs(value) < 1e-4)) return value.toExponential(2);
-  return value.toFixed(Math.max(0, Math.min(6, digits - Math.max(0, Math.floor(Math.log10(Math.abs(value) || 1))))));
+  if (value === 0) return "0";
+  if (Math.abs(value) >= 1e6 || Math.abs(value) < 1e-4) return value.toExponential(2);
+  return value.toFixed(Math.max(0, Math.min(6, digits - Math.max(0, Math.floor(Math.log10(Math.abs(value)))))));
 }
 
 /** @param {number | null | undefined} value */
@@ -19,7 +20,7 @@ export function percent(value, digits = 1) {
 
 /** @param {number | null | undefined} value */
 export function milliseconds(value) {
-  return value === null || value === undefined ? "–" : `${number(value, 3)} ms`;
+  return value === null || value === undefined ? "–" : `${number(value, 2)} ms`;
 }
 
 /**

@@ -14,6 +14,9 @@ const CLICK_PX = 5;
 const PIXEL_RATIO_MAX = 2;
 /** Drawn anew although nothing moved: what the page looks like settles. */
 const FRAMES_AFTER_CHANGE = 4;
+const HOME_ROUNDS = 16;
+/** The world stands below the middle by this share of half the height: above it is the bar of the view. */
+const HOME_DROP = 0.06;
 
 /**
  * @typedef {object} Options what is shown
@@ -173,19 +176,45 @@ export class View3D {
     const box = this.bounds;
     const size = box.getSize(new Vector3());
     const centre = box.getCenter(new Vector3());
-    const aspect = Math.max(0.3, this.camera.aspect);
-    const half = Math.tan((this.camera.fov * Math.PI) / 360);
-    const away = Math.max(size.x / (2 * half * aspect), (0.75 * size.y + 0.6 * size.z) / (2 * half)) * 1.02 + size.y * 0.28;
-    this.controls.target.copy(centre);
-    this.camera.position.copy(centre).add(new Vector3(0, -0.62, 0.78).multiplyScalar(away));
-    this.camera.near = away / 200;
-    this.camera.far = away * 30 + size.length() * 4;
+    const reach = size.length();
+    this.camera.near = reach / 500;
+    this.camera.far = reach * 40;
+    this.camera.aspect = this.place.clientWidth / (this._is_split ? 2 : 1) / Math.max(1, this.place.clientHeight);
     this.camera.updateProjectionMatrix();
-    this.controls.minDistance = away / 60;
-    this.controls.maxDistance = away * 6;
+    let [near, far] = [reach * 0.3, reach * 6];
+    for (let round = 0; round < HOME_ROUNDS; round += 1) {
+      const away = (near + far) / 2;
+      if (this._fits(box, centre, away)) far = away;
+      else near = away;
+    }
+    this._fits(box, centre, far);
+    this.controls.minDistance = reach / 100;
+    this.controls.maxDistance = reach * 8;
     this.controls.update();
     this._lay_grid(size, box);
     this.touch();
+  }
+
+  /**
+   * Look from a distance, the world in the middle of what the bars leave; returns whether all of it is seen.
+   * @param {Box3} box @param {Vector3} centre @param {number} away
+   */
+  _fits(box, centre, away) {
+    const target = centre.clone();
+    let extent = [0, 0, 0];
+    for (let round = 0; round < 3; round += 1) {
+      this.controls.target.copy(target);
+      this.camera.position.copy(target).add(new Vector3(0, -0.66, 0.75).normalize().multiplyScalar(away));
+      this.camera.lookAt(target);
+      this.camera.updateMatrixWorld();
+      const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) =>
+        new Vector3(bits & 1 ? box.max.x : box.min.x, bits & 2 ? box.max.y : box.min.y, bits & 4 ? box.max.z : box.min.z).project(this.camera));
+      const heights = corners.map(({ y }) => y);
+      extent = [Math.min(...heights), Math.max(...heights), Math.max(...corners.map(({ x }) => Math.abs(x)))];
+      const off = (extent[0] + extent[1]) / 2 + HOME_DROP;
+      target.y += off * away * Math.tan((this.camera.fov * Math.PI) / 360);
+    }
+    return extent[1] - extent[0] < 1.7 && extent[2] < 0.95;
   }
 
   /** @param {Vector3} size @param {Box3} box */

@@ -1,5 +1,6 @@
 // The bar over the view: what it shows, how two sources share it.
 
+import { lossGradient } from "./colours.js";
 import { byId, h, select, button } from "./ui.js";
 
 const SWITCHES = /** @type {[string, string, string][]} */ ([
@@ -36,7 +37,9 @@ export class ViewBar {
     } });
     bar.append(this.two);
     this.owners = h("div", { class: "legend owners", id: "owners" });
-    byId("view").append(this.owners);
+    const scale = h("span", {}, "loss 0 %");
+    this.signs = h("div", { class: "legend signs", hidden: true }, scale, h("i", { style: `background:${lossGradient()}` }), "100 %", h("span", {}, "▮ wall in the way"), h("span", {}, "✕ packet dropped"));
+    byId("view").append(this.owners, this.signs);
   }
 
   /** @param {string} name */
