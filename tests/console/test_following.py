@@ -101,6 +101,7 @@ def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
         "requests": list(requests),
         "links": [],
         "score": None,
+        "watched": {},
     }
 
 
