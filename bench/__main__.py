@@ -15,6 +15,7 @@ from typing import Any, Final
 from bench import (
     barrier,
     certificates,
+    console_seek,
     distributed,
     echo,
     hub,
@@ -98,6 +99,12 @@ BENCHES: Final = (
     Bench("whatif", "captured packets through another network", with_default(whatif.whatif), whatif.lines),
     Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),
+    Bench(
+        "console-seek",
+        "the time slider of the console over ten minutes of the table",
+        with_default(console_seek.console_seek),
+        console_seek.lines,
+    ),
     Bench("swarm", "rehearsals under random faults, by seed", swarm.swarm, swarm.lines),
     Bench("vhub-loss", "the vHub is killed and comes back", with_default(vhub_loss.vhub_loss), vhub_loss.lines),
     Bench("barrier", "the messages of a tick alone", run_barrier, barrier_lines),
