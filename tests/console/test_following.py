@@ -68,6 +68,15 @@ def test_a_frame_of_another_layout_is_not_drawn_and_asks_for_the_new_one() -> No
     assert moment is not None and len(moment.poses) == 18
 
 
+def test_a_frame_of_another_layout_of_the_same_size_is_not_drawn() -> None:
+    found, _ = following()
+    what = described(frame_of(7, BALL2[0]), BALL2)
+    found.turn_to(what, found.world_of(what, lambda deployment: {}))
+    assert found.read(commit(frame_of(8, BALL2[0]))) is not None
+    assert found.read(commit(frame_of(9, ["ball3", "ball"]))) is None
+    assert is_stale(found)
+
+
 def test_the_same_world_described_again_is_no_new_scene() -> None:
     found, _ = following()
     found.first_moment()
@@ -134,7 +143,7 @@ def test_contacts_are_where_balls_touch_something() -> None:
 
 
 def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None:
-    deployment = load_deployment(fleet_text(1), "hall")
+    deployment = load_deployment(fleet_text(1, "robots.rover01.heading=90 deg"), "hall")
     frame = initial_frame(deployment)
     rays = np.array(Overlays(deployment, frame.layout).content(frame, {"rays"})["rays"])
     sensor = next(s for s in deployment.robots["rover01"].sensors.values() if s.kind == "proximity")
