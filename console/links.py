@@ -131,12 +131,10 @@ class Links:
     def _line(self, key: Key, queue_ns: int, count: Count) -> dict[str, Any]:
         source, destination, rule = key
         judged = count.delivered + count.dropped
-        on_air = self._is_on_air(key)
-        line = {
+        return {
             "from": source,
             "to": destination,
             "rule": rule,
-            "radio": on_air,
             "offered": count.offered,
             "delivered": count.delivered,
             "dropped": count.dropped,
@@ -144,13 +142,27 @@ class Links:
             "delay_ms": round(count.delay_ns / count.delivered / 1e6, 4) if count.delivered else None,
             "queue_ms": round(queue_ns / 1e6, 4),
             "causes": count.causes,
+            **self._ends_of(key),
+        }
+
+    def with_ends(self, links: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Return links, of which `from`, `to` and `rule` are told, with where their ends are and what is between."""
+        keys = [(link["from"], link["to"], link["rule"]) for link in links]
+        self._look([key for key in keys if self._is_on_air(key)])
+        return [{**link, **self._ends_of(key)} for link, key in zip(links, keys, strict=True)]
+
+    def _ends_of(self, key: Key) -> dict[str, Any]:
+        source, destination, _ = key
+        on_air = self._is_on_air(key)
+        ends: dict[str, Any] = {
+            "radio": on_air,
             "from_link": self._ends.get(source),
             "to_link": self._ends.get(destination),
             "walls": self._walls.get(_pair(source, destination), []) if on_air else [],
         }
         if on_air:
-            line |= {"from_at": self._site(source), "to_at": self._site(destination)}
-        return line
+            ends |= {"from_at": self._site(source), "to_at": self._site(destination)}
+        return ends
 
     def _site(self, endpoint: str) -> Vector | None:
         """Return where the deployment says that an endpoint without a body is."""
@@ -204,6 +216,11 @@ def _pair(source: str, destination: str) -> Pair:
     return (source, destination) if source <= destination else (destination, source)
 
 
+def lost_where(cause: str) -> str:
+    """Return at which end of its link, or on the way, a packet is lost by a cause."""
+    return "sender" if cause in AT_SENDER else "receiver" if cause in AT_RECEIVER else "way"
+
+
 def _drops(seen: Mapping[Key, Count]) -> list[dict[str, Any]]:
     """Return the packets that were lost in the window, by link and cause, and where that was."""
     found: Counter[tuple[str, str, str]] = Counter()
@@ -215,7 +232,7 @@ def _drops(seen: Mapping[Key, Count]) -> list[dict[str, Any]]:
             "from": source,
             "to": destination,
             "cause": cause,
-            "where": "sender" if cause in AT_SENDER else "receiver" if cause in AT_RECEIVER else "way",
+            "where": lost_where(cause),
             "count": count,
         }
         for (source, destination, cause), count in found.items()

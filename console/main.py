@@ -46,12 +46,15 @@ def foosim_console(
     die_with_parent()
     name = find_run(run).name
 
-    def connected(give_up: Callable[[], bool]) -> Control:
-        return connect(name, give_up)
+    def viewing(give_up: Callable[[], bool]) -> Control:
+        return connect(name, "viewer", give_up)
+
+    def operating(give_up: Callable[[], bool]) -> Control:
+        return connect(name, "operator", give_up)
 
     options = ServeOptions(listen, certificate, key, view_only, open_browser, announce)
-    operate = None if view_only else connected
-    serve_sources(lambda: ([LiveSource(name, connected, operate)], ()), options, lambda text: print(text, flush=True))
+    operate = None if view_only else operating
+    serve_sources(lambda: ([LiveSource(name, viewing, operate)], ()), options, lambda text: print(text, flush=True))
 
 
 def main() -> None:

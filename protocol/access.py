@@ -2,7 +2,8 @@
 table of channels, which alone spells the keys.
 
 A node writes and hears what nodes do, under its own name; a client writes its own transmit key and hears its own
-receive key; an operator writes requests and hears their answers, and hears replays. What is not granted is denied.
+receive key; an operator writes requests and hears their answers, looks at the run, and hears replays; a viewer looks at
+the run. What is not granted is denied.
 The routers of the planes enforce it, each for those who connect to it, so it says nothing of a router's own messages.
 Zenoh tells nobody what it denies. Neighbours: `identity`, `channels`, `session_settings` (hands it to Zenoh).
 """
@@ -30,14 +31,19 @@ _READS: Final[dict[str, Reads]] = {
     "client": channels.CLIENT_READS,
     REPLAY: channels.REPLAY_READS,
     "operator": (*channels.OPERATOR_READS, *channels.VIEW_READS, *channels.LISTENER_READS),
+    "viewer": (*channels.OPERATOR_READS, *channels.VIEW_READS),
 }
 _PLANES: Final = {
     "node": (Plane.SIMULATION,),
     VHUB: (Plane.SIMULATION,),
     "operator": (Plane.SIMULATION, Plane.REPLAY),
+    "viewer": (Plane.SIMULATION,),
     "client": (Plane.RADIO,),
 }
 """Who connects to which planes' routers. A replay has everybody's packets, so it is for operators."""
+
+PEOPLE: Final = ("operator", "viewer")
+"""Each has many sessions at once, with ends of their own to the name, behind a dot, and is never present."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +83,7 @@ def access_to(plane: Plane, deployment: Deployment) -> Access:
 def grant(who: str, plane: Plane) -> Grant:
     """Return what an identity may do on a plane to which it connects."""
     role, name = identity.parse_identity(who)
-    # An operator has many sessions at once, each with an end of its own to its name, behind a dot.
-    key_name = f"{name}.$*" if role == "operator" else name
+    key_name = f"{name}.$*" if role in PEOPLE else name
     written = [channel for channel in CHANNELS if channel.plane is plane and _writes(role, channel)]
     presence = ALIVE[plane]
     return Grant(
@@ -87,7 +92,7 @@ def grant(who: str, plane: Plane) -> Grant:
         writes=tuple(channel.key_for(key_name) for channel in written),
         reads=tuple(_each(_READS[role], plane, lambda channel, own: _declared(channel, key_name if own else "*"))),
         interests=tuple(sorted({expression for channel in written for expression in _readers(channel, key_name)})),
-        alive="" if role == "operator" else presence.replace("{name}", name),
+        alive="" if role in PEOPLE else presence.replace("{name}", name),
         watches=presence.replace("{name}", ROUTERS[plane]),
     )
 

@@ -25,7 +25,7 @@ from typing import Final
 from foosim.protocol import wall
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.errors import Refused
-from foosim.protocol.identity import operator, parse_identity
+from foosim.protocol.identity import parse_identity
 
 CA_FILE: Final = "ca.pem"
 CA_KEY_FILE: Final = "ca.key"
@@ -35,6 +35,8 @@ PASSWORD_SUFFIX: Final = ".password"
 FILE_BYTES_MAX: Final = 65_536
 OPERATOR_VARIABLE: Final = "FOOSIM_OPERATOR"
 """Names the operator whose certificate control commands show, where there are several."""
+VIEWER_VARIABLE: Final = "FOOSIM_VIEWER"
+"""The same of the viewer whose certificate is shown by who only looks."""
 SOON: Final = timedelta(days=14)
 """A certificate that ends within this is to be renewed."""
 
@@ -120,15 +122,29 @@ def identities_in(folder: Path) -> list[str]:
 
 def operator_credentials(folder: Path | None) -> Credentials | None:
     """Return those of the operator that FOOSIM_OPERATOR names, or of the only one there; as `load_credentials`."""
+    return None if folder is None else _credentials_of_one(folder, "operator", OPERATOR_VARIABLE)
+
+
+def viewer_credentials(folder: Path | None) -> Credentials | None:
+    """Return those of the viewer that FOOSIM_VIEWER names, or of the only one there; as `load_credentials`.
+
+    Where there is none, those of an operator, who may look as well.
+    """
     if folder is None:
         return None
-    name = os.environ.get(OPERATOR_VARIABLE)
+    has_viewer = VIEWER_VARIABLE in os.environ or any(who.startswith("viewer.") for who in identities_in(folder))
+    return _credentials_of_one(folder, "viewer", VIEWER_VARIABLE) if has_viewer else operator_credentials(folder)
+
+
+def _credentials_of_one(folder: Path, role: str, variable: str) -> Credentials | None:
+    """Return those of the one in a role whom a variable of the environment names, or of the only one there."""
+    name = os.environ.get(variable)
     if name is not None:
-        return load_credentials(folder, operator(name))
-    known = [who for who in identities_in(folder) if who.startswith("operator.")]
+        return load_credentials(folder, f"{role}.{name}")
+    known = [who for who in identities_in(folder) if who.startswith(f"{role}.")]
     if len(known) != 1:
-        there = f"several operators ({', '.join(known)})" if known else "no operator's certificate"
-        raise CertificateError(f"{folder} has {there}: {OPERATOR_VARIABLE}=NAME in the environment says which it is")
+        there = f"several {role}s ({', '.join(known)})" if known else f"no {role}'s certificate"
+        raise CertificateError(f"{folder} has {there}: {variable}=NAME in the environment says which it is")
     return load_credentials(folder, known[0])
 
 

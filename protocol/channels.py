@@ -90,7 +90,9 @@ _SMALL: Final = limits.SMALL_MESSAGE_BYTES_MAX
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL)
 RECALL: Final = _simulation("recall", messages.Recall, "supervisor", "node, vhub", "an unknown heartbeat", named=False)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
-FETCH: Final = _simulation("fetch", asset_messages.Fetch, "node, vhub, operator", "supervisor", "a piece of a file")
+FETCH: Final = _simulation(
+    "fetch", asset_messages.Fetch, "node, vhub, operator, viewer", "supervisor", "a piece of a file"
+)
 PIECE: Final = _simulation("piece", asset_messages.Piece, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation(
@@ -113,9 +115,12 @@ TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a cha
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
 REQUEST: Final = _simulation("request", messages.Request, "operator", "supervisor", "a request", bytes_max=_SMALL)
+INQUIRY: Final = _simulation(
+    "inquiry", messages.Inquiry, "operator, viewer", "supervisor", "a request that only reads", bytes_max=_SMALL
+)
 ANSWER: Final = _simulation("answer", messages.Answer, "supervisor", "the named one", "an answer")
 VIEW: Final = _simulation(
-    "view", messages.Commit, "supervisor", "operator", "what a lease asks for", named=False, blocking=False
+    "view", messages.Commit, "supervisor", "operator, viewer", "what a lease asks for", named=False, blocking=False
 )
 
 CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
@@ -152,6 +157,7 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     END,
     FAREWELL,
     REQUEST,
+    INQUIRY,
     ANSWER,
     VIEW,
     CLIENT_HELLO,
@@ -196,7 +202,7 @@ VHUB_READS: Final[Reads] = (*((channel, True) for channel in (
     RECALL, EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final[Reads] = tuple((channel, False) for channel in (
-    HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST
+    HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST, INQUIRY
 ))  # fmt: skip
 CLIENT_READS: Final[Reads] = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
 OPERATOR_READS: Final[Reads] = ((ANSWER, True), (PIECE, True))

@@ -177,9 +177,11 @@ class Capture(Part):
 
 
 class AccessSpec(Part):
-    """Who may control the run, and how clients prove who they are: where the run has certificates."""
+    """Who may control the run, who may look at it, and how clients prove who they are: where the run has certificates.
+    """
 
     operators: list[OperatorName] = Field(default=["admin"], max_length=limits.OPERATORS_MAX)
+    viewers: list[OperatorName] = Field(default=[], max_length=limits.OPERATORS_MAX)
     radio: Literal["certificate", "password"] = "certificate"
 
 

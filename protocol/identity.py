@@ -1,5 +1,5 @@
 """Identities: what a certificate says that its holder is. `supervisor`, `vhub`, `node.NAME`, `client.NAME` (players
-too), `operator.NAME` (a person or a script that controls the run).
+too), `operator.NAME` (a person or a script that controls the run), `viewer.NAME` (one that only looks at it).
 
 An identity is the common name of a certificate and the stem of its files. Neighbours: `certificates` checks whether
 somebody is who he says, `access` what each may do.
@@ -14,9 +14,9 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue
 from foosim.protocol.names import is_name
 
-ROLES: Final = ("node", "client", "operator")
+ROLES: Final = ("node", "client", "operator", "viewer")
 """Roles of which there are several, told apart by name."""
-FORMS: Final = "supervisor, vhub, node.NAME, client.NAME or operator.NAME"
+FORMS: Final = "supervisor, vhub, node.NAME, client.NAME, operator.NAME or viewer.NAME"
 
 
 def node(name: str) -> str:
@@ -34,6 +34,11 @@ def operator(name: str) -> str:
     return f"operator.{name}"
 
 
+def viewer(name: str) -> str:
+    """Return the identity of a viewer."""
+    return f"viewer.{name}"
+
+
 def parse_identity(text: str) -> tuple[str, str]:
     """Return role and name, the name of supervisor and vHub being their role; raises BadValue."""
     if text in (SUPERVISOR, VHUB):
@@ -45,11 +50,12 @@ def parse_identity(text: str) -> tuple[str, str]:
 
 
 def identities_of(deployment: Deployment) -> list[str]:
-    """Return everybody who takes part in a run, or controls it: the servers first, the others by role and name."""
+    """Return everybody who takes part in a run, controls it or looks at it: servers first, others by role and name."""
     return [
         SUPERVISOR,
         VHUB,
         *map(node, sorted(deployment.nodes)),
         *map(client, sorted([*deployment.players, *deployment.clients])),
         *map(operator, sorted(deployment.access.operators)),
+        *map(viewer, sorted(deployment.access.viewers)),
     ]

@@ -15,7 +15,7 @@ NODES_MAX: Final = 256
 CLIENTS_MAX: Final = 1024
 OPERATORS_MAX: Final = 64
 OPERATOR_LENGTH_MAX: Final = 24
-"""Of an operator's name: each of his sessions adds a dot and seven characters."""
+"""Of an operator's or viewer's name: each of his sessions adds a dot and seven characters."""
 
 COUNTER_MAX: Final = 2**63 - 1
 """Ticks, epochs, nanoseconds and sequence numbers: what every MessagePack reader holds in a signed 64-bit integer."""

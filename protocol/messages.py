@@ -349,6 +349,10 @@ class Request(Message, frozen=True):
     arguments: Annotated[bytes, Meta(max_length=limits.TEXT_LENGTH_MAX)]
 
 
+class Inquiry(Request, frozen=True):
+    """A request that changes nothing."""
+
+
 class Answer(Message, frozen=True):
     """The supervisor's answer: the tick at which the request takes effect and JSON `result`, or why not."""
 

@@ -45,7 +45,7 @@ class Finding:
 def check_references(data: object) -> Iterator[Finding]:
     """All problems between the parts of a deployment's plain data, found as they are asked for."""
     view = View(data)
-    between = (_names, _hosts, _robots, _nodes, _players, _hears, _on, _capture, _deadlines)
+    between = (_names, _people, _hosts, _robots, _nodes, _players, _hears, _on, _capture, _deadlines)
     for check in (_world, *between, _lines, _shapes, _hall, _scenery):
         yield from check(view)
 
@@ -148,6 +148,15 @@ def _names(view: View) -> Iterator[Finding]:
             for scope in scopes:
                 scope.setdefault(name, section)
     yield from _processes(view, processes)
+
+
+def _people(view: View) -> Iterator[Finding]:
+    """An operator and a viewer of one name would hear each other's answers."""
+    operators = view.get("access", "operators")
+    known = operators if isinstance(operators, list) else ["admin"]
+    for index, name in view.texts("access", "viewers"):
+        if name in known:
+            yield Finding(("access", "viewers", index), "a viewer who is an operator, too", name)
 
 
 def _processes(view: View, taken: Mapping[str, str]) -> Iterator[Finding]:

@@ -1,7 +1,8 @@
 """The command `foosim-replay`: what a capture holds, whether it repeats, and all else that is done with one.
 
 Here are `info`, `verify` and `recover`, shells over the reader, `verify` and the recovery. Neighbours:
-`capture_commands` (export, cut, diff), `play_command` (play, control), `whatif_command`, `report_command`.
+`capture_commands` (export, cut, diff), `play_command` (play, control), `whatif_command`, `report_command`,
+`view_command`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue, Failed
 from foosim.protocol.journal import JournalError
-from foosim.rehearsal import capture_commands, play_command, report_command, whatif_command
+from foosim.rehearsal import capture_commands, play_command, report_command, view_command, whatif_command
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture
 from foosim.vhub.capture_damage import Damage, damage_of
@@ -208,7 +209,7 @@ WITH_LOSS: Final = 3
 _COMMANDS: Final = (
     *(play_command.play, play_command.control),
     *(capture_commands.export, capture_commands.cut, capture_commands.diff),
-    *(whatif_command.whatif, report_command.report),
+    *(whatif_command.whatif, report_command.report, view_command.view),
 )
 for command in _COMMANDS:
     app.command()(command)

@@ -1,7 +1,7 @@
 """What a report says of a captured run's network: counts, delays and losses over time, causes, ages, queues, places.
 
 Gathered in one pass over the packets, with bins and samples of bounded size, whatever the length of the run. Times are
-simulated; a packet is counted when it was sent. Neighbours: `report_tallies` counts, `report_settings` says what was
+simulated; a packet is counted when it was sent. Neighbours: `report_tallies` counts, `settings_text` says what was
 configured, `report_map` what is seen from above; `report_page` writes the page.
 """
 
@@ -14,20 +14,13 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from foosim.console.asked import edit_text, moves
 from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.network import event_of
 from foosim.protocol.radios import Radio
 from foosim.protocol.units import format_ns
 from foosim.rehearsal.age_tallies import AgeAtUse, AgeTallies
-from foosim.rehearsal.report_asked import edit_text, moves
 from foosim.rehearsal.report_map import Map, MapMaker
-from foosim.rehearsal.report_settings import (
-    event_text,
-    impairments_text,
-    radio_text,
-    rule_ends,
-    sends_once,
-)
 from foosim.rehearsal.report_tallies import BinTally, LinkTally, RuleTally, SenderTally
 from foosim.vhub.capture_reader import (
     DECODERS,
@@ -42,6 +35,13 @@ from foosim.vhub.events import Timeline
 from foosim.vhub.lint import delay_of, residual_of
 from foosim.vhub.profiles import Profiles
 from foosim.vhub.rows import AGES, PACKETS, TICK, CaptureError, PacketRow
+from foosim.vhub.settings_text import (
+    event_text,
+    impairments_text,
+    radio_text,
+    rule_ends,
+    sends_once,
+)
 
 BINS: Final = 60
 """At most so many spans of time."""

@@ -14,11 +14,11 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self, TypeVar
+from typing import Any, Final, Literal, Self, TypeVar
 
 from foosim.protocol import channels
 from foosim.protocol.asset_messages import Fetch
-from foosim.protocol.certificates import Credentials, operator_credentials
+from foosim.protocol.certificates import Credentials, operator_credentials, viewer_credentials
 from foosim.protocol.channels import Channel, Plane
 from foosim.protocol.codec import decode, decode_json, encode, encode_json
 from foosim.protocol.command import PKI_VARIABLE
@@ -28,7 +28,7 @@ from foosim.protocol.fetching import Fetching
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Wire
 from foosim.protocol.message_types import Vector
-from foosim.protocol.messages import Answer, Request
+from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.protocol.units import parse_pace
@@ -39,7 +39,14 @@ ANSWER_S: Final = 30.0
 AGAIN_S: Final = 0.1
 CONNECT_S: Final = 5.0
 WAITING_MAX: Final = 256
+Role = Literal["operator", "viewer"]
 Taken = TypeVar("Taken")
+Take = Callable[[str, bytes], Taken | None]
+_ASKED_BY: Final[dict[str, tuple[type[Request], Channel]]] = {
+    "operator": (Request, channels.REQUEST),
+    "viewer": (Inquiry, channels.INQUIRY),
+}
+_MAY: Final = {"operator": "an operator", "viewer": "a viewer or an operator"}
 
 
 class RequestRefused(Refused):
@@ -54,14 +61,20 @@ class Control:
     """A connection to one running supervisor. Use it in `with`."""
 
     def __init__(
-        self, address: str, credentials: Credentials | None = None, give_up: Callable[[], bool] = lambda: False
+        self,
+        address: str,
+        credentials: Credentials | None = None,
+        give_up: Callable[[], bool] = lambda: False,
+        role: Role = "operator",
     ) -> None:
         """Connect to the simulation plane's address; raises ConnectError when nobody is there, or at `give_up`.
 
-        `credentials` are an operator's, where the run has certificates.
+        `credentials` are an operator's, where the run has certificates. A `viewer` (whose credentials may also be a
+        viewer's) can ask for what changes nothing: status, describe, watch.
         """
-        # Under its certificate an operator may speak by any name that begins with his own and a dot.
-        stem = f"operator-{os.getpid()}-" if credentials is None else f"{credentials.name}."
+        # Under its certificate a person may speak by any name that begins with his own and a dot.
+        stem = f"{role}-{os.getpid()}-" if credentials is None else f"{credentials.name}."
+        self._role = role
         self._name = f"{stem}{os.urandom(4).hex()[:7]}"
         self._credentials = credentials
         self._inbox = Inbox(WAITING_MAX)
@@ -89,13 +102,9 @@ class Control:
         """
         self._requests += 1
         identity = f"{self._name[-7:]}-{self._requests}"
-        payload = encode(Request(self._name, identity, verb, encode_json(arguments)))
-
-        def take(key: str, content: bytes) -> Answer | None:
-            answer = decode(Answer, content, channels.ANSWER.bytes_max) if key == channels.ANSWER.key else None
-            return answer if answer is not None and answer.id == identity else None
-
-        answer = self._say(channels.REQUEST, payload, take, timeout_s, give_up)
+        kind, channel = _ASKED_BY[self._role]
+        payload = encode(kind(self._name, identity, verb, encode_json(arguments)))
+        answer = self._say(channel, payload, answer_to(identity), timeout_s, give_up)
         if answer is None:
             raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s{self._hint()}")
         if not answer.accepted:
@@ -133,7 +142,8 @@ class Control:
             payload = encode(Fetch(self._name, self._name, bytes.fromhex(digest), offset))
 
             def take(key: str, content: bytes) -> bool | None:
-                return key == channels.PIECE.key and fetching.take(channels.read(channels.PIECE, self._name, content))
+                is_piece = key == channels.PIECE.key
+                return (is_piece and fetching.take(channels.read(channels.PIECE, self._name, content))) or None
 
             if not self._say(channels.FETCH, payload, take, timeout_s, give_up):
                 raise NoAnswer(f"no piece of a file of the deployment within {timeout_s:g} s{self._hint()}")
@@ -143,35 +153,54 @@ class Control:
         self,
         channel: Channel,
         payload: bytes,
-        take: Callable[[str, bytes], Taken | None],
+        take: Take[Taken],
         timeout_s: float,
         give_up: Callable[[], bool],
     ) -> Taken | None:
         """Say something until `take` makes something of what comes (a channel's key, the payload); None at the end."""
         deadline_s = time.monotonic() + timeout_s
-        while (now_s := time.monotonic()) < deadline_s and not give_up():
+        while (left_s := deadline_s - time.monotonic()) > 0 and not give_up():
             self._wire.put(channel, self._name, payload)
-            again_s = min(deadline_s, now_s + AGAIN_S)
-            while (left_s := again_s - time.monotonic()) > 0:
-                for key, _, content in self._inbox.take(left_s):
-                    with contextlib.suppress(Malformed):
-                        taken = take(key, content)
-                        if taken:
-                            return taken
+            taken = self._hear(take, min(left_s, AGAIN_S))
+            if taken is not None:
+                return taken
+        return None
+
+    def _hear(self, take: Take[Taken], timeout_s: float) -> Taken | None:
+        """Return what `take` makes of something that comes in time."""
+        deadline_s = time.monotonic() + timeout_s
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            for key, _, content in self._inbox.take(left_s):
+                with contextlib.suppress(Malformed):
+                    taken = take(key, content)
+                    if taken is not None:
+                        return taken
         return None
 
     def _hint(self) -> str:
-        return "" if self._credentials is None else f"; is {self._credentials.identity} an operator of this run?"
+        return "" if self._credentials is None else f"; is {self._credentials.identity} {_MAY[self._role]} of this run?"
 
 
-def connect(run: str | None = None, give_up: Callable[[], bool] = lambda: False) -> Control:
-    """Connect to the newest live run, or to the one named. Raises NoRun, and what `Control` and
-    `operator_credentials` raise.
+def answer_to(identity: str) -> Take[Answer]:
+    """Return what takes the answer to a request, of all that comes."""
+
+    def take(key: str, content: bytes) -> Answer | None:
+        answer = decode(Answer, content, channels.ANSWER.bytes_max) if key == channels.ANSWER.key else None
+        return answer if answer is not None and answer.id == identity else None
+
+    return take
+
+
+def connect(run: str | None = None, role: Role = "operator", give_up: Callable[[], bool] = lambda: False) -> Control:
+    """Connect to the newest live run, or to the one named. Raises NoRun, and what `Control`, `operator_credentials` and
+    `viewer_credentials` raise.
     """
     folder = find_run(run)
     info = folder.info()
     assert info is not None, "a run that was found has a run file"
-    return Control(info.simulation, operator_credentials(_pki_of(info)), give_up)
+    pki = _pki_of(info)
+    credentials = operator_credentials(pki) if role == "operator" else viewer_credentials(pki)
+    return Control(info.simulation, credentials, give_up, role)
 
 
 def _pki_of(info: RunInfo) -> Path | None:

@@ -31,6 +31,7 @@ from foosim.protocol.messages import (
     Farewell,
     Heartbeat,
     Hello,
+    Inquiry,
     Order,
     Part,
     Prepare,
@@ -129,6 +130,7 @@ class SupervisorCore:
             Deliveries: self._on_deliveries,
             Want: self._on_want,
             Request: self.requests.take,
+            Inquiry: self.requests.inquire,
             Farewell: self.handshake.farewell,
         }
         text = settings.deployment_name, settings.deployment_text

@@ -22,7 +22,7 @@ from foosim.protocol.codec import decode_json, encode, encode_json
 from foosim.protocol.errors import Malformed, Refused, show
 from foosim.protocol.frame import layout_after
 from foosim.protocol.layout import BALL, Layout
-from foosim.protocol.messages import Add, Answer, Disrupt, Edit, Push, Remove, Request
+from foosim.protocol.messages import Add, Answer, Disrupt, Edit, Inquiry, Push, Remove, Request
 from foosim.protocol.names import NAME_RULE, is_name, nearest_name
 from foosim.protocol.network import EVENTS_MAX, event_of
 from foosim.protocol.network_request import event_text, told
@@ -96,6 +96,16 @@ class Requests:
             answer = self._decide(request, now_ns)
         if answer is not None:
             self._say(answer)
+
+    def inquire(self, inquiry: Inquiry, payload: bytes, now_ns: int) -> None:
+        """Answer who may only look."""
+        if inquiry.verb in READS:
+            answer = self._decide(inquiry, now_ns)
+            assert answer is not None, inquiry.verb
+        else:
+            why = f"{show(inquiry.verb)} is for operators: who only looks may ask for {', '.join(READS)}"
+            answer = Answer(inquiry.sender, inquiry.id, False, self._core.frame.tick, why, b"{}")
+        self._say(answer)
 
     def _decide(self, request: Request, now_ns: int) -> Answer | None:
         try:

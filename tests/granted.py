@@ -27,7 +27,10 @@ def may_put(identity: str, key: str) -> bool:
             of_vhub = ("hello", "fetch", "ready", "standing", "want", "heartbeat", "farewell")
             return key in {f"{S}/deliveries", *(f"{S}/{what}/vhub" for what in of_vhub)}
         case "operator":
-            return key.rpartition("/")[0] in {f"{P}/request", f"{S}/request", f"{S}/fetch"} and is_end_of(key, name)
+            asks = {f"{P}/request", f"{S}/request", f"{S}/inquiry", f"{S}/fetch"}
+            return key.rpartition("/")[0] in asks and is_end_of(key, name)
+        case "viewer":
+            return key.rpartition("/")[0] in {f"{S}/inquiry", f"{S}/fetch"} and is_end_of(key, name)
         case "client":
             return key in {f"{R}/hello/{name}", f"{R}/up/{name}"}
     return False
@@ -49,6 +52,9 @@ def may_hear(identity: str, key: str) -> bool:
             to_it = {f"{S}/answer", f"{S}/piece", f"{P}/answer"}
             addressed = key.rpartition("/")[0] in to_it and is_end_of(key, name)
             return addressed or key == f"{S}/view" or key.startswith(f"{P}/played/")
+        case "viewer":
+            addressed = key.rpartition("/")[0] in {f"{S}/answer", f"{S}/piece"} and is_end_of(key, name)
+            return addressed or key == f"{S}/view"
         case "client":
             return key in {f"{R}/{what}/{name}" for what in ("welcome", "refusal", "down")}
     return False

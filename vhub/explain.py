@@ -7,15 +7,17 @@ they have to agree with the row's. Neighbours: `explain_stages` (tells of each s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from foosim.protocol.errors import BadValue
+from foosim.protocol.frame import Frame
 from foosim.protocol.names import nearest_name
-from foosim.vhub.capture_reader import CaptureData
-from foosim.vhub.explain_stages import STAGE_NAMES, Stages
+from foosim.vhub.capture_reader import CaptureData, TickMark
+from foosim.vhub.explain_stages import STAGE_NAMES, Evidence, Stages
 from foosim.vhub.figures import EXACT, time_text
-from foosim.vhub.rows import PACKETS, PacketRow
+from foosim.vhub.rows import CLIENTS, PACKETS, TICK, ClientRow, PacketRow, TickRow
 from foosim.vhub.state import OUTBOX_SHIFT
 
 NAMES_SHOWN: Final = 8
@@ -97,7 +99,45 @@ def find_packet(capture: CaptureData, which: PacketName) -> PacketRow:
 
 def explain_packet(capture: CaptureData, which: PacketName) -> Explained:
     """Return what became of a captured packet. Raises BadValue for one that is not there, CaptureError."""
-    return _told(Stages(capture, find_packet(capture, which)))
+    return explain_row(_Captured(capture), find_packet(capture, which))
+
+
+def explain_row(evidence: Evidence, row: PacketRow) -> Explained:
+    """Return what became of a packet, by its row and by what else is known of its run. Raises CaptureError."""
+    return _told(Stages(evidence, row))
+
+
+class _Captured:
+    """What a capture has beside the row of a packet."""
+
+    def __init__(self, capture: CaptureData) -> None:
+        self.deployment = capture.deployment
+        self.versions = capture.about.versions
+        self._capture = capture
+
+    def asked(self, until: int) -> Iterator[tuple[int, str]]:
+        for row in self._capture.rows(TICK):
+            assert isinstance(row, TickRow)
+            if row.tick <= until:
+                yield from network_events(row)
+
+    def frame(self, tick: int) -> Frame | None:
+        found = None
+        for frame in self._capture.each_frame():
+            if frame.tick > tick:
+                break
+            found = frame
+        return found
+
+    def clients(self) -> Iterator[ClientRow]:
+        for row in self._capture.rows(CLIENTS):
+            assert isinstance(row, ClientRow)
+            yield row
+
+
+def network_events(row: TickMark | TickRow) -> list[tuple[int, str]]:
+    """Return what was asked of the network in a tick: the tick, and each event as JSON."""
+    return [(row.tick, edit.event) for edit in row.edits if edit.kind == "network"]
 
 
 def _told(stages: Stages) -> Explained:
@@ -121,7 +161,7 @@ def _told(stages: Stages) -> Explained:
 
 def _head(stages: Stages) -> str:
     row = stages.row
-    is_robot = row.source in stages.capture.deployment.robots
+    is_robot = row.source in stages.evidence.deployment.robots
     number = f"tick {row.sequence >> OUTBOX_SHIFT}, place {row.sequence & 0xFFFF}" if is_robot else "its own count"
     via = f" via {row.radio}" if row.radio and row.radio != row.rule else ""
     copy = f", copy {row.copy}" if row.copy else ""

@@ -7,22 +7,21 @@ Neighbours: `explain` (makes the whole story), `rows.PacketRow`, `stages` (whose
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import groupby
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import UNIT, Slot, chance_threshold, draw_words
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Disrupt
 from foosim.vhub.capture_columns import word_of
-from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.events import FOREVER_NS
 from foosim.vhub.explain_radio import attempts_of, lora_text, ratio_db
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.figures import EXACT, rate_text, time_text
 from foosim.vhub.link_models import VERSION_KEY
 from foosim.vhub.packet import size_of_payload
-from foosim.vhub.rows import CLIENTS, TICK, ClientRow, PacketRow, TickRow, edit_of
+from foosim.vhub.rows import ClientRow, PacketRow
 from foosim.vhub.setup import BLOCK_SHIFT, LinkSetup
 from foosim.vhub.stages import STAGES
 from foosim.vhub.stages.admit import NODE_DOWN
@@ -70,22 +69,36 @@ def _share(word: int) -> str:
     return f"{word / UNIT:.6g}"
 
 
+class Evidence(Protocol):
+    """What is known of the run of a row beside it: a capture, or what a running system keeps."""
+
+    @property
+    def deployment(self) -> Deployment: ...
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Of libraries and link models, by name."""
+
+    def asked(self, until: int) -> Iterable[tuple[int, str]]:
+        """Return what was asked of the network up to a tick: ticks and events as JSON, in their order."""
+
+    def frame(self, tick: int) -> Frame | None:
+        """Return the newest frame at or before a tick, None where none is known."""
+
+    def clients(self) -> Iterable[ClientRow]:
+        """Return who joined and left, in their order."""
+
+
 class Stages:
     """One row, and the link that it went over as it was then."""
 
-    def __init__(self, capture: CaptureData, row: PacketRow) -> None:
-        self.capture, self.row = capture, row
-        self.tick_ns = capture.deployment.tick_ns
-        self.fabric = Fabric(capture.deployment)
+    def __init__(self, evidence: Evidence, row: PacketRow) -> None:
+        self.evidence, self.row = evidence, row
+        self.tick_ns = evidence.deployment.tick_ns
+        self.fabric = Fabric(evidence.deployment)
         self.tick = row.sent_ns // self.tick_ns
         last = max(self.tick, row.arrival_tick)
-        asked = [
-            (tick_row.tick, edit.event)
-            for tick_row in capture.rows(TICK)
-            if isinstance(tick_row, TickRow) and tick_row.tick <= last
-            for edit in map(edit_of, tick_row.edits)
-            if isinstance(edit, Disrupt)
-        ]
+        asked = [*evidence.asked(last)]
         self._take(asked, 0, self.tick)
         self.link = self.fabric.link(row.source, row.destination, row.channel)
         self.setup: LinkSetup = self.link.setup_at(row.sent_ns)
@@ -273,7 +286,7 @@ class Stages:
         Bodies move: the newest captured frame before the packet tells, if what it says adds up to what the row has.
         """
         row, budget = self.row, self.setup.budget
-        frame = self._frame() if row.walls else None
+        frame = self.evidence.frame(self.tick) if row.walls else None
         if frame is None or budget is None:
             return dict.fromkeys(row.walls)
         self.fabric.turn_to(frame)
@@ -286,14 +299,6 @@ class Stages:
         if sorted(name for name, _ in known) != sorted(row.walls) or abs(total - row.walls_cdb) > 1:
             return dict.fromkeys(row.walls)
         return {name: round(loss_db, 2) for name, loss_db in known}
-
-    def _frame(self) -> Frame | None:
-        found = None
-        for frame in self.capture.each_frame():
-            if frame.tick > self.tick:
-                break
-            found = frame
-        return found
 
     def _residual(self) -> Told:
         row, stage = self.row, self.stages["residual"]
@@ -310,7 +315,7 @@ class Stages:
         model, extra_ns = self.settings.model, self.row.model_ns
         assert model is not None, "a link with a model of one's own"
         facts = {"model": model.name, "parameters": dict(model.parameters), "extra_ns": extra_ns}
-        facts["package"] = self.capture.about.versions.get(VERSION_KEY + model.name, "")
+        facts["package"] = self.evidence.versions.get(VERSION_KEY + model.name, "")
         failed = ", which failed" if self.row.cause == MODEL_FAILED else ""
         return f"{model.name} of {facts['package']}{failed}, {_time(extra_ns)} more delay", facts
 
@@ -395,9 +400,9 @@ class Stages:
     def _receiver_state(self) -> str:
         """Return why a receiver did not take anything: a client that has left, or never came, or a body."""
         to, here = self.row.destination, False
-        if to not in self.capture.deployment.robots:
-            for client in self.capture.rows(CLIENTS):
-                if isinstance(client, ClientRow) and client.client == to and client.tick <= self.row.arrival_tick:
+        if to not in self.evidence.deployment.robots:
+            for client in self.evidence.clients():
+                if client.client == to and client.tick <= self.row.arrival_tick:
                     here = client.event == "joins"
             if not here:
                 return "is not here"

@@ -17,7 +17,6 @@ from foosim.protocol.errors import DeploymentError
 from foosim.protocol.messages import Sent
 from foosim.protocol.scene import Vector
 from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.report_settings import impairments_text, radio_text
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.whatif import what_if
 from foosim.supervisor.net_command import linted
@@ -28,6 +27,7 @@ from foosim.vhub.link_models import ModelError, Passage, check_link_models, diff
 from foosim.vhub.profiles import Profiles
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import PACKETS, PacketRow
+from foosim.vhub.settings_text import impairments_text, radio_text
 from foosim.vhub.stages.own import MODEL, MODEL_FAILED
 from foosim.vhub.state import HubState
 from foosim.vhub.to_rows import packet_row

@@ -15,7 +15,7 @@ from foosim.protocol.access import access_control, access_to
 from foosim.protocol.channels import ALIVE, CHANNELS, Plane
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
-from foosim.protocol.identity import identities_of
+from foosim.protocol.identity import ROLES, identities_of
 from foosim.protocol.session_settings import holds
 from tests.granted import may_be_present, may_hear, may_put, may_watch
 
@@ -24,14 +24,20 @@ TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NAMES = st.sampled_from(["a", "a-b", "a_b", "b", "ab", "a-b-c", "request", "all", "node", "client", "order"])
 
 
-def deployment(nodes: list[str], clients: list[str], operators: list[str], radio: str = "certificate") -> Deployment:
+def deployment(
+    nodes: list[str],
+    clients: list[str],
+    operators: list[str],
+    radio: str = "certificate",
+    viewers: list[str] | None = None,
+) -> Deployment:
     """The table with other names."""
     content = yaml.safe_load(read_deployment_text(TABLE))
     robots = [robot for node in content["nodes"].values() for robot in node["robots"]]
     content["nodes"] = {name: {"robots": robots if name == nodes[0] else []} for name in nodes}
     content["players"] = {}
     content["clients"] = {name: {} for name in clients}
-    content["access"] = {"operators": operators, "radio": radio}
+    content["access"] = {"operators": operators, "radio": radio, "viewers": viewers or []}
     return load_deployment(yaml.safe_dump(content), "test")
 
 
@@ -65,16 +71,22 @@ def keys(plane: Plane, names: list[str]) -> list[tuple[str, zenoh.KeyExpr]]:
     st.lists(NAMES, min_size=1, max_size=3, unique=True),
     st.lists(NAMES, max_size=3, unique=True),
     st.lists(NAMES, max_size=2, unique=True),
+    st.lists(NAMES, max_size=2, unique=True),
 )
-def test_rules_say_what_the_predicate_says(nodes: list[str], clients: list[str], operators: list[str]) -> None:
+def test_rules_say_what_the_predicate_says(
+    nodes: list[str], clients: list[str], operators: list[str], viewers: list[str]
+) -> None:
     clients = [f"c{name}" for name in clients]
-    made = deployment(nodes, clients, operators)
+    viewers = [name for name in viewers if name not in operators]
+    made = deployment(nodes, clients, operators, viewers=viewers)
     fixed = ["vhub", "supervisor", "replay", "nobody"]
-    names = [*nodes, *clients, *fixed, *(f"{name}.x1" for name in [*operators, *nodes])]
+    names = [*nodes, *clients, *fixed, *(f"{name}.x1" for name in [*operators, *viewers, *nodes])]
     for plane in Plane:
         control = access_control(access_to(plane, made))
-        here = {Plane.RADIO: "client.", Plane.REPLAY: "operator."}.get(plane, ("vhub", "node.", "operator."))
-        for identity in [*identities_of(made), "node.nobody", "client.nobody", "operator.nobody"]:
+        here = {Plane.RADIO: "client.", Plane.REPLAY: "operator."}.get(
+            plane, ("vhub", "node.", "operator.", "viewer.")
+        )
+        for identity in [*identities_of(made), *(f"{role}.nobody" for role in ROLES)]:
             is_known = identity.startswith(here) and not identity.endswith("nobody")
             passes = Allowed(control, identity)
             for name, key in keys(plane, names):
@@ -90,7 +102,7 @@ def test_rules_say_what_the_predicate_says(nodes: list[str], clients: list[str],
 
 
 def test_nobody_subscribes_to_more_than_it_hears() -> None:
-    made = deployment(["red", "blue"], ["hand"], ["admin"])
+    made = deployment(["red", "blue"], ["hand"], ["admin"], viewers=["desk"])
     for plane in Plane:
         control = access_control(access_to(plane, made))
         for identity in identities_of(made):
@@ -100,11 +112,12 @@ def test_nobody_subscribes_to_more_than_it_hears() -> None:
 
 
 def test_writers_are_told_that_readers_listen_as_those_declare_it() -> None:
-    made = deployment(["red", "blue"], ["hand"], ["admin"])
+    made = deployment(["red", "blue"], ["hand"], ["admin"], viewers=["desk"])
     readers = {
         "node.red": ["simulation/hello/*", "simulation/part/**", "simulation/samples/**", "simulation/want/*"],
         "vhub": ["simulation/deliveries/**", "simulation/heartbeat/*", "simulation/want/*"],
-        "operator.admin": ["simulation/request/*"],
+        "operator.admin": ["simulation/request/*", "simulation/inquiry/*", "simulation/fetch/*"],
+        "viewer.desk": ["simulation/inquiry/*", "simulation/fetch/*"],
         "client.hand": ["radio/hello/*", "radio/up/*"],
     }
     for identity, declared in readers.items():

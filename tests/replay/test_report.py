@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as replace_row
 
+from foosim.console.asked import moves
 from foosim.protocol.scene import Box, Cylinder, Shape, turn
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
-from foosim.rehearsal.report_asked import moves
 from foosim.rehearsal.report_map import MapMaker, outline
 from foosim.rehearsal.report_page import _runs, page
 from foosim.rehearsal.report_svg import WHOLE, round_up

@@ -22,6 +22,7 @@ from foosim.protocol.certificates import (
     load_credentials,
     operator_credentials,
     passwords_file,
+    viewer_credentials,
 )
 from foosim.protocol.errors import Refused
 from foosim.supervisor import pki
@@ -208,6 +209,22 @@ def test_an_operator_is_the_only_one_or_named(folder: Path, monkeypatch: pytest.
     monkeypatch.setenv("FOOSIM_OPERATOR", "bob")
     found = operator_credentials(folder)
     assert found is not None and found.identity == "operator.bob"
+
+
+def test_a_viewer_is_the_only_one_or_named_or_the_operator(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for variable in ("FOOSIM_OPERATOR", "FOOSIM_VIEWER"):
+        monkeypatch.delenv(variable, raising=False)
+    assert viewer_credentials(None) is None
+    for issued, expected in (("operator.ann", "operator.ann"), ("viewer.desk", "viewer.desk")):
+        pki.issue(folder, [issued])
+        found = viewer_credentials(folder)
+        assert found is not None and found.identity == expected
+    pki.issue(folder, ["viewer.wall"])
+    with pytest.raises(CertificateError, match=r"several viewers \(viewer\.desk, viewer\.wall\): FOOSIM_VIEWER=NAME"):
+        viewer_credentials(folder)
+    monkeypatch.setenv("FOOSIM_VIEWER", "wall")
+    found = viewer_credentials(folder)
+    assert found is not None and found.identity == "viewer.wall"
 
 
 def test_passwords_are_kept_beside_certificates(folder: Path) -> None:

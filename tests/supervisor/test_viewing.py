@@ -13,7 +13,7 @@ from foosim.protocol.codec import decode, decode_json, encode, encode_json
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import frame_from_bytes
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Answer, Commit, Request
+from foosim.protocol.messages import Answer, Commit, Inquiry, Request
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import OPERATOR, Settings, System
 from foosim.supervisor.core import SupervisorCore
@@ -125,6 +125,23 @@ def test_looking_is_not_journalled_nor_kept_and_not_even_a_refusal_is() -> None:
 def test_a_rate_that_is_none_is_refused(hz: object) -> None:
     answer = ask(begun(), 0, "watch", hz=hz)
     assert not answer.accepted and answer.text.startswith("hz: a number from 0 to 100 is needed, not ")
+
+
+def test_who_only_looks_may_ask_for_what_changes_nothing_and_no_more() -> None:
+    core = begun()
+    verbs = {}
+    for verb in ("status", "describe", "watch", "pause", "push", "down", "fly"):
+        core.actions.clear()
+        inquiry = encode(Inquiry("desk.1", f"id-{verb}", verb, encode_json({"hz": 5})))
+        core.receive(channels.INQUIRY, "desk.1", inquiry, 0)
+        (said,) = core.actions
+        assert isinstance(said, Publish), "nothing is journalled"
+        verbs[verb] = decode(Answer, said.payload)
+    assert [verb for verb, answer in verbs.items() if answer.accepted] == ["status", "describe", "watch"]
+    assert verbs["pause"].text == "'pause' is for operators: who only looks may ask for status, describe, watch"
+    core.actions.clear()
+    core.receive(channels.INQUIRY, "desk.1", encode(Request("desk.1", "id", "down", b"{}")), 0)
+    assert core.statistics().refused == 1 and core.end is None, "a request on the key of an inquiry is none"
 
 
 def test_so_many_may_look_and_no_more() -> None:

@@ -33,21 +33,21 @@ from tests.wire.conftest import TABLE, wait_for
 
 LONG_S: Final = 900.0
 INSIDERS: Final = {
-    Plane.SIMULATION: ("node.red", "node.blue", "vhub", "operator.admin"),
+    Plane.SIMULATION: ("node.red", "node.blue", "vhub", "operator.admin", "viewer.desk"),
     Plane.RADIO: ("client.hand", "client.other"),
     Plane.REPLAY: ("operator.admin",),
 }
 OUTSIDERS: Final = {
-    Plane.SIMULATION: ("client.hand", "node.nobody", "operator.nobody"),
+    Plane.SIMULATION: ("client.hand", "node.nobody", "operator.nobody", "viewer.nobody"),
     Plane.RADIO: ("node.red", "operator.admin", "client.nobody"),
-    Plane.REPLAY: ("node.red", "client.hand", "operator.nobody"),
+    Plane.REPLAY: ("node.red", "client.hand", "operator.nobody", "viewer.desk"),
 }
 """They have certificates of the same root."""
 ROUTER: Final = {Plane.SIMULATION: "supervisor", Plane.RADIO: "vhub", Plane.REPLAY: "vhub"}
 PRESENT: Final = {Plane.REPLAY: "replay"}
 """The name under which a router is present, where it is not its identity's: a replay shows the vHub's certificate."""
 NAMES: Final = {
-    Plane.SIMULATION: ("red", "blue", "nobody", "vhub", "supervisor", "admin.x1", "nobody.x1"),
+    Plane.SIMULATION: ("red", "blue", "nobody", "vhub", "supervisor", "admin.x1", "desk.x1", "nobody.x1"),
     Plane.RADIO: ("hand", "other", "nobody", "vhub", "red"),
     Plane.REPLAY: ("packets", "poses", "rows", "clock", "replay", "red", "admin.x1", "nobody.x1"),
 }
@@ -67,7 +67,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def deployment() -> Deployment:
     content = yaml.safe_load(read_deployment_text(TABLE))
-    content |= {"players": {}, "clients": {"hand": {}, "other": {}}}
+    content |= {"players": {}, "clients": {"hand": {}, "other": {}}, "access": {"viewers": ["desk"]}}
     return load_deployment(yaml.safe_dump(content), "test")
 
 

@@ -9,7 +9,7 @@ from foosim.protocol import channels
 from foosim.protocol.codec import encode, encode_json
 from foosim.protocol.messages import Request
 from foosim.rehearsal.rehearse import rehearse
-from foosim.supervisor.control import Control
+from foosim.supervisor.control import Control, answer_to
 from foosim.supervisor.run_folder import open_run
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import recover_capture
@@ -45,7 +45,7 @@ def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: Ho
         for answer in (moved, paused):  # the same request, the same answer, by whoever gives it
             again = Request(answer.sender, answer.id, "status", encode_json({}))
             control._wire.put(channels.REQUEST, answer.sender, encode(again))
-            assert control._wait(answer.id, LIMIT_S) == answer
+            assert control._hear(answer_to(answer.id), LIMIT_S) == answer
         control.ask("resume")
         house.ticking(paused.tick + 100)
         control.ask("down")

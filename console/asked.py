@@ -1,6 +1,6 @@
 """What people asked of a run's world, in words: balls and robots that were added, removed, pushed, moved.
 
-Neighbours: `report` lists it among the events.
+Neighbours: `timeline` marks it, `rehearsal.report` lists it among the events.
 """
 
 from __future__ import annotations

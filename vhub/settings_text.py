@@ -1,6 +1,6 @@
 """A network's settings as people read them.
 
-Neighbours: `report` shows them; `vhub.lint` says what they amount to.
+Neighbours: `rehearsal.report` and the console show them; `lint` says what they amount to.
 """
 
 from __future__ import annotations

@@ -1,0 +1,272 @@
+"""Where the rows of a capture stand, so that any of them is read at once: what the time slider seeks with.
+
+The index is made of the heads of chunks and their message indexes: no chunk is unpacked for it, but the last of a file
+that was cut within its indexes. A capture that is still being written is looked at again and again (`refresh`), from
+where the last look ended; its files may become more (`capture.split_time`). Unpacked chunks are kept while there is
+room. Neighbours: `vhub.mcap_file` (the container), `vhub.capture_parts` (which files are one capture), `recording`.
+"""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from bisect import bisect_right
+from collections import OrderedDict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from io import BytesIO
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import zstandard
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+
+from foosim.vhub.capture_parts import files_from
+from foosim.vhub.mcap_file import (
+    CHUNK_BYTES_MAX,
+    CHUNK_FIELDS,
+    INDEX_FIELDS,
+    MAGIC,
+    MESSAGE_FIELDS,
+    RECORD,
+    Message,
+    chunk_records,
+    unpack_chunk,
+)
+from foosim.vhub.rows import CaptureError
+
+CACHE_BYTES: Final = 64 * 1024 * 1024
+"""Of unpacked chunks that are kept; the one that is read last always is."""
+_DAMAGED: Final = (EndOfFile, struct.error, ValueError, zstandard.ZstdError)
+
+
+class Chunk(NamedTuple):
+    """A chunk: in which file, where its record begins and how long that is."""
+
+    part: int
+    offset: int
+    length: int
+
+
+@dataclass(slots=True)
+class Places:
+    """Where the messages of one topic stand, in the order of the files."""
+
+    log_ns: array[int] = field(default_factory=lambda: array("Q"))
+    chunk: array[int] = field(default_factory=lambda: array("I"))
+    """Number of the chunk."""
+    at: array[int] = field(default_factory=lambda: array("I"))
+    """Place of the record in the unpacked chunk."""
+
+    def __len__(self) -> int:
+        return len(self.log_ns)
+
+    def newest(self, time_ns: int) -> int:
+        """Return the number of the last message at or before a time, -1 for none; for topics in order of time."""
+        return bisect_right(self.log_ns, time_ns) - 1
+
+
+@dataclass(slots=True)
+class _Part:
+    """One file, as far as it was looked at."""
+
+    path: Path
+    number: int
+    done: int = 0
+    ended: bool = False
+    topics: dict[int, str] = field(default_factory=dict)
+    """By channel, of those that are wanted."""
+    last: int = -1
+    """Number of its last chunk, -1 before the first."""
+    taken: set[int] = field(default_factory=set)
+    """Channels of that chunk whose messages were taken."""
+
+
+class CaptureIndex:
+    """The index of some topics over a capture's files. It belongs to one thread."""
+
+    def __init__(self, path: Path, topics: Iterable[str]) -> None:
+        """Raises CaptureError for what cannot be read."""
+        self.path: Final = path
+        self._topics = frozenset(topics)
+        self._cache: OrderedDict[int, bytes] = OrderedDict()
+        self.generation = 0
+        """Raised when the index begins anew."""
+        self._begin()
+        self.refresh()
+
+    def _begin(self) -> None:
+        self.generation += 1
+        self.chunks: list[Chunk] = []
+        self.places: dict[str, Places] = {topic: Places() for topic in self._topics}
+        self._parts: list[_Part] = []
+        self._cache.clear()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last file has its end."""
+        return bool(self._parts) and self._parts[-1].ended
+
+    def refresh(self) -> bool:
+        """Look at what was written since; return whether there is more. Raises CaptureError.
+
+        A file that became shorter, or was let go (`capture.last`), is another capture: the index begins anew.
+        """
+        before = len(self.chunks)
+        if not self._parts or self._parts[-1].ended or not self._is_as_it_was():
+            files = files_from(self.path)
+            if [part.path for part in self._parts] != files[: len(self._parts)] or not self._is_as_it_was():
+                self._begin()
+                before = -1
+            for path in files[len(self._parts) :]:
+                if self._parts and not self._parts[-1].ended:
+                    break
+                self._parts.append(_Part(path, len(self._parts)))
+                self._look(self._parts[-1])
+            return len(self.chunks) != before
+        self._look(self._parts[-1])
+        return len(self.chunks) != before
+
+    def _is_as_it_was(self) -> bool:
+        try:
+            return all(part.path.stat().st_size >= part.done for part in self._parts)
+        except OSError:
+            return False
+
+    def read(self, topic: str, number: int) -> Message:
+        """Return a message of a topic by its number. Raises CaptureError for a chunk that is damaged."""
+        places = self.places[topic]
+        at = places.at[number]
+        chunk = self._unpacked(places.chunk[number])
+        try:
+            _, length = RECORD.unpack_from(chunk, at)
+            start = at + RECORD.size
+            _, sequence, log_ns, publish_ns = MESSAGE_FIELDS.unpack_from(chunk, start)
+        except struct.error as error:
+            raise self._damaged(places.chunk[number], f"its index leads behind its end, {error}") from None
+        data = chunk[start + MESSAGE_FIELDS.size : start + length]
+        return Message(topic, log_ns, publish_ns, sequence, data)
+
+    def _unpacked(self, number: int) -> bytes:
+        known = self._cache.get(number)
+        if known is not None:
+            self._cache.move_to_end(number)
+            return known
+        part, offset, length = self.chunks[number]
+        path = self._parts[part].path
+        try:
+            with path.open("rb") as stream:
+                stream.seek(offset + RECORD.size)
+                content = unpack_chunk(stream.read(length - RECORD.size), f"{path}: byte {offset}")
+        except OSError as error:
+            raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+        except _DAMAGED as error:
+            raise self._damaged(number, str(error)) from None
+        self._cache[number] = content
+        kept = sum(map(len, self._cache.values()))
+        while kept > CACHE_BYTES and len(self._cache) > 1:
+            _, dropped = self._cache.popitem(last=False)
+            kept -= len(dropped)
+        return content
+
+    def _damaged(self, number: int, what: str) -> CaptureError:
+        part, offset, _ = self.chunks[number]
+        return CaptureError(f"{self._parts[part].path}: byte {offset}: a damaged chunk, {what}")
+
+    # --- looking -----------------------------------------------------------------------------------------------------
+
+    def _look(self, part: _Part) -> None:
+        try:
+            with part.path.open("rb") as stream:
+                size = part.path.stat().st_size
+                if size < max(part.done, len(MAGIC)):
+                    return
+                with mmap(stream.fileno(), size, access=ACCESS_READ) as whole, memoryview(whole) as content:
+                    self._walk(part, content, size)
+        except (OSError, ValueError) as error:
+            raise CaptureError(f"{part.path}: cannot be read, {error}") from None
+
+    def _walk(self, part: _Part, content: memoryview, size: int) -> None:
+        """Take the whole records behind those that were taken."""
+        if not part.done:
+            if bytes(content[: len(MAGIC)]) != MAGIC:
+                raise CaptureError(f"{part.path}: no MCAP file, it does not start with {MAGIC!r}")
+            part.done = len(MAGIC)
+        while not part.ended and part.done + RECORD.size <= size:
+            opcode, length = RECORD.unpack_from(content, part.done)
+            stop = part.done + RECORD.size + length
+            if stop > size or (length > CHUNK_BYTES_MAX and opcode == Opcode.CHUNK):
+                break
+            try:
+                start = part.done + RECORD.size
+                known = start + CHUNK_FIELDS.size if opcode == Opcode.CHUNK else stop
+                self._take(part, opcode, bytes(content[start:known]), length)
+            except (EndOfFile, struct.error, ValueError) as error:
+                raise CaptureError(f"{part.path}: byte {part.done}: a damaged record, {error}") from None
+            part.done = stop
+        if not part.ended:
+            self._complete(part)
+
+    def _take(self, part: _Part, opcode: int, content: bytes, length: int) -> None:
+        """Take a record of so many bytes; of a chunk `content` is the head alone."""
+        if opcode == Opcode.CHANNEL:
+            self._declare(part, content)
+        elif opcode == Opcode.CHUNK:
+            if not part.taken:
+                self._complete(part)
+            CHUNK_FIELDS.unpack_from(content)
+            self.chunks.append(Chunk(part.number, part.done, RECORD.size + length))
+            # What the first chunk of a further file says again stands in the file before.
+            is_repeat = part.number > 0 and part.last < 0
+            part.last = len(self.chunks) - 1
+            part.taken = set(part.topics) if is_repeat else set()
+        elif opcode == Opcode.MESSAGE_INDEX:
+            channel, size = INDEX_FIELDS.unpack_from(content)
+            if channel in part.topics and channel not in part.taken and part.last >= 0:
+                pairs = array("Q")
+                pairs.frombytes(content[INDEX_FIELDS.size : INDEX_FIELDS.size + size])
+                self._note(part, channel, pairs)
+        elif opcode == Opcode.MESSAGE:
+            raise ValueError("a message outside of a chunk; foosim-replay cut writes a capture with chunks")
+        elif opcode == Opcode.DATA_END:
+            if not part.taken:
+                self._complete(part)
+            part.ended = True
+
+    def _declare(self, part: _Part, content: bytes) -> None:
+        channel = records.Channel.read(ReadDataStream(BytesIO(content)))
+        if channel.topic in self._topics:
+            part.topics[channel.id] = channel.topic
+
+    def _note(self, part: _Part, channel: int, pairs: array[int]) -> None:
+        """Take the messages of a channel in the last chunk, (time, place) each."""
+        places = self.places[part.topics[channel]]
+        places.log_ns.extend(pairs[::2])
+        places.at.fromlist(pairs[1::2].tolist())
+        places.chunk.fromlist([part.last] * (len(pairs) // 2))
+        part.taken.add(channel)
+
+    def _complete(self, part: _Part) -> None:
+        """Take what the indexes of the last chunk have not told: it has none, or they are still to be written."""
+        missing = part.topics.keys() - part.taken
+        if part.last < 0 or not missing:
+            return
+        found: dict[int, array[int]] = {}
+        chunk = self._unpacked(part.last)
+        try:
+            for opcode, start, _ in chunk_records(chunk):
+                if opcode == Opcode.CHANNEL:
+                    self._declare(part, chunk[start:])
+                elif opcode == Opcode.MESSAGE:
+                    channel, _, log_ns, _ = MESSAGE_FIELDS.unpack_from(chunk, start)
+                    if channel in missing:
+                        found.setdefault(channel, array("Q")).extend((log_ns, start - RECORD.size))
+        except _DAMAGED as error:
+            raise self._damaged(part.last, str(error)) from None
+        for channel, pairs in found.items():
+            self._note(part, channel, pairs)
+        part.taken |= missing

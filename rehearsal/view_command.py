@@ -1,0 +1,95 @@
+"""The command `foosim-replay view`: the console over a capture, beside or under another one or a table of poses.
+
+Neighbours: `foosim.console` (file_source, poses_source, serving), `between` (computes ticks that were not captured).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from foosim.console.file_source import FileSource
+from foosim.console.poses_source import PosesSource
+from foosim.console.serving import ServeOptions, serve_sources
+from foosim.console.source import Source
+from foosim.protocol.addresses import LOOPBACK
+from foosim.protocol.errors import BadValue, read_at
+from foosim.protocol.units import parse_ns
+from foosim.rehearsal.between import Between
+from foosim.rehearsal.capture_arguments import reading
+from foosim.vhub.capture_reader import read_about
+
+TABLE: Final = ".csv"
+"""How the name of a table of poses ends; all else is a capture."""
+
+
+def view(  # a command's options
+    file: Annotated[
+        Path, typer.Argument(metavar="CAPTURE", help="The capture, or a table of poses (.csv).", show_default=False)
+    ],
+    second: Annotated[
+        Path | None,
+        typer.Option(metavar="CAPTURE|CSV", help="Another one on the same clock, beside it or as a ghost in it."),
+    ] = None,
+    offset: Annotated[
+        str | None, typer.Option(help="The time of --second at which the first one has time 0, e.g. 2.5s or -1s.")
+    ] = None,
+    listen: Annotated[str, typer.Option(help="HOST[:PORT] to serve the page at.")] = LOOPBACK,
+    certificate: Annotated[
+        Path | None, typer.Option(help="A PEM certificate for HTTPS, which another address than loopback takes.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option(help="The key of that certificate, PEM.")] = None,
+    open_browser: Annotated[bool, typer.Option("--open", help="Show the page in the browser of this machine.")] = False,
+) -> None:
+    """Serve a page that shows a capture: played, sought, stepped to the tick, with all that happened marked.
+
+    Prints an address; the token in it is the permission. A capture that is still being written, one without an end and
+    one of several files are shown as well. With --second the distance between the two is plotted, entity by entity: two
+    captures, a run and its what-if, a simulation and recorded poses. Ctrl-C ends it. Exit codes: 0 ended, 1 nobody can
+    listen, 2 bad input, 3 refused.
+    """
+    if offset is not None and second is None:
+        raise BadValue("--offset needs --second")
+    offset_ns = 0 if offset is None else read_at("--offset", _signed_ns, offset)
+    with reading():
+        sources = open_sources(file, second, offset_ns)
+    options = ServeOptions(listen, certificate, key, open=open_browser)
+    serve_sources(lambda: (sources, ()), options, lambda text: print(text, flush=True))
+
+
+def open_sources(file: Path, second: Path | None = None, offset_ns: int = 0) -> list[Source]:
+    """Return the source of a file, and the one that follows it. Raises CaptureError, BadPoses."""
+    if _is_table(file):
+        table = PosesSource(file)
+        if second is None:
+            return [table]
+        if not _is_table(second):
+            raise BadValue("a table of poses comes second: give the capture first", str(second))
+        return [table, PosesSource(second, table.deck, offset_ns, compare=lambda: table.where)]
+    first = _capture(file)
+    if second is None:
+        return [first]
+    if _is_table(second):
+        deployment = first.recording.deployment
+        return [first, PosesSource(second, first.deck, offset_ns, deployment, first.opened(links=True))]
+    return [first, FileSource(second, first.deck, offset_ns, _between(second), first.opened())]
+
+
+def _capture(file: Path) -> FileSource:
+    return FileSource(file, recompute=_between(file))
+
+
+def _between(file: Path) -> Between:
+    return Between(read_about(file))
+
+
+def _is_table(file: Path) -> bool:
+    return file.suffix.lower() == TABLE
+
+
+def _signed_ns(text: str) -> int:
+    """Return a time in ns, which may be negative."""
+    sign = -1 if text.startswith("-") else 1
+    return sign * parse_ns(text.removeprefix("-"))

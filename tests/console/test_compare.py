@@ -1,0 +1,72 @@
+"""Distances between two sources: what is known between samples, and what is not."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foosim.console.compare import POINTS, Comparison
+from foosim.console.recording import Recording
+from foosim.console.tracks import Track
+from foosim.console.whereabouts import Whereabouts
+
+MS = 1_000_000
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+def track(*samples: tuple[int, float]) -> Track:
+    """Something that moves along x: (time in ms, x)."""
+    poses = [(x, 0.0, 0.0, *UPRIGHT) for _, x in samples]
+    return Track(np.array([at * MS for at, _ in samples]), np.array(poses))
+
+
+def test_between_two_samples_a_place_lies_on_the_line_and_a_turn_on_the_arc() -> None:
+    half = (0.0, 0.0, sin(pi / 2), cos(pi / 2))
+    turning = Track(np.array([0, 100 * MS]), np.array([(0.0, 0.0, 0.0, *UPRIGHT), (0.4, 0.8, 0.0, *half)]))
+    found = turning.at(25 * MS)
+    assert found is not None
+    assert found[0] == pytest.approx((0.1, 0.2, 0.0)) and found[1] == pytest.approx((0, 0, sin(pi / 8), cos(pi / 8)))
+    assert turning.at(100 * MS) == ((0.4, 0.8, 0.0), half), "a sample itself is as it was read"
+
+
+def test_before_behind_in_a_gap_and_in_a_jump_nothing_is_known() -> None:
+    moved = track((0, 0.0), (20, 0.01), (40, 0.9), (60, 0.91), (2000, 1.0))
+    assert [moved.at(at * MS) is None for at in (-1, 0, 10, 20, 30, 40, 50, 60, 61, 1999, 2000, 2001)] == [
+        *(True, False, False, False, True, False, False, False, True, True, False, True)
+    ]
+
+
+def test_a_series_has_holes_where_one_side_is_not_known_and_grows_with_the_span() -> None:
+    ours, theirs = track((0, 0.0), (1000, 1.0)), track((100, 0.3), (500, 0.3))
+
+    comparison = Comparison(
+        lambda at: {"ball": pose} if (pose := ours.at(at)) else {},
+        lambda at: {"ball": pose} if (pose := theirs.at(at)) else {},
+        MS,
+    )
+    comparison.over(0, 1000)
+    while not comparison.is_complete:
+        comparison.work(37)
+    content = comparison.as_json(400)
+    assert content["entities"] == [{"name": "ball", "distance_m": 0.1}]
+    series = dict(map(tuple, content["series"]))
+    assert len(series) <= POINTS + 1
+    assert series[0] is None and series[600] is None and series[200] == 0.1 and series[500] == 0.2
+    comparison.over(0, 1100)
+    assert not comparison.is_complete, "the points of what came are still to be made"
+
+
+def test_a_capture_is_nowhere_from_itself_and_interpolated_between_its_frames(run: Path) -> None:
+    one, other = (Whereabouts(Recording(run)) for _ in range(2))
+    for tick in (0, 10, 15, 123, 300):
+        poses = one(tick * 2 * MS)
+        assert poses == other(tick * 2 * MS) and "ball" in poses and "red.goal" in poses
+    ball = [one(tick * 2 * MS)["ball"][0] for tick in (100, 105, 110)]
+    assert ball[1] == pytest.approx([(a + b) / 2 for a, b in zip(ball[0], ball[2], strict=True)])
+    assert one(301 * 2 * MS) == {} and one(-1) == {}
+    shifted = Whereabouts(Recording(run), 20 * MS)
+    assert shifted(0) == one(20 * MS), "an offset is the capture's time at the deck's time 0"
+    assert "red.goal/slide" in Whereabouts(Recording(run), links=True)(0) and "red.goal/slide" not in one(0)

@@ -1,0 +1,234 @@
+"""What happened in a capture: marks to the tick, windows of links at any time, the last drops explained."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foosim.console.asked import edit_text
+from foosim.console.capture_curves import curve_points, reading_points
+from foosim.console.capture_history import CaptureHistory
+from foosim.console.link_history import PACKET_MARKS
+from foosim.console.recording import Recording
+from foosim.console.source import Curve
+from foosim.console.timeline import MARKS_MAX, Mark, Timeline, WorldEvents
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import BALL, WORLD
+from foosim.protocol.start import initial_frame, kickoff_ticks
+from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.explain import PacketName, explain_packet
+from foosim.vhub.rows import CLIENTS, PACKETS, TICK, EditRow, EpochRow, OwnerRow, RecoveryRow
+from tests.replay.conftest import TABLE, TICK_NS, TICKS
+
+SECOND_NS = 1_000_000_000
+
+
+@pytest.fixture(scope="module")
+def table() -> Deployment:
+    return load_deployment(TABLE.read_text(), TABLE.name)
+
+
+def opened(path: Path) -> CaptureHistory:
+    """A history that was read to its end."""
+    history = CaptureHistory(Recording(path, (PACKETS, CLIENTS)))
+    while not history.is_complete:
+        history.gather(97)
+    return history
+
+
+@pytest.fixture(scope="module")
+def history(run: Path) -> CaptureHistory:
+    return opened(run)
+
+
+# --- marks -----------------------------------------------------------------------------------------------------------
+
+
+class Played:
+    """Frames of a table in which the rules' memory is what a test writes."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.frame = initial_frame(deployment)
+        self.events = WorldEvents(deployment)
+        self.events.take(self.frame)
+
+    def at(self, tick: int, **slots: float) -> list[Mark]:
+        """What is found at a frame with these slots: of the ball, or score_red, kickoffs."""
+        values = np.array(self.frame.values)
+        for name, value in slots.items():
+            entity, field, offset = {
+                "score_red": (WORLD, "score", 0),
+                "score_blue": (WORLD, "score", 1),
+                "kickoffs": (WORLD, "kickoffs", 0),
+            }.get(name, (BALL, name, 0))
+            values[self.frame.layout[entity].offsets[field] + offset] = value
+        self.frame = Frame(tick, self.frame.layout, values)
+        return self.events.take(self.frame)
+
+
+def test_what_the_rules_did_is_found_to_the_tick_between_frames(table: Deployment) -> None:
+    wait = kickoff_ticks(table)
+    played = Played(table)
+    assert played.at(wait - 6, wait_ticks=6) == []
+    assert played.at(wait + 6, wait_ticks=0, kickoffs=1) == [Mark(wait, "kickoff", "kick-off of ball")]
+    assert played.at(1000, wait_ticks=wait - 3, score_red=1) == [Mark(997, "goal", "goal of red, 1 : 0")]
+    assert played.at(1010, wait_ticks=wait - 13) == []
+    assert played.at(2000, wait_ticks=0, kickoffs=2) == [Mark(997 + wait, "kickoff", "kick-off of ball")]
+    assert played.at(2100, out_ticks=40, still_ticks=1, quarantined=1) == [
+        Mark(2100, "quarantine", "ball is in quarantine")
+    ]
+    assert played.at(2200, wait_ticks=wait, out_ticks=0, quarantined=0) == [Mark(2200, "out", "ball left the table")]
+    assert played.at(2200 + wait, wait_ticks=0, kickoffs=3)[0].tick == 2200 + wait
+    played.at(4000, still_ticks=900)
+    assert played.at(4010, wait_ticks=wait - 2, still_ticks=0) == [Mark(4008, "dead", "ball lay still")]
+    late = played.at(9000, wait_ticks=0, kickoffs=6, score_red=2, score_blue=1)
+    assert [mark.text for mark in late if mark.kind == "goal"] == ["goal of red, 2 : 0", "goal of blue, 2 : 1"]
+    assert [mark.kind for mark in late if mark.kind != "goal"] == ["kickoff"] * 3, "those that no frame shows, too"
+    assert played.at(10, wait_ticks=wait) == [], "an earlier frame begins anew"
+
+
+def epoch(tick: int, number: int, roster: list[str], **owners: str) -> EpochRow:
+    return EpochRow(tick, number, "0" * 64, roster, [OwnerRow(*pair) for pair in sorted(owners.items())], "")
+
+
+def test_epochs_moves_recoveries_requests_and_drops_are_marks(table: Deployment) -> None:
+    timeline = Timeline(table)
+    timeline.take_epoch(epoch(0, 1, ["n1", "n2"], a="n1", b="n2"))
+    timeline.take_epoch(epoch(50, 2, ["n1", "n2"], a="n2", b="n2"))
+    timeline.take_epoch(epoch(90, 3, ["n1"], a="n1", b="n1"))
+    timeline.take_recovery(RecoveryRow("node", "n2", "silent", 89, 3, 120_000_000))
+    push = EditRow("push", "ball", impulse=[0.1, 0.0, 0.0])
+    timeline.take_edits(21, [push, EditRow("freeze", "a"), EditRow("network", event="{")])
+    cut = '{"partition": [["player-red"], ["camera"]]}'
+    timeline.take_edits(30, [EditRow("network", event=cut)])
+    for at_ns in (0, 1, 30 * SECOND_NS):
+        timeline.take_drop(at_ns, "blocked")
+    timeline.take_drop(2, "random_loss")
+    assert timeline.news() == [
+        Mark(0, "drops", "3 dropped: blocked 2, random_loss 1"),
+        Mark(20, "push", edit_text(push)),
+        Mark(21, "network", "an event of the network that cannot be read"),
+        Mark(30, "network", "partition player-red | camera"),
+        Mark(50, "move", "move a from n1 to n2"),
+        Mark(89, "recovery", "node n2: silent, 120 ms without a commit"),
+        Mark(90, "epoch", "epoch 3 without n2"),
+        Mark(15_000, "drops", "1 dropped: blocked 1"),
+    ]
+    assert timeline.news() == []
+    for tick in range(MARKS_MAX + 5):
+        timeline.take_edits(tick + 1, [push])
+    assert len(timeline.news()) == MARKS_MAX - 1 and timeline.left == {"push": 6}, "bounded, and what is left counted"
+
+
+def test_drops_of_a_long_run_are_counted_in_spans_that_get_longer(table: Deployment) -> None:
+    timeline = Timeline(table)
+    hours = 20_000
+    for second in range(hours):
+        timeline.take_drop(second * SECOND_NS, "snr")
+    marks = timeline.news()
+    assert len(marks) <= 121 and sum(int(mark.text.split()[0]) for mark in marks) == hours
+
+
+def test_a_run_has_its_marks(history: CaptureHistory, table: Deployment) -> None:
+    recording = history.recording
+    rows = [recording.row(TICK, number) for number in range(TICKS + 1)]
+    asked = [(row.tick - 1, edit.kind, edit_text(edit)) for row in rows for edit in row.edits]
+    assert sorted(kind for _, kind, _ in asked) == ["add", "push"]
+    marks = [(mark.tick, mark.kind, mark.text) for mark in opened(recording.path).news()]
+    assert [mark for mark in marks if mark[1] != "drops"] == [
+        *asked,
+        (kickoff_ticks(table), "kickoff", "kick-off of ball"),
+    ]
+    assert history.share == 1.0
+
+
+# --- links -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("at", "window"), [(TICKS, TICKS), (150, 50), (37, 10), (0, 10), (299, 1)])
+def test_a_window_has_what_the_packets_say(history: CaptureHistory, at: int, window: int) -> None:
+    packets = open_capture(history.recording.path).packets
+    at_ns, after_ns = at * TICK_NS, (at - window) * TICK_NS
+    arrived_ns = np.where(packets.arrival_tick < 0, packets.sent_ns, packets.arrival_tick * TICK_NS)
+    told = {(link["from"], link["to"], link["rule"]): link for link in history.links.windows(at_ns, window * TICK_NS)}
+    used = packets.where(packets.sent_ns <= at_ns)
+    assert told.keys() == set(zip(used.source, used.destination, used.rule, strict=True))
+    for (source, destination, rule), link in told.items():
+        own = (packets.source == source) & (packets.destination == destination) & (packets.rule == rule)
+        sent = own & (packets.sent_ns > after_ns) & (packets.sent_ns <= at_ns)
+        came = own & (arrived_ns > after_ns) & (arrived_ns <= at_ns)
+        delivered, dropped = came & (packets.fate == "delivered"), came & (packets.fate == "dropped")
+        assert (link["offered"], link["delivered"], link["dropped"]) == (sent.sum(), delivered.sum(), dropped.sum())
+        assert link["causes"] == dict(Counter(packets.cause[dropped]))
+        delays = (packets.due_ns - packets.sent_ns)[delivered]
+        assert link["delay_ms"] == (pytest.approx(delays.mean() / 1e6) if len(delays) else None)
+    only = history.links.windows(at_ns, window * TICK_NS, ("camera", "player-red"))
+    assert only == [link for key, link in told.items() if key[:2] == ("camera", "player-red")]
+    totals = history.links.totals(at_ns)
+    assert totals["offered"] == len(used) and totals["delivered"] + totals["dropped"] + totals["in_flight"] == len(used)
+
+
+def test_the_last_drops_of_a_link_are_explained_as_the_command_does(history: CaptureHistory) -> None:
+    capture = open_capture(history.recording.path)
+    packets = capture.packets
+    lost = packets.where(packets.fate == "dropped")
+    assert len(lost) > 3
+    for number in range(len(lost)):
+        source, destination = lost.source[number], lost.destination[number]
+        at_ns = int(max(lost.sent_ns[number], lost.arrival_tick[number] * TICK_NS))
+        told = history.watched(source, destination, at_ns)
+        assert told["link"] == [source, destination] and told["rule"] == "everything"
+        name = PacketName(source, int(lost.sequence[number]), destination, int(lost.copy[number]))
+        expected = explain_packet(capture, name)
+        (drop,) = [drop for drop in told["drops"] if drop["head"] == expected.head]
+        assert drop["verdict"] == expected.verdict and drop["cause"] == lost.cause[number]
+        assert [step["text"] for step in drop["steps"]] == [step.text for step in expected.steps]
+    assert history.watched("nobody", "nobody", 0) == {"link": ["nobody", "nobody"], "rule": "", "drops": []}
+
+
+def test_packets_of_more_links_than_are_told_apart_are_counted(
+    history: CaptureHistory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("foosim.console.link_history.LINKS_MAX", 3)
+    few = opened(history.recording.path)
+    assert few.links.packets == history.links.packets and few.links.others > 0
+    assert few.links.totals(SECOND_NS)["offered"] == few.links.packets - few.links.others
+
+
+# --- curves ----------------------------------------------------------------------------------------------------------
+
+
+def test_curves_of_a_run_are_what_the_capture_has(history: CaptureHistory) -> None:
+    recording = history.recording
+    frames = [*open_capture(recording.path).each_frame()]
+    place = frames[0].layout[BALL].offsets["position"]
+    first = [(frame.tick, float(frame.values[place])) for frame in frames if len(frame.layout.balls) == 1]
+    assert curve_points(history, Curve("a", field=place), TICKS, 0) == first
+    score = curve_points(history, Curve("b", status="score.red"), TICKS, 0)
+    assert len(score) > 100 and {value for _, value in score} == {0.0}
+    offered = curve_points(history, Curve("c", status="packets.offered"), TICKS, 0)
+    assert offered[-1][1] == history.links.packets and offered == sorted(offered)
+    link = curve_points(history, Curve("d", link=("camera", "player-red"), figure="delivered"), TICKS, 0)
+    (window,) = history.links.windows(TICKS * TICK_NS, 5 * SECOND_NS, ("camera", "player-red"))
+    assert [link[-1]] == [(TICKS, window["delivered"])]
+    readings = reading_points(history, "camera", "ball", -1, TICKS * TICK_NS)
+    assert len(readings) > 20 and all(len(numbers) == 3 for _, numbers in readings)
+    assert curve_points(history, Curve("e", reading=("camera", "ball"), index=2), TICKS, 0) == [
+        (tick, numbers[2]) for tick, numbers in readings
+    ]
+    assert curve_points(history, Curve("f", reading=("camera", "nothing")), TICKS, 0) == []
+
+
+def test_the_marks_of_packets_are_a_part_of_their_rows(run: Path) -> None:
+    recording = Recording(run, (PACKETS,))
+    for number in range(0, len(recording.index.places[PACKETS]), 50):
+        row, mark = (
+            recording.row(PACKETS, number),
+            recording.decoded(PACKET_MARKS, recording.index.read(PACKETS, number)),
+        )
+        assert all(getattr(row, name) == getattr(mark, name) for name in mark.__struct_fields__)
