@@ -37,7 +37,7 @@ help:
 	@echo 'make clean   remove environments, caches and builds; captures stay'
 
 up: environment
-	@.venv/bin/foosim-supervisor up deploy/table.yaml $(ARGS)
+	@.venv/bin/foosim-supervisor up deploy/table.yaml --console $(ARGS)
 
 play: environment
 	@$(PYTEST) -m campaign tests/rehearsal/test_a_minute_of_play.py tests/laws $(ARGS)

@@ -15,6 +15,7 @@ from typing import Any, Final
 from bench import (
     barrier,
     certificates,
+    console,
     distributed,
     echo,
     hub,
@@ -97,6 +98,12 @@ BENCHES: Final = (
     Bench("rays", "lines of sight through a hall of shelves and vehicles", with_default(rays.rays), rays.lines),
     Bench("whatif", "captured packets through another network", with_default(whatif.whatif), whatif.lines),
     Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
+    Bench(
+        "console",
+        "a page beside the run: what the console takes, and the run",
+        with_default(console.console),
+        console.lines,
+    ),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),
     Bench("swarm", "rehearsals under random faults, by seed", swarm.swarm, swarm.lines),
     Bench("vhub-loss", "the vHub is killed and comes back", with_default(vhub_loss.vhub_loss), vhub_loss.lines),

@@ -9,13 +9,15 @@ from __future__ import annotations
 from base64 import b64decode
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 from foosim.console.drawing import Drawing
 from foosim.console.links import Links
 from foosim.console.source import About, Moment, Wanted
 from foosim.console.status_marks import StatusMarks
+from foosim.console.timeline import WorldEvents
+from foosim.console.watched import Watched
 from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
@@ -54,6 +56,8 @@ class Following:
         """The newest one that was shown."""
         self._is_paused = self._has_changed = False
         self._marks = StatusMarks()
+        self._events: WorldEvents | None = None
+        self._watched: Watched | None = None
         self._statuses = 0
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
         """Who has asked: by the request's sender, tick and verb."""
@@ -93,6 +97,8 @@ class Following:
         is_new = before is None or before.drawing is not world.drawing
         if is_new:
             self._frame = None
+            if before is None or before.drawing.deployment is not deployment:
+                self._events, self._watched = WorldEvents(deployment), Watched(deployment)
             world.links.turn_to(world.drawing.scene)
         return is_new
 
@@ -134,6 +140,8 @@ class Following:
             return None
         jump = self._frame is None or frame.tick < self._frame.tick
         self._frame = frame
+        if self._watched is not None:
+            self._watched.keep(frame)
         return replace(moment, jump=jump) if jump else moment
 
     def overlay(self, wanted: Collection[str]) -> dict[str, Any] | None:
@@ -145,13 +153,14 @@ class Following:
     # --- statuses ----------------------------------------------------------------------------------------------------
 
     def watch_arguments(self, wanted: Wanted, hz_max: float) -> dict[str, Any]:
-        """Return what a lease is asked for with."""
-        asked: dict[str, Any] = {"hz": min(wanted.hz, hz_max)}
-        if wanted.links:
-            asked["links"] = wanted.links
-        if wanted.readings:
-            asked["readings"] = wanted.readings
-        return asked
+        """Return what a lease is asked for with: what this world does not have is left out."""
+        assert self._world is not None, "described first"
+        deployment = self._world.drawing.deployment
+        ends = set(deployment.endpoints())
+        links = [link for link in wanted.links if ends.issuperset(link)]
+        robots = deployment.robots
+        readings = [pair for pair in wanted.readings if pair[0] in robots and pair[1] in robots[pair[0]].sensors]
+        return {"hz": min(wanted.hz, hz_max), "links": links, "readings": readings}
 
     def asked(self, sender: str, tick: int, verb: str, who: str) -> None:
         """Remember which browser has asked for something."""
@@ -170,6 +179,8 @@ class Following:
         self._has_changed = was_paused != self._is_paused
         messages: list[dict[str, Any]] = [{"type": "status", "status": status}]
         marks = self._marks.new(status)
+        if self._events is not None and self._frame is not None:
+            marks += map(asdict, self._events.take(self._frame))
         if marks:
             messages.append({"type": "marks", "marks": marks})
         if self._statuses % LINKS_EVERY == 0 and self._world is not None:
@@ -177,7 +188,17 @@ class Following:
                 self._world.links.move(self._frame)
             messages.append(self._world.links.message(status))
         self._statuses += 1
+        if self._watched is not None:
+            messages += self._watched.readings(status["watched"])
         return messages
+
+    def explained(self, status: Mapping[str, Any], wanted: Wanted) -> list[dict[str, Any]]:
+        """Return the messages about links that are watched. It takes a while: for a thread."""
+        report, drops = status["watched"], status["watched"].get("drops", {})
+        watched = self._watched
+        if watched is None:
+            return []
+        return watched.drops(report, [link for link in wanted.links if f"{link[0]}>{link[1]}" in drops])
 
     def standing_moment(self) -> Moment | None:
         """Return the last moment again where the run has just paused or gone on, which pages show."""

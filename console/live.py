@@ -22,7 +22,7 @@ from foosim.console.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.inbox import Inbox
-from foosim.supervisor.control import Control, NoAnswer
+from foosim.supervisor.control import Control, NoAnswer, RequestRefused
 
 VERBS: Final = (
     *("pause", "resume", "step", "rate", "add", "remove", "move", "push", "network", "stop", "start", "down"),
@@ -175,22 +175,26 @@ class LiveSource:
 
     async def _poll(self, control: Control, feed: Feed) -> None:
         """Ask for statuses, renew the lease, describe again where frames do not fit; as long as somebody looks."""
-        following, renewed_s, lease = self._following, 0.0, Wanted()
+        following, lease = self._following, Wanted()
+        renewed_s = described_s = 0.0
         while True:
             self._changed.clear()
             wanted = self._wanted
             if wanted.readers == 0:
                 await self._changed.wait()
                 continue
-            if following.is_stale:
+            if following.is_stale and time.monotonic() >= described_s + POLL_S:
                 await self._describe(control, feed)
+                described_s = time.monotonic()
             now_s = time.monotonic()
             if wanted != lease or now_s >= renewed_s + RENEW_S:
-                asked = following.watch_arguments(wanted, HZ_MAX)
-                await self._in_thread(partial(control.ask, "watch", QUESTION_S, self._closing.is_set, **asked))
+                await self._renew(control, feed, following.watch_arguments(wanted, HZ_MAX), wanted != lease)
                 lease, renewed_s = wanted, now_s
             status = await self._in_thread(lambda: control.status(QUESTION_S, self._closing.is_set))
-            for message in following.take_status(status):
+            messages = following.take_status(status)
+            if wanted.links:
+                messages += await self._in_thread(partial(following.explained, status, wanted))
+            for message in messages:
                 feed.tell(message)
             moment = following.standing_moment()
             if moment is not None:
@@ -198,6 +202,16 @@ class LiveSource:
             with suppress(TimeoutError):
                 async with asyncio.timeout(POLL_S):
                     await self._changed.wait()
+
+    async def _renew(self, control: Control, feed: Feed, wanted: dict[str, Any], is_new: bool) -> None:
+        """Begin or renew the lease; frames alone, where others watch so many links that there is no room for these."""
+        ask = partial(control.ask, "watch", QUESTION_S, self._closing.is_set)
+        try:
+            await self._in_thread(partial(ask, **wanted))
+        except RequestRefused as refused:
+            if is_new:
+                feed.tell(_note("warning", str(refused)))
+            await self._in_thread(partial(ask, hz=wanted["hz"]))
 
     def _take_frames(self, inbox: Inbox, ended: threading.Event, loop: asyncio.AbstractEventLoop, feed: Feed) -> None:
         """In a thread: wait for frames, and hand what they show to the event loop."""

@@ -104,16 +104,13 @@ def _announce(options: ServeOptions, stem: str, tokens: Tokens, say: Callable[[s
     """Say the addresses of the page."""
     view = f"{stem}#view={tokens.view}"
     operate = "" if options.view_only else f"{stem}#operate={tokens.operate}"
+    text = f"console: {operate}, to look only: {view}" if operate else f"console: {view}"
     if options.announce is not None:
-        write_private(options.announce, encode_json({"view": view, "operate": operate}))
-    say(addresses_text(view, operate))
+        write_private(options.announce, encode_json({"view": view, "operate": operate, "text": text}))
+        text = f"console: {stem}"  # others may read the log
+    say(text)
     if options.open:
         webbrowser.open(operate or view)
-
-
-def addresses_text(view: str, operate: str) -> str:
-    """`console: http://127.0.0.1:1234/#operate=..., to look only: ...`."""
-    return f"console: {operate}, to look only: {view}" if operate else f"console: {view}"
 
 
 def write_private(path: Path, content: bytes) -> None:

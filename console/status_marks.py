@@ -1,7 +1,6 @@
-"""What is marked on the time line of a running system: goals, losses and returns, requests; out of one status after
-the other.
+"""What is marked on the time line of a running system out of its statuses: losses and returns, requests.
 
-Pure. Neighbours: `live` feeds it, `supervisor.display` has the words.
+Pure. Neighbours: `following` feeds it, `supervisor.display` has the words, `timeline` reads frames.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ class StatusMarks:
     def __init__(self) -> None:
         self._recoveries = 0
         self._requests: set[tuple[Any, ...]] = set()
-        self._score: Mapping[str, int] | None = None
 
     def new(self, status: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Return the marks that a status adds."""
@@ -33,10 +31,4 @@ class StatusMarks:
             if (tick, verb, text, who) not in self._requests:
                 marks.append({"tick": tick, "kind": "request", "text": f"{who}: {text}"})
         self._requests = set(requests)
-        if status["score"] is not None:
-            score = status["score"]
-            if self._score is not None and score != self._score:
-                text = " : ".join(f"{team} {goals}" for team, goals in score.items())
-                marks.append({"tick": status["ticks"], "kind": "goal", "text": text})
-            self._score = score
         return marks

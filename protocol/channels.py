@@ -11,7 +11,15 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, get_args
 
-from foosim.protocol import asset_messages, client_messages, hub_messages, limits, messages, replay_messages
+from foosim.protocol import (
+    asset_messages,
+    client_messages,
+    hub_messages,
+    limits,
+    messages,
+    replay_messages,
+    view_messages,
+)
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import Malformed
 
@@ -112,6 +120,9 @@ WANT: Final = _simulation(
 )
 HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
 TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a change, and an answer", named=False)
+WATCHED: Final = _simulation(
+    "watched", view_messages.Watched, "supervisor", "vhub", "what people look at changes, and an answer", named=False
+)
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
 REQUEST: Final = _simulation("request", messages.Request, "operator", "supervisor", "a request", bytes_max=_SMALL)
@@ -154,6 +165,7 @@ CHANNELS: Final[tuple[Channel, ...]] = (
     WANT,
     HEARTBEAT,
     TEMPO,
+    WATCHED,
     END,
     FAREWELL,
     REQUEST,
@@ -199,7 +211,7 @@ NODE_READS: Final[Reads] = (*((channel, True) for channel in (
 VHUB_READS: Final[Reads] = (*((channel, True) for channel in (
     BUILD, PIECE, REFUSAL, PROCEED, COMMIT
 )), *((channel, False) for channel in (
-    RECALL, EPOCH, SAMPLES, WANT, TEMPO, END, CLIENT_HELLO, UP
+    RECALL, EPOCH, SAMPLES, WANT, TEMPO, WATCHED, END, CLIENT_HELLO, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final[Reads] = tuple((channel, False) for channel in (
     HELLO, FETCH, READY, STANDING, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST, INQUIRY

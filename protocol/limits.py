@@ -14,6 +14,8 @@ ENTITIES_MAX: Final = 4096
 NODES_MAX: Final = 256
 CLIENTS_MAX: Final = 1024
 OPERATORS_MAX: Final = 64
+WATCHED_MAX: Final = 64
+"""Links that people look at at once, and readings."""
 OPERATOR_LENGTH_MAX: Final = 24
 """Of an operator's or viewer's name: each of his sessions adds a dot and seven characters."""
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 from foosim.protocol import channels
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode, encode_json
-from foosim.protocol.messages import Answer, Request
+from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.rehearsal.bus import Bus
 
 OPERATOR: Final = "operator"
@@ -31,13 +31,19 @@ class People:
         """What was shown of the run, as it came."""
         bus.subscribe(OPERATOR, (*channels.OPERATOR_READS, *channels.VIEW_READS))
 
-    def request(self, verb: str, again_ns: int, arguments: dict[str, Any]) -> str:
-        """Ask for something, every `again_ns` until it is answered (0: once); return the request's id."""
+    def request(
+        self, verb: str, again_ns: int, arguments: dict[str, Any], who: str = OPERATOR, *, only_looks: bool = False
+    ) -> str:
+        """Ask for something, every `again_ns` until it is answered (0: once); return the request's id.
+
+        Who `only_looks` asks as a viewer does.
+        """
         self._requests += 1
         identity = f"request-{self._requests}"
         self.asked[identity] = verb
-        payload = encode(Request(OPERATOR, identity, verb, encode_json(arguments)))
-        self._ask(identity, payload, again_ns)
+        kind, channel = (Inquiry, channels.INQUIRY) if only_looks else (Request, channels.REQUEST)
+        self._bus.subscribe(who, channels.OPERATOR_READS)
+        self._ask(identity, channel, who, encode(kind(who, identity, verb, encode_json(arguments))), again_ns)
         return identity
 
     def give_up(self, verb: str) -> None:
@@ -53,9 +59,9 @@ class People:
             answer = decode(Answer, payload)
             self.answers[answer.id] = answer
 
-    def _ask(self, identity: str, payload: bytes, again_ns: int) -> None:
+    def _ask(self, identity: str, channel: Channel, who: str, payload: bytes, again_ns: int) -> None:
         if identity in self.answers or identity not in self.asked:
             return
-        self._bus.put(OPERATOR, channels.REQUEST, OPERATOR, payload, self._bus.now_ns)
+        self._bus.put(who, channel, who, payload, self._bus.now_ns)
         if again_ns:
-            self._later(again_ns, lambda: self._ask(identity, payload, again_ns))
+            self._later(again_ns, lambda: self._ask(identity, channel, who, payload, again_ns))

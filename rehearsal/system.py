@@ -193,8 +193,7 @@ class System:
         message = self.bus.pop()
         process = self.processes.get(message[2])
         if process is None:
-            if message[2] == OPERATOR:
-                self.people.hear(message[3], message[5])
+            self.people.hear(message[3], message[5])
         elif process.inbox or process.busy_until_ns > self.bus.now_ns:
             process.inbox.append(message)
             self._behind[process.name] = process

@@ -22,6 +22,7 @@ from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import has_launcher
 from foosim.protocol.usage import BadUsage
 from foosim.supervisor import control
+from foosim.supervisor.console_child import Page
 from foosim.supervisor.detach import detach
 from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
@@ -100,6 +101,10 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     balance: Balance = False,
     detached: Annotated[bool, typer.Option("--detach", help="Run in the background; down ends it.")] = False,
     resumed: Annotated[str | None, typer.Option("--resume", help="Go on with this run, whose launcher died.")] = None,
+    console: Annotated[
+        bool, typer.Option("--console", help="Serve a page that shows the run; its address is printed.")
+    ] = False,
+    open_browser: Annotated[bool, typer.Option("--open", help="--console, and show it in the browser.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
 ) -> None:
     """Run all that a deployment declares, here and on its hosts, until Ctrl-C or --for.
@@ -117,19 +122,22 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     """
     display = Display(sys.stderr if json else sys.stdout)
     begun: Up | Outcome | None = None
+    page: Page = "open" if open_browser else "console" if console else ""
     try:
+        if page and detached:
+            raise BadValue("--console and --detach exclude each other; foosim-console shows a run in the background")
         if resumed is not None:
             begins = pace, duration, seed, sets, engine, listen, branch, run, capture
             if file is not None or insecure or balance or no_capture or detached or any(map(bool, begins)):
                 raise BadValue("--resume takes FILE and its options from the run", resumed)
-            begun = _go_on(open_run(resumed), display)
+            begun = _go_on(open_run(resumed), display, page)
         elif file is None:
             raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
         elif no_capture and capture is not None:
             raise BadValue("--capture and --no-capture exclude each other", str(capture))
         else:
             options = _options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance)
-            begun = _begin(options, capture, not no_capture, run, detached, display)
+            begun = _begin(options, capture, not no_capture, run, detached, display, page)
         outcome = begun.run() if isinstance(begun, Up) else begun
     except Killed as killed:
         print(killed, file=sys.stderr)
@@ -152,7 +160,13 @@ def _print_result(result: Mapping[str, Any], json: bool) -> None:
 
 
 def _begin(
-    options: RunOptions, capture: Path | None, captures: bool, run: str | None, detached: bool, display: Display
+    options: RunOptions,
+    capture: Path | None,
+    captures: bool,
+    run: str | None,
+    detached: bool,
+    display: Display,
+    console: Page,
 ) -> Up | Outcome:
     """Return a run of a deployment to be run, or leave it running; without a `capture` it is where captures go by
     default, where any is wanted (`captures`)."""
@@ -165,10 +179,10 @@ def _begin(
     _prepare(plan, display, None)
     if detached:
         return detached_outcome(detach(plan, path, run), plan.deployment, path)
-    return Up(plan, path, display, run)
+    return Up(plan, path, display, run, console=console)
 
 
-def _go_on(folder: RunFolder, display: Display) -> Up | Outcome:
+def _go_on(folder: RunFolder, display: Display, console: Page) -> Up | Outcome:
     """Return a run that is to go on; of one that has ended return how."""
     if folder.result() is not None:
         recover_leftovers(display.say)
@@ -177,7 +191,7 @@ def _go_on(folder: RunFolder, display: Display) -> Up | Outcome:
     check_players_here(plan)
     _look_for_room(plan, path, folder.path, display)
     _prepare(plan, display, folder.name)
-    return Up(plan, path, display, None, folder)
+    return Up(plan, path, display, None, folder, console)
 
 
 def _look_for_room(plan: Plan, capture: Path | None, runs: Path, display: Display) -> None:

@@ -80,6 +80,8 @@ class Handshake:
         if reason:
             self.refuse(process.role, process.name, process.boot, reason)
             return
+        if process.name == channels.VHUB:
+            core.viewing.hub_ready()
         if core.take_over is not None:
             core.take_over.wake(now_ns)
         elif not core.is_open:

@@ -11,7 +11,7 @@ chosen, then answered; what only reads is neither journalled nor kept. To add a 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from math import hypot
 from typing import TYPE_CHECKING, Any, Final
@@ -23,10 +23,11 @@ from foosim.protocol.errors import Malformed, Refused, show
 from foosim.protocol.frame import layout_after
 from foosim.protocol.layout import BALL, Layout
 from foosim.protocol.messages import Add, Answer, Disrupt, Edit, Inquiry, Push, Remove, Request
-from foosim.protocol.names import NAME_RULE, is_name, nearest_name
+from foosim.protocol.names import NAME_RULE, is_name
 from foosim.protocol.network import EVENTS_MAX, event_of
 from foosim.protocol.network_request import event_text, told
 from foosim.protocol.units import parse_pace
+from foosim.supervisor.choices import chosen
 from foosim.supervisor.issued import Issued
 from foosim.supervisor.records import ASKED_KEPT, Asked, OrderedRecord, RequestRecord, asked
 from foosim.supervisor.status import status
@@ -311,7 +312,7 @@ class Requests:
                 self.prepare()
 
     def _push(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        name = _chosen("free body", _name(arguments, "name", BALL), [ball.name for ball in self._next_layout().balls])
+        name = chosen("free body", _name(arguments, "name", BALL), [ball.name for ball in self._next_layout().balls])
         impulse = _vector(arguments, "impulse", None)
         ball = self._core.deployment.table.ball
         size, most = hypot(*impulse), ball.mass * ball.speed_limit
@@ -347,8 +348,8 @@ class Requests:
 
     def _move(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         core = self._core
-        robot = _chosen("robot", _name(arguments, "robot"), sorted(core.owners))
-        node = _chosen("node", _name(arguments, "node"), core.members)
+        robot = chosen("robot", _name(arguments, "robot"), sorted(core.owners))
+        node = chosen("node", _name(arguments, "node"), core.members)
         tick = core.frame.tick
         if core.owners[robot] == node:
             core.recovery.moved(robot)
@@ -362,7 +363,7 @@ class Requests:
 
     def _stop_node(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         core = self._core
-        node = _chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
+        node = chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
         tick = core.frame.tick
         if node in core.roster.stopped:
             return self._accept(request, tick, f"{node} is stopped already")
@@ -377,7 +378,7 @@ class Requests:
 
     def _start_node(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         core = self._core
-        node = _chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
+        node = chosen("node", _name(arguments, "node"), sorted(core.deployment.nodes))
         if node in core.members:
             return self._accept(request, core.frame.tick, f"{node} takes part already")
         core.roster.stopped.discard(node)
@@ -402,14 +403,6 @@ def _name(arguments: dict[str, Any], key: str, default: str = "") -> str:
     if not isinstance(value, str):
         raise Refused(f"{key}: a name is needed, not {show(value)}")
     return value
-
-
-def _chosen(what: str, name: str, choices: Sequence[str]) -> str:
-    if name in choices:
-        return name
-    nearest = nearest_name(name, choices)
-    hint = f", nearest is {nearest}" if nearest else ""
-    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices) or 'none'}{hint}")
 
 
 def _integer(arguments: dict[str, Any], name: str, low: int, high: int) -> int:

@@ -113,6 +113,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "requests": [asdict(asked) for asked in core.requests.asked],
         "refusals": report.get("refusals", {}),
         "clients": report.get("clients", []),
+        "watched": report.get("watched", {}),
     }
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -22,6 +22,7 @@ from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Failed, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.session import ConnectError
+from foosim.supervisor.console_child import ConsoleChild, Page
 from foosim.supervisor.control import Control, NoAnswer
 from foosim.supervisor.display import Display, recovery_text
 from foosim.supervisor.hosts import check_hosts, fetch_capture
@@ -33,6 +34,7 @@ from foosim.supervisor.remote import CAPTURE
 from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
+from foosim.supervisor.signals import counted_signals
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 
@@ -72,8 +74,12 @@ class Up:
         display: Display,
         run: str | None = None,
         resumed: RunFolder | None = None,
+        console: Page = "",
     ) -> None:
-        """`capture` is where it is captured; None captures nothing. `run` names it, `resumed` is one to go on with."""
+        """`capture` is where it is captured; None captures nothing. `run` names it, `resumed` is one to go on with.
+
+        `console` says whether one is started beside the run.
+        """
         self.plan = plan
         self.capture = capture
         self.display = display
@@ -84,6 +90,7 @@ class Up:
         self.folder.write_launch(launch_of(plan.options, capture))
         units = [name for name, node in plan.deployment.nodes.items() if node.launch == "systemd"]
         self._launcher = Launcher(self.folder.name, remotes, units)
+        self._console = ConsoleChild(self.folder, display.say, console)
         self._not_home = ""
         """Why the capture was not brought home from the machine on which it was written."""
         self._interrupts = 0
@@ -112,7 +119,7 @@ class Up:
 
     def run(self) -> Outcome:
         """Start everything, show it until it is over, and return how it ended. Raises Killed."""
-        with self._signals(), self.display:
+        with counted_signals(self._count), self.display:
             try:
                 if self._start():
                     self._watch()
@@ -121,6 +128,7 @@ class Up:
                 leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
                 self._launcher.wait(leave_s if self.folder.result() is not None else END_S)
             finally:
+                self._console.end()
                 self._launcher.stop()
                 self._launcher.close()
             self._bring_home()
@@ -222,12 +230,14 @@ class Up:
     def _watch(self) -> None:
         """Show the run until its supervisor has ended."""
         next_s = time.monotonic()
+        self._console.start()
         exposure = Exposure(self.plan.address, time.monotonic_ns())
         with ExitStack() as stack:
             while self._goes_on():
                 reminder = exposure.due(time.monotonic_ns())
                 if reminder:
                     self.display.say(reminder)
+                self._console.look()
                 if time.monotonic() >= next_s:
                     next_s = time.monotonic() + self.display.every_s
                     self._control = self._control or self._connect(stack)
@@ -483,17 +493,6 @@ class Up:
         lines = capture_lines(self.capture, self.folder.result(), journals)
         return lines or ([self._not_home] if self._not_home else [])
 
-    @contextmanager
-    def _signals(self) -> Iterator[None]:
-        """Count Ctrl-C (and what means the same) instead of being ended by it."""
-
-        def count(number: int, frame: object) -> None:
-            self._interrupts += 1
-
-        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        before = {number: signal.signal(number, count) for number in numbers}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+    def _count(self) -> None:
+        """Take note of a Ctrl-C."""
+        self._interrupts += 1

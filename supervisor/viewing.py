@@ -10,14 +10,17 @@ Leases are in no journal: after a loss of the supervisor they are asked for agai
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish
-from foosim.protocol.codec import encode_json
+from foosim.protocol.codec import encode, encode_json
 from foosim.protocol.errors import Refused, show
-from foosim.protocol.messages import Add, Answer, Edit, Remove, Request
+from foosim.protocol.messages import Add, Answer, Edit, Heartbeat, Remove, Request
+from foosim.protocol.view_messages import Watched
+from foosim.supervisor.choices import chosen
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
@@ -30,6 +33,18 @@ FRAME_BYTES_MAX: Final = 384 * 1024
 """A larger commit is not in the answer to `describe`, and comes with the lease."""
 _NS_PER_S: Final = 1_000_000_000
 
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Lease:
+    """What somebody wants to see: frames per second, links and readings; and until when."""
+
+    hz: float
+    links: list[Pair]
+    readings: list[Pair]
+    until_ns: int
+
 
 class Viewing:
     """The leases, and what is published by them."""
@@ -38,8 +53,12 @@ class Viewing:
         self.is_shown = False
         """Whether somebody wants frames: all that a commit has to ask while nobody does."""
         self._core = core
-        self._leases: dict[str, tuple[float, int]] = {}
-        """By who asks: frames per second, and when the lease is over."""
+        self._leases: dict[str, _Lease] = {}
+        """By who asks."""
+        self._watched = Watched([], [])
+        """What the vHub was told last."""
+        self._told_at: Heartbeat | None = None
+        """Its last heartbeat before that."""
         self._period_ns = self._due_ns = 0
         self._unseen = b""
         """The last commit, while it has not been shown."""
@@ -47,13 +66,19 @@ class Viewing:
     def watch(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         """Begin or renew a lease; the answer has the rate that it gets and for how long. Raises Refused."""
         hz = _rate(arguments.get("hz"))
+        links = _pairs("links", arguments.get("links"), self._link)
+        readings = _pairs("readings", arguments.get("readings"), self._reading)
         self._end_leases(now_ns)
         if request.sender not in self._leases and len(self._leases) >= limits.OPERATORS_MAX:
             raise Refused(f"{limits.OPERATORS_MAX} look at the run already")
-        was_shown = hz > 0.0 and self._leases.get(request.sender, (0.0, 0))[0] > 0.0
-        self._leases[request.sender] = hz, now_ns + LEASE_NS
+        known = self._leases.get(request.sender)
+        leases = {**self._leases, request.sender: _Lease(hz, links, readings, now_ns + LEASE_NS)}
+        watched = _watched_by(leases.values())
+        self._leases = leases
+        if watched != self._watched or links or readings:
+            self._say_watched(watched)
         self._set_rate()
-        if hz and not was_shown:
+        if hz and not (known is not None and known.hz):
             self._unseen = self._last_commit
         got = min(hz, _NS_PER_S / self._period_ns) if hz else 0.0
         return self._answer(request, {"hz": got, "lease_s": LEASE_NS / _NS_PER_S})
@@ -86,9 +111,10 @@ class Viewing:
 
     def wake(self, now_ns: int) -> None:
         """End leases that were not renewed; show what was committed last, if nothing came behind it."""
-        if not self._leases:
-            return
-        self._end_leases(now_ns)
+        if self._leases:
+            self._end_leases(now_ns)
+        if self._hub_is_wrong():
+            self._say_watched(self._watched)
         if self._unseen and now_ns >= self._due_ns:
             self._show(now_ns)
 
@@ -100,11 +126,47 @@ class Viewing:
             self._due_ns = now_ns + self._period_ns
 
     def _end_leases(self, now_ns: int) -> None:
-        over = [name for name, (_, until_ns) in self._leases.items() if until_ns <= now_ns]
+        over = [name for name, lease in self._leases.items() if lease.until_ns <= now_ns]
         for name in over:
             self._leases.pop(name)
         if over:
             self._set_rate()
+            watched = _watched_by(self._leases.values())
+            if watched != self._watched:
+                self._say_watched(watched)
+
+    def hub_ready(self) -> None:
+        """Tell a vHub that was started again what is looked at."""
+        if self._is_watching:
+            self._say_watched(self._watched)
+
+    def _hub_is_wrong(self) -> bool:
+        """Whether the vHub keeps what nobody looks at: it has missed that, or another supervisor told it to."""
+        hub = self._core.roster.by_name.get(channels.VHUB)
+        keeps = hub is not None and "watched" in hub.report and hub.heartbeat is not self._told_at
+        return keeps and not self._is_watching and self._core.end is None
+
+    def _say_watched(self, watched: Watched) -> None:
+        self._watched = watched
+        hub = self._core.roster.by_name.get(channels.VHUB)
+        self._told_at = None if hub is None else hub.heartbeat
+        self._core.actions.append(Publish(channels.WATCHED, channels.SUPERVISOR, encode(watched)))
+
+    @property
+    def _is_watching(self) -> bool:
+        return bool(self._watched.links or self._watched.readings)
+
+    def _link(self, source: str, destination: str) -> None:
+        """Raise Refused for a link without ends."""
+        ends = self._core.deployment.endpoints()
+        for name in (source, destination):
+            chosen("endpoint", name, ends)
+
+    def _reading(self, robot: str, channel: str) -> None:
+        """Raise Refused for what no sensor measures."""
+        robots = self._core.deployment.robots
+        sensors = robots[chosen("robot", robot, sorted(robots))].sensors
+        chosen(f"sensor of {robot}", channel, sorted(sensors))
 
     @property
     def _last_commit(self) -> bytes:
@@ -113,7 +175,7 @@ class Viewing:
 
     def _set_rate(self) -> None:
         """Show frames as often as the most eager lease wants, and as their size allows."""
-        hz = max((hz for hz, _ in self._leases.values()), default=0.0)
+        hz = max((lease.hz for lease in self._leases.values()), default=0.0)
         self.is_shown = hz > 0.0
         if self.is_shown:
             self._period_ns = round(_NS_PER_S / min(hz, BYTES_PER_S_MAX / max(1, len(self._last_commit))))
@@ -131,3 +193,30 @@ def _rate(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= HZ_MAX:
         raise Refused(f"hz: a number from 0 to {HZ_MAX:g} is needed, not {show(value)}")
     return float(value)
+
+
+def _watched_by(leases: Iterable[_Lease]) -> Watched:
+    """Return what some leases want to see together. Raises Refused when it is too much."""
+    links: set[Pair] = set()
+    readings: set[Pair] = set()
+    for lease in leases:
+        links.update(lease.links)
+        readings.update(lease.readings)
+    for what, pairs in (("links", links), ("readings", readings)):
+        if len(pairs) > limits.WATCHED_MAX:
+            raise Refused(f"{what}: at most {limits.WATCHED_MAX} are looked at at once, these would make {len(pairs)}")
+    return Watched(sorted(links), sorted(readings))
+
+
+def _pairs(what: str, value: object, check: Callable[[str, str], None]) -> list[Pair]:
+    """Return pairs of names as they are asked for. Raises Refused, as `check` does."""
+    pairs = [] if value is None else value
+    if not isinstance(pairs, list) or len(pairs) > limits.WATCHED_MAX:
+        raise Refused(f"{what}: a list of at most {limits.WATCHED_MAX} pairs of names is needed")
+    found: list[Pair] = []
+    for pair in pairs:
+        if not isinstance(pair, list) or len(pair) != 2 or not all(isinstance(name, str) for name in pair):
+            raise Refused(f"{what}: a pair of names is needed, not {show(pair)}")
+        check(*pair)
+        found.append((pair[0], pair[1]))
+    return found

@@ -45,7 +45,7 @@ def may_hear(identity: str, key: str) -> bool:
             to_it = {f"{S}/{what}/{name}" for what in ("build", "piece", "refusal", "commit")}
             return key in to_all | to_it or key.startswith((f"{S}/part/", f"{S}/want/"))
         case "vhub":
-            to_all = {f"{S}/{what}" for what in ("recall", "epoch", "tempo", "end")}
+            to_all = {f"{S}/{what}" for what in ("recall", "epoch", "tempo", "watched", "end")}
             to_it = {f"{S}/{what}/vhub" for what in ("build", "piece", "refusal", "proceed", "commit")}
             return key in to_all | to_it or key.startswith((f"{S}/samples/", f"{S}/want/"))
         case "operator":

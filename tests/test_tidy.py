@@ -119,6 +119,7 @@ SHELLS = {
     "supervisor/plan.py",
     "supervisor/resumable.py",
     "supervisor/run_folder.py",
+    "supervisor/signals.py",
     "supervisor/up.py",
     "vhub/branching.py",
     "vhub/capture_cut.py",

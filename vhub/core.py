@@ -23,7 +23,6 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame
 from foosim.protocol.hub_messages import Proceed
-from foosim.protocol.layout import added_entities
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
     DONE_OF,
@@ -50,18 +49,21 @@ from foosim.protocol.orphan import Orphan
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain
+from foosim.protocol.view_messages import Watched
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
 from foosim.vhub.footing import Footing
+from foosim.vhub.head import head_of
 from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closings
 from foosim.vhub.packet import Flight, received
-from foosim.vhub.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
+from foosim.vhub.records import Closing, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
 from foosim.vhub.report import HubStatistics, LinksTold, report, statistics
 from foosim.vhub.resume import Past
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
 from foosim.vhub.waits import Waits
+from foosim.vhub.watching import Watching
 
 HubAction = Action | Keep | KeepEpoch
 
@@ -93,12 +95,12 @@ class HubCore:
         self.finished = False
         self.lost = self.failure = self.capture = self.capture_file = self.radio_address = ""
         self.recording: dict[str, Any] = {}
-        self.links_told = LinksTold()
+        self.links_told, self.watching = LinksTold(), Watching()
         self.speak: Callable[[int], int] = lambda now_ns: now_ns
         """Called amid a closing: what is to be said by then may be performed; returns the time."""
         self.busy = 0.0
         self.epoch = self._epoch_tick = self._end_ns = self._malformed = self.repeated = self.disk_progress = 0
-        self._epoch_payload = b""
+        self.epoch_payload = b""
         self._owners: dict[str, str] = {}
         self.waits = Waits()
         self._keeping = Keeping()
@@ -118,6 +120,7 @@ class HubCore:
             Build: self._on_build,
             Piece: self._on_build,
             Tempo: self.door.tempo,
+            Watched: self.watching.take,
             End: self._on_end,
             Proceed: self.footing.proceed,
             ClientHello: self.door.hello,
@@ -250,6 +253,8 @@ class HubCore:
             state.join(joining, tick)
         closing = closing_of(frame, commit, self.commits.chain_at(tick), state, joins, leaves, now_ns)
         released = state.close_world(frame, packets, closing.fates, commit.edits)
+        if self.watching.readings:
+            self.watching.sensed(tick, packets)
         due = state.due_members(tick)
         for name in due:
             self.door.go(name, tick, released.pop(name, []), now_ns)
@@ -293,6 +298,8 @@ class HubCore:
         for flight in world.closing.fates:
             if not flight.cause and flight.destination not in state.members:
                 flight.released_wall_ns = now_ns
+        if self.watching.links:
+            self.watching.judged(world.closing.fates)
         world.closing.ages = state.aged
         self._keeping.add(world.closing)
         self.actions += self._keeping.take(releases.waiting_tick)
@@ -314,14 +321,7 @@ class HubCore:
 
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""
-        assert self.state is not None and self.member.build is not None
-        commit, _, frame = self.commits.get(self.state.closed) or (b"", None, None)
-        layout = self.commits.layout if frame is None else frame.layout
-        assert layout is not None
-        added = [(entity.name, entity.model) for entity in added_entities(self.state.deployment, layout)]
-        chain = self.commits.chain_at(self.state.closed)
-        where = commit, self._epoch_payload, self.capture_file, chain, self.footing.machine, self.door.absences.record()
-        return encode(HeadRecord(self.member.build.run, self.state.snapshot(), added, *where))
+        return head_of(self)
 
     def _release(self, now_ns: int) -> None:
         """Say what is released to free-running clients by now; closings of which nothing waits go to the capture."""
@@ -392,7 +392,7 @@ class HubCore:
 
     def _take_epoch(self, epoch: Epoch) -> None:
         self.epoch, self._epoch_tick = epoch.epoch, epoch.tick
-        self._epoch_payload = encode(epoch)
+        self.epoch_payload = encode(epoch)
         self._owners = dict(epoch.owners)
 
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
@@ -409,7 +409,7 @@ class HubCore:
             return
         branches = self.state.turn_to(epoch)
         self._take_epoch(epoch)
-        self.actions += [Journal(self._epoch_payload), KeepEpoch(epoch)]
+        self.actions += [Journal(self.epoch_payload), KeepEpoch(epoch)]
         if branches:
             self.footing.branch_off(self._sent)
         self.footing.entered()

@@ -69,7 +69,8 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
     `links` are those with the most traffic: [from, to, offered, delivered, dropped, mean delay in ns, rule, how long
     its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any. Ages at use are [channel,
     uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts messages by channel and sender,
-    `refusals` packets by reason; `lateness_ms` is how late packets left in realtime, null if none did.
+    `refusals` packets by reason; `lateness_ms` is how late packets left in realtime, null if none did. What somebody
+    looks at is under `watched` (`Watching.report`).
     """
     state, refused = core.state, core.refusals.by_sender()
     if state is None:
@@ -90,6 +91,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
             "links": core.links_told.lines(state, anew=is_last),
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
+            **core.watching.report(state),
             "absences": {"boot": core.member.boot, **core.door.absences.report()},
             "lateness_ms": lateness.as_json() if lateness is not None and lateness.count else None,
             "capture": core.capture,

@@ -109,6 +109,9 @@ def test_who_looks_at_what_is_told_to_the_source_until_nobody_does() -> None:
                 assert stage.source.wanted[-1].overlays == {"rays"}
                 stage.source.tell(type="watched", link=["a", "b"], drops=[])
                 assert (await other.hear("watched"))["link"] == ["a", "b"]
+                await one.say(type="watch", link=["a", "b"])  # who comes later gets what was told
+                assert (await one.hear("watched"))["drops"] == []
+                await one.say(type="watch", link=None)
             await until(lambda: stage.source.wanted[-1].links == ())
         await until(lambda: stage.source.wanted[-1].hz == 0.0)
 

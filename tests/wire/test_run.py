@@ -24,6 +24,7 @@ from tests.wire.conftest import LIMIT_S, LONG
 if TYPE_CHECKING:
     from tests.wire.conftest import House
 
+
 def last_json(out: str) -> dict[str, Any]:
     """The object in the last line."""
     content = json.loads(out.splitlines()[-1])

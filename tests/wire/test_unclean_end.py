@@ -26,7 +26,9 @@ def last_json(out: str) -> dict[str, Any]:
 
 
 def test_the_next_start_completes_the_capture_of_a_run_that_was_killed_whole(house: House) -> None:
-    slow = "network.links.everything.delay=20 ms"  # the camera takes a picture every 10 ms: some are always on their way
+    slow = (
+        "network.links.everything.delay=20 ms"  # the camera takes a picture every 10 ms: some are always on their way
+    )
     split = ("--set", "capture.split_time=40 ms", "--set", slow)
     up = house.up("--pace", "fast", "--engine", "pure", "--capture", "run.mcap", *split, players=True)
     run = house.info()

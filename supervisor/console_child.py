@@ -1,0 +1,78 @@
+"""The console beside a run: a process that `up` starts and ends, and that may die without harm to the run.
+
+It is no process of the run: nobody waits for it, and nobody starts it again. It writes the addresses of its page into
+the run's folder, where only the owner can read them. Neighbours: `up`, `console.main` (the process), `launcher`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, Literal
+
+import msgspec
+
+from foosim.protocol.errors import Failed
+from foosim.supervisor.launcher import Launcher
+from foosim.supervisor.run_folder import UNREADABLE, RunFolder
+
+CONSOLE: Final = "console"
+Page = Literal["", "console", "open"]
+"""Whether a page is to show the run, and the browser of this machine the page."""
+ADDRESSES: Final = "console.json"
+"""In the run's folder: the addresses of the page, and the line that says them."""
+
+
+class ConsoleChild:
+    """The console of one run."""
+
+    def __init__(self, folder: RunFolder, say: Callable[[str], None], page: Page) -> None:
+        self._folder, self._say, self._page = folder, say, page
+        self._launcher = Launcher(folder.name)
+        self._has_addresses = self._has_ended = False
+        """What was said of it."""
+
+    def start(self) -> None:
+        """Start it, if there is to be one: the run can be found by now."""
+        if not self._page:
+            return
+        path = self._folder.path / ADDRESSES
+        path.unlink(missing_ok=True)
+        command = [
+            "foosim-console",
+            self._folder.name,
+            "--announce",
+            str(path),
+            *(["--open"] if self._page == "open" else []),
+        ]
+        try:
+            self._launcher.start(CONSOLE, command, self._folder.log(CONSOLE))
+        except Failed as failed:
+            self._say(f"{failed}; the run goes on without it")
+
+    def look(self) -> None:
+        """Say its addresses as soon as it has some, and how it ended when it has."""
+        child = self._launcher.children.get(CONSOLE)
+        if child is None or self._has_ended:
+            return
+        text = "" if self._has_addresses else self._addresses()
+        if text:
+            self._has_addresses = True
+            self._say(text)
+        if child.exit_code is not None:
+            self._has_ended = True
+            self._say(
+                f"console {child.ending}, and the run goes on; foosim-console {self._folder.name} starts another one; "
+                f"its log is {child.log}"
+            )
+
+    def end(self) -> None:
+        """End it, at once."""
+        self._launcher.kill()
+        self._launcher.close()
+        (self._folder.path / ADDRESSES).unlink(missing_ok=True)
+
+    def _addresses(self) -> str:
+        try:
+            return str(msgspec.json.decode((self._folder.path / ADDRESSES).read_bytes())["text"])
+        except UNREADABLE:
+            return ""

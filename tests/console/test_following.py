@@ -1,0 +1,155 @@
+"""What becomes of what a running system says: frames as moments, layouts that change, requests as marks, overlays."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from foosim.console.following import Following, World
+from foosim.console.overlays import Overlays
+from foosim.console.source import About, Wanted
+from foosim.protocol.codec import encode
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import Commit
+from foosim.protocol.start import initial_frame
+from tests.console.memory import TABLE, table
+
+BALL2 = [["ball2", "ball"]]
+
+
+def commit(frame: Frame) -> bytes:
+    return encode(Commit(1, frame.tick, frame.digest, frame.values.tobytes(), [], [], False))
+
+
+def described(frame: Frame, added: list[list[str]], paused: bool = False) -> dict[str, Any]:
+    return {
+        "run": "test",
+        "deployment_name": TABLE.name,
+        "deployment": TABLE.read_text(),
+        "added": added,
+        "layout": frame.layout.digest.hex(),
+        "tick": frame.tick,
+        "frame": b64encode(commit(frame)).decode(),
+    }
+
+
+def frame_of(tick: int, *added: list[str]) -> Frame:
+    layout = build_layout(table(), [(name, model) for name, model in added])
+    return Frame(tick, layout, np.arange(layout.size, dtype=np.float64))
+
+
+def following() -> tuple[Following, World]:
+    found = Following(About("live", "test", "", 1, ()))
+    what = described(frame_of(5), [])
+    world = found.world_of(what, lambda deployment: {})
+    assert found.turn_to(what, world)
+    return found, world
+
+
+def is_stale(found: Following) -> bool:
+    return found.is_stale
+
+
+def test_a_frame_of_another_layout_is_not_drawn_and_asks_for_the_new_one() -> None:
+    found, world = following()
+    first = found.first_moment()
+    assert first is not None and (first.tick, first.jump) == (5, True)
+    read = found.read(commit(frame_of(6)))
+    assert read is not None
+    assert found.read(commit(frame_of(7, BALL2[0]))) is None
+    assert is_stale(found)
+    what = described(frame_of(7, BALL2[0]), BALL2)
+    assert found.turn_to(what, found.world_of(what, lambda deployment: {}))
+    assert not is_stale(found)
+    # What was read before the layout changed comes too late.
+    assert found.show(*read, world.drawing.moment(read[1])) is None
+    moment = found.first_moment()
+    assert moment is not None and len(moment.poses) == 18
+
+
+def test_the_same_world_described_again_is_no_new_scene() -> None:
+    found, _ = following()
+    found.first_moment()
+    what = described(frame_of(9), [])
+    assert not found.turn_to(what, found.world_of(what, lambda deployment: {}))
+    moment = found.first_moment()
+    assert moment is not None and moment.tick == 9
+
+
+def test_time_that_goes_back_is_a_jump() -> None:
+    found, world = following()
+    found.first_moment()
+    jumps = []
+    for tick in (6, 7, 3, 4):
+        moment = found.show(world, frame_of(tick), world.drawing.moment(frame_of(tick)))
+        assert moment is not None
+        jumps.append(moment.jump)
+    assert jumps == [False, False, True, False]
+
+
+def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "state": state,
+        "ticks": 5,
+        "tick_ns": 2_000_000,
+        "recoveries": [],
+        "requests": list(requests),
+        "links": [],
+        "score": None,
+        "watched": {},
+    }
+
+
+def test_a_request_names_the_browser_that_asked_and_is_marked_once() -> None:
+    found, _ = following()
+    found.first_moment()
+    found.asked("operator-1-abc", 5, "pause", "browser 2")
+    entry = {"tick": 5, "verb": "pause", "text": "paused at tick 5", "who": "operator-1-abc", "accepted": True}
+    other = {**entry, "tick": 4, "verb": "rate", "text": "pace 2x from tick 4", "who": "operator-9-xyz"}
+    messages = {message["type"]: message for message in found.take_status(status("paused", other, entry))}
+    assert [entry["who"] for entry in messages["status"]["status"]["requests"]] == ["operator-9-xyz", "browser 2"]
+    texts = [mark["text"] for mark in messages["marks"]["marks"]]
+    assert texts == ["operator-9-xyz: pace 2x from tick 4", "browser 2: paused at tick 5"]
+    standing = found.standing_moment()
+    assert standing is not None and standing.paused
+    assert found.standing_moment() is None
+    assert "marks" not in {message["type"] for message in found.take_status(status("paused", other, entry))}
+
+
+def test_what_this_world_does_not_have_is_not_asked_for() -> None:
+    found, _ = following()
+    wanted = Wanted(1, 500.0, links=(("camera", "player-red"), ("a", "b")), readings=(("camera", "ball"), ("x", "y")))
+    asked = found.watch_arguments(wanted, 100.0)
+    assert asked == {"hz": 100.0, "links": [("camera", "player-red")], "readings": [("camera", "ball")]}
+
+
+def test_contacts_are_where_balls_touch_something() -> None:
+    layout = build_layout(table())
+    values = np.zeros(layout.size)
+    ball = layout["ball"].offsets
+    values[ball["position"] : ball["position"] + 3] = 1.0, 2.0, 3.0
+    values[ball["contacts"] : ball["contacts"] + 2] = 2.0, 0.5
+    content = Overlays(table(), layout).content(Frame(7, layout, values), {"contacts"})
+    assert content["contacts"] == [(1.0, 2.0, 3.0, 0.5)]
+    assert content["rays"] == []
+
+
+def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None:
+    deployment = load_deployment(fleet_text(1), "hall")
+    frame = initial_frame(deployment)
+    rays = np.array(Overlays(deployment, frame.layout).content(frame, {"rays"})["rays"])
+    sensor = next(s for s in deployment.robots["rover01"].sensors.values() if s.kind == "proximity")
+    radius = deployment.hall.rover.radius
+    assert rays.shape == (sensor.rays, 6)
+    rays[:, (0, 3)] -= frame.at("rover01", "position")
+    rays[:, (1, 4)] -= frame.at("rover01", "position", 1)
+    np.testing.assert_allclose(np.hypot(*rays[:, :2].T), radius, atol=1e-3)
+    ways = np.hypot(*(rays[:, 3:5] - rays[:, :2]).T)
+    assert ways.max() <= sensor.range + 1e-3
+    heading = frame.at("rover01", "heading")
+    np.testing.assert_allclose(np.arctan2(rays[0, 1], rays[0, 0]), heading, atol=1e-3)

@@ -1,0 +1,104 @@
+"""What the vHub keeps for people of links and readings that they look at: the last drops, the last readings.
+
+Nothing is kept of what nobody looks at, and nothing of it is in the state, the journal or the capture: a run is the
+same whoever looks. Neighbours: `core` closes ticks, `report` sends what is kept, `supervisor.viewing` says what is
+looked at, `supervisor.drops_shown` tells of the drops.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import msgspec
+
+from foosim.protocol.codec import encode_json
+from foosim.protocol.messages import RobotPacket
+from foosim.protocol.view_messages import Watched
+from foosim.vhub.packet import IN_FLIGHT, Flight
+from foosim.vhub.state import HubState
+from foosim.vhub.to_rows import packet_row
+
+DROPS_KEPT: Final = 8
+"""Of each link."""
+READINGS_KEPT: Final = 128
+"""Of each channel of a robot."""
+REPORT_BYTES_MAX: Final = 96 * 1024
+"""Of drops, of readings, and of events that were asked of the network, in a report: the newest are told."""
+_NUMBER_BYTES: Final = 8
+
+Pair = tuple[str, str]
+
+
+class Watching:
+    """What is looked at, and what is kept of it."""
+
+    def __init__(self) -> None:
+        self.links: dict[Pair, deque[Flight]] = {}
+        """By source and destination, the packets that were dropped last."""
+        self.readings: dict[Pair, deque[bytes]] = {}
+        """By robot and channel, the last readings as JSON: the tick and its numbers."""
+
+    def take(self, watched: Watched, payload: bytes, now_ns: int) -> None:
+        """From now on keep of these links and readings; what there is of others goes."""
+        self.links = {pair: self.links.get(pair, deque(maxlen=DROPS_KEPT)) for pair in sorted(watched.links)}
+        kept = self.readings
+        self.readings = {pair: kept.get(pair, deque(maxlen=READINGS_KEPT)) for pair in sorted(watched.readings)}
+
+    def sensed(self, tick: int, packets: Iterable[RobotPacket]) -> None:
+        """Keep what robots sent of the readings that are looked at."""
+        for packet in packets:
+            kept = self.readings.get((packet.robot, packet.channel))
+            count, rest = divmod(len(packet.payload), _NUMBER_BYTES)
+            if kept is not None and not rest:
+                kept.append(encode_json([tick, struct.unpack(f"<{count}d", packet.payload)]))
+
+    def judged(self, flights: Iterable[Flight]) -> None:
+        """Keep the packets that were dropped on the links that are looked at."""
+        for flight in flights:
+            if flight.cause and flight.cause != IN_FLIGHT:
+                kept = self.links.get((flight.source, flight.destination))
+                if kept is not None:
+                    kept.append(flight)
+
+    def report(self, state: HubState) -> dict[str, Any]:
+        """Return what is told of it, empty while nobody looks.
+
+        `drops` has for each link, `FROM>TO`, its last packets that were dropped, as rows of a capture without their
+        payloads, oldest first; `readings` for each `ROBOT/CHANNEL` its last readings, [tick, [numbers]]; `asked` the
+        events that were asked of the network, [tick, event as JSON], and `here` the clients that take part, for who
+        explains the drops.
+        """
+        if not self.links and not self.readings:
+            return {}
+        rows = {f"{a}>{b}": [_row(flight) for flight in flights] for (a, b), flights in self.links.items()}
+        readings = {f"{robot}/{channel}": list(kept) for (robot, channel), kept in self.readings.items()}
+        asked = [encode_json(event) for event in state.fabric.asked] if self.links else []
+        watched = {
+            "drops": _newest(rows),
+            "readings": _newest(readings),
+            "asked": _newest({"": asked})[""],
+            "here": sorted(name for name, member in state.members.items() if member.active),
+        }
+        return {"watched": watched}
+
+
+def _row(flight: Flight) -> bytes:
+    return encode_json(msgspec.structs.replace(packet_row(flight), payload=b""))
+
+
+def _newest(kept: Mapping[str, list[bytes]]) -> dict[str, list[msgspec.Raw]]:
+    """Return the last of each that fit into an equal share of a report, in their order."""
+    share = REPORT_BYTES_MAX // max(1, len(kept))
+    told: dict[str, list[msgspec.Raw]] = {}
+    for name, contents in kept.items():
+        left, chosen = share, []
+        for content in reversed(contents):
+            left -= len(content)
+            if left < 0:
+                break
+            chosen.append(msgspec.Raw(content))
+        told[name] = chosen[::-1]
+    return told
