@@ -28,6 +28,7 @@ from bench import (
     table_one_process,
     verdict,
     vhub_loss,
+    view,
     warehouse,
     whatif,
 )
@@ -87,6 +88,7 @@ BENCHES: Final = (
         certificates.lines,
     ),
     Bench("realtime", "the same in real time", with_default(realtime.realtime), realtime.lines),
+    Bench("view", "the same as fast as it goes, looked at and not, by turns", with_default(view.view), view.lines),
     Bench("hub", "packets through the vHub's core", with_default(hub.hub), hub.lines),
     Bench(
         "packets",
