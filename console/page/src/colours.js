@@ -70,8 +70,8 @@ export const MARKS = /** @type {Record<string, {colour: string, sign: string, te
   drops: { colour: "#d55e00", sign: "✕", text: "drops" },
   request: { colour: "#009e73", sign: "●", text: "requests" },
   network: { colour: "#009e73", sign: "◉", text: "network" },
-  add: { colour: "#009e73", sign: "＋", text: "additions" },
-  remove: { colour: "#009e73", sign: "－", text: "removals" },
+  add: { colour: "#009e73", sign: "+", text: "additions" },
+  remove: { colour: "#009e73", sign: "−", text: "removals" },
   push: { colour: "#009e73", sign: "➤", text: "pushes" },
   move: { colour: "#009e73", sign: "⇄", text: "moves" },
 });

@@ -93,10 +93,7 @@ export class View3D {
     store.on("scene", (source) => this._build(source));
     store.on("poses", (source) => {
       const world = this.worlds.get(source.info.id);
-      if (world) world.paths.add(source.poses, source.info.tick_ns / 1e9);
-    });
-    store.on("marks", (source) => {
-      if (source.marks.at(-1)?.kind === "goal") this.worlds.get(source.info.id)?.paths.cutHere();
+      if (world) world.paths.add(source.poses, source.info.tick_ns / 1e9, source.marks);
     });
     store.on("drops", ({ source, drops }) => {
       const world = this.worlds.get(source.info.id);
