@@ -16,7 +16,7 @@ export PYTHONDONTWRITEBYTECODE :=
 WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats machines lint bench compiled clean environment
+.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats machines lint page bench compiled clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim-supervisor up)'
@@ -31,6 +31,7 @@ help:
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
 	@echo 'make machines  further cuts between machines: needs root, see docs/testing.md'
 	@echo 'make lint    ruff and mypy alone'
+	@echo 'make page    lint and type check the page of the console, and bundle it into console/www: needs npm'
 	@echo 'make compiled  .venv-compiled: foosim with its hot path compiled, as pip installs it where a C compiler is'
 	@echo 'make bench   measure speed, latency and throughput of that (ARGS: options of the bench)'
 	@echo 'make clean   remove environments, caches and builds; captures stay'
@@ -81,6 +82,11 @@ lint: environment
 	@for package in $(PACKAGES); do ln -sfn ../../$$package .typecheck/foosim/$$package; done
 	@$(PYTHON) -m mypy .typecheck/foosim tests $(wildcard bench)
 
+# What is checked in is what this makes: tests/console/test_page_bundle.py compares.
+page:
+	@sh tools/page.sh check
+	@sh tools/page.sh build console/www
+
 bench: compiled
 	@.venv-compiled/bin/python -m bench $(ARGS)
 
@@ -91,5 +97,5 @@ environment:
 	@sh tools/environment.sh
 
 clean:
-	rm -rf .venv .venv-uv .venv-compiled .typecheck .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
+	rm -rf .venv .venv-uv .venv-compiled .typecheck .page .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
 	find $(wildcard $(PACKAGES) tests bench) -type d -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,160 @@
+// The tab "World": what the rules say, the bodies, and what can be done with the one that is selected.
+
+import { dialog, vector } from "./dialogs.js";
+import { counted, number, time } from "./text.js";
+import { button, byId, field, h, keyed, select, setText } from "./ui.js";
+
+const ROWS_MAX = 400;
+
+export class Entities {
+  /**
+   * @param {import("./store.js").Store} store
+   * @param {import("./desk.js").Desk} desk
+   * @param {{follow: () => void, plot: (entity: string) => void}} actions
+   */
+  constructor(store, desk, actions) {
+    this.store = store;
+    this.desk = desk;
+    this.actions = actions;
+    this.facts = h("dl", { class: "facts" });
+    this.filter = h("input", { type: "search", placeholder: "Find an entity", "aria-label": "Find an entity", oninput: () => this.draw() });
+    this.list = h("ul", { class: "entities", "aria-label": "Entities" });
+    this.detail = h("section", { class: "detail", "aria-label": "Selected entity" });
+    this.add = button("Add …", () => this.askAdd(), { id: "add" });
+    byId("panel-world").append(
+      h("section", {}, h("h2", {}, "State"), this.facts),
+      h("section", { class: "fill" }, h("div", { class: "row" }, h("h2", {}, "Entities"), this.filter, this.add), this.list),
+      this.detail,
+    );
+    for (const name of ["scene", "status", "selected", "sources", "connected"]) store.on(name, () => this.draw());
+    this.draw();
+  }
+
+  draw() {
+    const source = this.store.main;
+    if (!source) return;
+    this._draw_facts(source);
+    const wanted = this.filter.value.trim().toLowerCase();
+    const bodies = (source.scene?.bodies ?? []).filter(({ name, model }) => `${name} ${model}`.toLowerCase().includes(wanted));
+    keyed(
+      this.list,
+      bodies.slice(0, ROWS_MAX),
+      (body) => `${body.name} ${body.model}`,
+      (body) => {
+        const choose = h("button", { type: "button", onclick: () => this.store.select(this.store.selected === body.name ? "" : body.name) });
+        choose.append(h("b", {}, body.name), h("span", {}, body.model), h("i"));
+        return h("li", {}, choose);
+      },
+      (row, body) => {
+        const choose = /** @type {HTMLElement} */ (row.firstElementChild);
+        choose.setAttribute("aria-pressed", String(body.name === this.store.selected));
+        setText(/** @type {Element} */ (choose.lastElementChild), source.ownerOf(body.name));
+      },
+    );
+    this.add.hidden = !source.may("add") || !source.scene?.addable.length;
+    this.add.disabled = !this.desk.may("add");
+    this._draw_detail(source);
+  }
+
+  /** @param {import("./store.js").Source} source */
+  _draw_facts(source) {
+    const { status } = source;
+    /** @type {[string, string][]} */
+    const facts = [];
+    if (status?.score) facts.push(["Score", `red ${status.score.red} : ${status.score.blue} blue`]);
+    if (status?.ball) {
+      const [x, y, z] = status.ball.position;
+      facts.push(["Ball", `${number(x)}, ${number(y)}, ${number(z)} m${status.ball.solver ? `, solved by ${status.ball.solver}` : ""}`]);
+    }
+    if (status?.rovers) {
+      const { count, drive, least, charge } = status.rovers;
+      facts.push(["Rovers", `${count}, ${drive} drive; ${least} has ${Math.round(charge * 100)} % of its charge`]);
+    }
+    if (status?.epoch !== undefined) facts.push(["Epoch", String(status.epoch)]);
+    if (status?.handovers !== undefined) facts.push(["So far", `${counted(status.handovers, "hand-over")}, ${counted(status.moves ?? 0, "move")}`]);
+    if (status?.recording?.state) facts.push(["Capture", [status.recording.state, status.recording.problem].filter(Boolean).join(": ")]);
+    if (status?.waiting_for) facts.push(["Waits for", status.waiting_for]);
+    if (status?.reason) facts.push(["Ended", status.reason]);
+    const { span } = source.info;
+    if (span) facts.push(["Span", `${time(source.seconds(span.first))} to ${time(source.seconds(span.last))}`]);
+    if (source.scene) facts.push(["Scene", `${counted(source.scene.bodies.length, "entity", "entities")}, ${counted(source.scene.links.length, "link")}`]);
+    keyed(this.facts, facts, ([name]) => name, ([name]) => h("div", {}, h("dt", {}, name), h("dd")), (row, [, text]) => setText(/** @type {Element} */ (row.lastElementChild), text));
+  }
+
+  /** @param {import("./store.js").Source} source */
+  _draw_detail(source) {
+    const body = source.scene?.bodies.find(({ name }) => name === this.store.selected);
+    this.detail.hidden = !body;
+    if (!body) return;
+    const owner = source.ownerOf(body.name);
+    const key = [body.name, owner, body.pushable, body.removable, source.info.verbs, this.desk.connection.connected].join(" ");
+    if (this.detail.dataset.drawn === key) return;
+    this.detail.dataset.drawn = key;
+    const may = (/** @type {string} */ verb) => this.desk.may(verb);
+    const owned = Object.values(source.status?.nodes ?? {}).some((/** @type {any} */ node) => node.owned?.includes(body.name));
+    const actions = [
+      button("Follow", this.actions.follow, { title: "Keep the view on it (F)" }),
+      button("Plot …", () => this.actions.plot(body.name)),
+      body.pushable && source.may("push") ? button("Push …", () => this.askPush(body.name), { disabled: !may("push"), id: "push" }) : null,
+      owned && source.may("move") ? button("Move …", () => this.askMove(body.name), { disabled: !may("move"), id: "move" }) : null,
+      body.removable && source.may("remove") ? button("Remove …", () => this.askRemove(body.name), { disabled: !may("remove"), id: "remove", class: "danger" }) : null,
+    ].filter((one) => one !== null);
+    this.detail.replaceChildren(
+      h("h2", {}, body.name),
+      h("p", {}, `${body.model}, ${counted(body.links.length, "link")}${owner ? `, computed by ${owner}` : ""}`),
+      h("div", { class: "row" }, ...actions),
+    );
+  }
+
+  async askAdd() {
+    const addable = this.store.main?.scene?.addable ?? [];
+    const model = select(addable.map(({ model: name }) => [name, name]), addable[0]?.model ?? "");
+    const name = h("input", { placeholder: "chosen for you", maxlength: 64 });
+    const position = h("input", { value: (addable[0]?.position ?? [0, 0, 0]).join(" "), required: true });
+    const velocity = h("input", { value: (addable[0]?.velocity ?? [0, 0, 0]).join(" "), required: true });
+    const content = [field("Model", model), field("Name", name), field("Position (m)", position, "x y z in the world"), field("Velocity (m/s)", velocity)];
+    await dialog("Add an entity", content, {
+      action: "Add",
+      send: () => {
+        const at = vector(position.value, "Position");
+        const speed = vector(velocity.value, "Velocity");
+        if (typeof at === "string") return at;
+        if (typeof speed === "string") return speed;
+        return this.desk.ask("add", { ...(name.value ? { name: name.value } : {}), position: at, velocity: speed });
+      },
+    });
+  }
+
+  /** @param {string} name */
+  async askPush(name) {
+    const impulse = h("input", { value: "0.05 0 0", required: true });
+    await dialog(`Push ${name}`, [field("Impulse (N s)", impulse, "x y z in the world")], {
+      action: "Push",
+      send: () => {
+        const given = vector(impulse.value, "Impulse");
+        return typeof given === "string" ? given : this.desk.ask("push", { name, impulse: given });
+      },
+    });
+  }
+
+  /** @param {string} robot */
+  async askMove(robot) {
+    const source = this.store.main;
+    const owner = source?.ownerOf(robot) ?? "";
+    const nodes = Object.keys(source?.status?.nodes ?? {}).filter((node) => node !== owner);
+    const node = select(nodes.map((name) => [name, name]), nodes[0] ?? "");
+    await dialog(`Move ${robot}`, [field("To the node", node, `${owner} has it now; the world does not notice.`)], {
+      action: "Move",
+      send: () => this.desk.ask("move", { robot, node: node.value }),
+    });
+  }
+
+  /** @param {string} name */
+  async askRemove(name) {
+    await dialog(`Remove ${name}?`, [h("p", {}, `${name} leaves the world at the next tick.`)], {
+      action: "Remove",
+      danger: true,
+      send: () => this.desk.ask("remove", { name }),
+    });
+  }
+}

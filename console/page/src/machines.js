@@ -1,0 +1,219 @@
+// The tab "Machines": nodes with what they own, load, lag, who is waited for; recoveries. Robots are dragged to nodes.
+
+import { coloursOf, paletteColour } from "./colours.js";
+import { confirmed, dialog } from "./dialogs.js";
+import { timeChart } from "./plots.js";
+import { Ring } from "./ring.js";
+import { counted, milliseconds, number, percent } from "./text.js";
+import { button, byId, h, keyed, setText } from "./ui.js";
+
+const SPAN_S = 120;
+const DRAG_PX = 6;
+const ROBOTS_SHOWN_MAX = 60;
+const RECOVERIES_SHOWN = 50;
+
+/** @param {any} entry of the account of recoveries */
+export function recoveryText(entry) {
+  const texts = /** @type {Record<string, string>} */ ({
+    node: `lost node ${entry.name} (${entry.reason})`,
+    join: `node ${entry.name} takes part`,
+    supervisor: "the supervisor was started again",
+    vhub: `lost the vHub (${entry.reason})`,
+    player: `lost ${entry.name} (${entry.reason})`,
+    return: `${entry.name} takes part again`,
+  });
+  const after = entry.outage_ms === null ? "" : `, went on after ${number(entry.outage_ms, 2)} ms`;
+  return `${texts[entry.what] ?? `${entry.what} ${entry.name}`}${after}, epoch ${entry.epoch}`;
+}
+
+export class Machines {
+  /** @param {import("./store.js").Store} store @param {import("./desk.js").Desk} desk */
+  constructor(store, desk) {
+    this.store = store;
+    this.desk = desk;
+    this.lags = new Ring(6000);
+    this.head = h("p", { class: "summary" });
+    this.balance = button("Balance …", () => void this.askBalance(), { id: "balance", title: "Give every node as many robots" });
+    this.nodes = h("div", { class: "nodes", "aria-label": "Nodes" });
+    this.others = h("tbody");
+    this.recoveries = h("ol", { class: "recoveries", "aria-label": "Recoveries" });
+    const lag = h("div");
+    this.chart = timeChart(lag, { unit: "lag (ms)", height: 140 });
+    const columns = ["Process", "Role", "Load", "Waits for"].map((name) => h("th", { scope: "col", class: "left" }, name));
+    byId("panel-machines").append(
+      h("section", {}, h("div", { class: "row" }, h("h2", {}, "Nodes"), this.balance), this.head, this.nodes),
+      h("section", {}, h("h2", {}, "Lag of ticks"), lag),
+      h("section", {}, h("h2", {}, "Other processes"), h("table", {}, h("thead", {}, h("tr", {}, ...columns)), this.others)),
+      h("section", {}, h("h2", {}, "Recoveries"), this.recoveries),
+    );
+    store.on("status", (source) => {
+      if (source.info.id !== 0) return;
+      if (source.status?.late) this.lags.push(source.status.ticks, source.status.late.lag_ms);
+      this.draw();
+    });
+    for (const name of ["sources", "connected"]) store.on(name, () => this.draw());
+    store.on("theme", () => this.chart.redraw());
+  }
+
+  draw() {
+    const source = this.store.main;
+    const status = source?.status;
+    if (!source || !status || byId("panel-machines").hidden) return;
+    const lag = status.lag_ms;
+    const late = status.late?.waited_for ? `; tick ${status.late.tick} waited for ${status.late.waited_for}` : "";
+    setText(this.head, lag ? `Epoch ${status.epoch}. Lag p50 ${milliseconds(lag.p50)}, p99 ${milliseconds(lag.p99)}, max ${milliseconds(lag.max)}${late}` : `Epoch ${status.epoch ?? "–"}.`);
+    const nodes = Object.entries(status.nodes ?? {});
+    const colours = coloursOf(nodes.map(([name]) => name));
+    keyed(this.nodes, nodes, ([name]) => name, ([name]) => this._card(name), (card, [name, node]) => this._fill(card, name, node, status, colours));
+    this.balance.hidden = !source.may("move") || nodes.length < 2;
+    this.balance.disabled = !this.desk.may("move");
+    const others = Object.entries(status.processes ?? {}).filter(([name]) => !(name in (status.nodes ?? {})));
+    keyed(this.others, others, ([name]) => name, () => h("tr", {}, h("th", { scope: "row", class: "left" }), h("td", { class: "left" }), h("td"), h("td", { class: "left" })), (row, [name, process]) => {
+      [name, process.role, percent(process.busy, 0), doing(process)].forEach((text, index) => setText(row.children[index], text));
+    });
+    const recoveries = [...(status.recoveries ?? [])].reverse().slice(0, RECOVERIES_SHOWN);
+    keyed(this.recoveries, recoveries, (entry) => JSON.stringify(entry), (entry) => h("li", {}, h("b", {}, `${source.seconds(entry.tick).toFixed(3)} s`), ` tick ${entry.tick}: ${recoveryText(entry)}`));
+    if (!recoveries.length) this.recoveries.replaceChildren(h("li", { class: "hint" }, "Nothing was lost so far."));
+    const first = source.tick - SPAN_S / (source.info.tick_ns / 1e9);
+    this.chart.update([{ name: "lag", unit: "ms", points: this.lags.window(first, source.tick, 300).map(([tick, value]) => [source.seconds(tick), value]) }]);
+  }
+
+  /** @param {string} name */
+  _card(name) {
+    const toggle = button("", () => void this.toggle(name), {});
+    return h(
+      "article",
+      { class: "node", "data-node": name, "aria-label": `Node ${name}` },
+      h("header", {}, h("i", { class: "swatch", "aria-hidden": "true" }), h("h3", {}, name), h("span", { class: "doing" }), toggle),
+      h("div", { class: "load" }, h("i", { "aria-hidden": "true" }), h("span")),
+      h("div", { class: "robots" }),
+      h("p", { class: "hint" }),
+    );
+  }
+
+  /**
+   * @param {HTMLElement} card @param {string} name @param {any} node @param {Status} status
+   * @param {Map<string, string>} colours
+   */
+  _fill(card, name, node, status, colours) {
+    const process = status.processes?.[name];
+    const [header, load, robots, more] = /** @type {HTMLElement[]} */ ([...card.children]);
+    /** @type {HTMLElement} */ (header.children[0]).style.background = colours.get(name) ?? paletteColour(7);
+    setText(header.children[2], doing(process));
+    const toggle = /** @type {HTMLButtonElement} */ (header.children[3]);
+    const gone = !process || process.stopped || process.lost;
+    setText(toggle, gone ? "Start" : "Stop …");
+    toggle.className = gone ? "" : "danger";
+    toggle.hidden = !this.store.main?.may(gone ? "start" : "stop");
+    toggle.disabled = !this.desk.may(gone ? "start" : "stop");
+    const busy = process?.busy ?? 0;
+    load.style.setProperty("--share", String(Math.min(1, busy)));
+    setText(load.children[1], `load ${percent(busy, 0)}, ${counted(node.owned.length, "robot")}${process?.host ? `, on ${process.host}` : ""}`);
+    const mayMove = this.desk.may("move");
+    keyed(robots, node.owned.slice(0, ROBOTS_SHOWN_MAX), (/** @type {string} */ robot) => robot, (/** @type {string} */ robot) => this._chip(robot), (chip) => chip.classList.toggle("movable", mayMove));
+    const hidden = node.owned.length - ROBOTS_SHOWN_MAX;
+    setText(more, hidden > 0 ? `and ${hidden} more` : node.owned.length ? "" : "owns no robot");
+  }
+
+  /** A robot, to be dragged to another node, or moved by its button. @param {string} robot */
+  _chip(robot) {
+    const chip = h("button", { type: "button", class: "chip", title: `${robot}: drag it to a node, or press Enter to move it` }, robot);
+    /** @type {{x: number, y: number, ghost: HTMLElement | null} | null} */
+    let drag = null;
+    chip.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0 || !chip.classList.contains("movable")) return;
+      chip.setPointerCapture(event.pointerId);
+      drag = { x: event.clientX, y: event.clientY, ghost: null };
+    });
+    chip.addEventListener("pointermove", (event) => {
+      if (!drag) return;
+      if (!drag.ghost && Math.hypot(event.clientX - drag.x, event.clientY - drag.y) < DRAG_PX) return;
+      drag.ghost ??= document.body.appendChild(h("div", { class: "chip dragged" }, robot));
+      drag.ghost.style.transform = `translate(${event.clientX}px, ${event.clientY}px)`;
+      this._mark(nodeAt(event.clientX, event.clientY));
+    });
+    const finish = (/** @type {PointerEvent} */ event, /** @type {boolean} */ dropped) => {
+      if (!drag) return;
+      const { ghost } = drag;
+      drag = null;
+      ghost?.remove();
+      this._mark("");
+      const node = ghost && dropped ? nodeAt(event.clientX, event.clientY) : "";
+      if (node && node !== this.store.main?.ownerOf(robot)) void this.desk.ask("move", { robot, node });
+      else if (dropped && !ghost) this.store.select(robot);
+    };
+    chip.addEventListener("pointerup", (event) => finish(event, true));
+    chip.addEventListener("pointercancel", (event) => finish(event, false));
+    chip.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" || !this.desk.may("move")) return;
+      event.preventDefault();
+      this.store.emit("move", robot);
+    });
+    return chip;
+  }
+
+  /** @param {string} node the one that a robot would be dropped on */
+  _mark(node) {
+    for (const card of this.nodes.children) card.classList.toggle("target", /** @type {HTMLElement} */ (card).dataset.node === node);
+  }
+
+  /** @param {string} name */
+  async toggle(name) {
+    const process = this.store.main?.status?.processes?.[name];
+    if (!process || process.stopped || process.lost) {
+      await this.desk.ask("start", { node: name });
+      return;
+    }
+    const text = `Its robots move to the other nodes first. The world does not notice; the node can be started again.`;
+    if (await confirmed(`Stop node ${name}?`, text, "Stop node")) await this.desk.ask("stop", { node: name });
+  }
+
+  /** Moves that give every node that takes part as many robots, one more or less. */
+  moves() {
+    const status = this.store.main?.status;
+    const here = Object.entries(status?.nodes ?? {}).filter(([name]) => {
+      const process = status.processes?.[name];
+      return process && !process.stopped && !process.lost;
+    });
+    const owned = new Map(here.map(([name, node]) => [name, [.../** @type {any} */ (node).owned]]));
+    /** @type {{robot: string, from: string, node: string}[]} */
+    const moves = [];
+    for (;;) {
+      const order = [...owned].sort((a, b) => b[1].length - a[1].length);
+      if (order.length < 2 || order[0][1].length - order[order.length - 1][1].length < 2) return moves;
+      const robot = order[0][1].pop();
+      order[order.length - 1][1].push(robot);
+      moves.push({ robot, from: order[0][0], node: order[order.length - 1][0] });
+    }
+  }
+
+  async askBalance() {
+    const moves = this.moves();
+    const list = moves.map(({ robot, from, node }) => h("li", {}, `${robot}: ${from} → ${node}`));
+    const content = moves.length ? [h("p", {}, `${counted(moves.length, "robot")} would move; the world does not notice.`), h("ul", { class: "scroll" }, ...list)] : [h("p", {}, "The nodes own as many robots each already.")];
+    await dialog("Balance the nodes", content, {
+      action: moves.length ? "Move them" : "Done",
+      send: async () => {
+        for (const { robot, node } of moves) {
+          const wrong = await this.desk.ask("move", { robot, node });
+          if (wrong) return wrong;
+        }
+        return "";
+      },
+    });
+  }
+}
+
+/** @param {any} process */
+function doing(process) {
+  if (!process) return "not here yet";
+  if (process.stopped) return "stopped";
+  if (process.lost) return "lost";
+  return process.waiting_for ? `waits for ${process.waiting_for}` : "";
+}
+
+/** The node whose card is at a place of the window. @param {number} x @param {number} y */
+function nodeAt(x, y) {
+  const card = /** @type {HTMLElement | null | undefined} */ (document.elementFromPoint(x, y)?.closest("[data-node]"));
+  return card?.dataset.node ?? "";
+}

@@ -1,0 +1,108 @@
+// Shapes of links as instances: one mesh for each kind of geometry, so a world of a thousand robots is a few draw calls.
+
+import {
+  BoxGeometry, BufferAttribute, BufferGeometry, CylinderGeometry, DynamicDrawUsage, InstancedMesh, Matrix4,
+  MeshLambertMaterial, Quaternion, SphereGeometry, Vector3,
+} from "three";
+import { FLOATS_PER_LINK, decodeMesh } from "./messages.js";
+
+/** @typedef {{shape: Shape, link: number}} Placed a shape and its link; -1: it never moves */
+
+const at = new Vector3();
+const turn = new Quaternion();
+const one = new Vector3(1, 1, 1);
+const whole = new Matrix4();
+
+/**
+ * The matrix of a link from the poses of all. @param {Float32Array} poses @param {number} link @param {Matrix4} into
+ */
+export function linkMatrix(poses, link, into) {
+  const start = link * FLOATS_PER_LINK;
+  at.set(poses[start], poses[start + 1], poses[start + 2]);
+  turn.set(poses[start + 3], poses[start + 4], poses[start + 5], poses[start + 6]);
+  return into.compose(at, turn, one);
+}
+
+/** The matrix of a shape in its link, with its size: geometries are of unit size. @param {Shape} shape */
+function localMatrix(shape) {
+  const size = new Vector3(1, 1, 1);
+  if (shape.kind === "box" && shape.half) size.fromArray(shape.half).multiplyScalar(2);
+  if (shape.kind === "sphere") size.setScalar(shape.radius ?? 1);
+  if (shape.kind === "cylinder") size.set(shape.radius ?? 1, shape.radius ?? 1, shape.length ?? 1);
+  return new Matrix4().compose(new Vector3(...shape.position), new Quaternion(...shape.orientation), size);
+}
+
+/** @param {string} kind @param {{vertices: string, triangles: string} | undefined} mesh */
+function geometryOf(kind, mesh) {
+  if (kind === "box") return new BoxGeometry(1, 1, 1);
+  if (kind === "sphere") return new SphereGeometry(1, 24, 16);
+  if (kind === "cylinder") return new CylinderGeometry(1, 1, 1, 24).rotateX(Math.PI / 2);
+  const geometry = new BufferGeometry();
+  if (mesh) {
+    const { vertices, triangles } = decodeMesh(mesh);
+    geometry.setAttribute("position", new BufferAttribute(vertices, 3));
+    geometry.setIndex(new BufferAttribute(triangles, 1));
+    geometry.computeVertexNormals();
+  }
+  return geometry;
+}
+
+/** All shapes of one geometry. */
+class Batch {
+  /** @param {BufferGeometry} geometry @param {Placed[]} placed @param {number} opacity */
+  constructor(geometry, placed, opacity) {
+    this.placed = placed;
+    this.locals = placed.map(({ shape }) => localMatrix(shape));
+    const material = new MeshLambertMaterial({ transparent: opacity < 1, opacity, depthWrite: opacity === 1 });
+    this.mesh = new InstancedMesh(geometry, material, placed.length);
+    this.mesh.instanceMatrix.setUsage(DynamicDrawUsage);
+    this.mesh.frustumCulled = false;
+    this.mesh.userData.batch = this;
+    this.locals.forEach((local, index) => this.mesh.setMatrixAt(index, local));
+  }
+
+  /** @param {Matrix4[]} links */
+  place(links) {
+    this.placed.forEach(({ link }, index) => {
+      if (link >= 0) this.mesh.setMatrixAt(index, whole.multiplyMatrices(links[link], this.locals[index]));
+    });
+    this.mesh.instanceMatrix.needsUpdate = true;
+    this.mesh.boundingSphere = null;
+  }
+
+  /** @param {(placed: Placed) => import("three").Color} colourOf */
+  paint(colourOf) {
+    this.placed.forEach((placed, index) => this.mesh.setColorAt(index, colourOf(placed)));
+    if (this.mesh.instanceColor) this.mesh.instanceColor.needsUpdate = true;
+  }
+
+  dispose() {
+    this.mesh.geometry.dispose();
+    /** @type {MeshLambertMaterial} */ (this.mesh.material).dispose();
+    this.mesh.dispose();
+  }
+}
+
+/**
+ * The batches of a scene: opaque ones and, for each opacity, see-through ones.
+ * @param {SceneMessage} scene
+ * @param {number} opacity of all of it, for a ghost
+ * @returns {Batch[]}
+ */
+export function batchesOf(scene, opacity) {
+  /** @type {Placed[]} */
+  const placed = opacity < 1 ? [] : scene.scenery.map((shape) => ({ shape, link: -1 }));
+  scene.links.forEach((link, index) => placed.push(...link.shapes.map((shape) => ({ shape, link: index }))));
+  /** @type {Map<string, Placed[]>} */
+  const groups = new Map();
+  for (const one of placed) {
+    const key = `${one.shape.kind} ${one.shape.mesh ?? ""} ${one.shape.colour[3] * opacity}`;
+    const group = groups.get(key);
+    if (group) group.push(one);
+    else groups.set(key, [one]);
+  }
+  return [...groups.values()].map((group) => {
+    const { kind, mesh, colour } = group[0].shape;
+    return new Batch(geometryOf(kind, scene.meshes[mesh ?? ""]), group, colour[3] * opacity);
+  });
+}

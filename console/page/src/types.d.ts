@@ -1,0 +1,132 @@
+// What goes over the WebSocket and between the modules. Ambient: every module sees these names.
+
+type Vec3 = [number, number, number];
+type Quat = [number, number, number, number];
+type Rgba = [number, number, number, number];
+
+interface Shape {
+  kind: "box" | "sphere" | "cylinder" | "mesh";
+  half?: Vec3;
+  radius?: number;
+  length?: number;
+  mesh?: string;
+  position: Vec3;
+  orientation: Quat;
+  colour: Rgba;
+  name: string;
+}
+
+interface SceneLink { name: string; body: string; shapes: Shape[] }
+interface SceneBody { name: string; model: string; links: number[]; removable: boolean; pushable: boolean }
+interface SceneField { entity: string; field: string; unit: string; index: number; count: number }
+interface SceneSensor { robot: string; channel: string; kind: string; unit: string }
+interface Addable { model: string; position: Vec3; velocity: Vec3 }
+
+interface SceneMessage {
+  type: "scene";
+  source: number;
+  generation: number;
+  layout: string;
+  links: SceneLink[];
+  scenery: Shape[];
+  bodies: SceneBody[];
+  fields: SceneField[];
+  sensors: SceneSensor[];
+  meshes: Record<string, { vertices: string; triangles: string }>;
+  bounds: [Vec3, Vec3];
+  addable: Addable[];
+}
+
+/** Poses of all links: 7 numbers each (x, y, z in m; quaternion x, y, z, w); behind them the values that are plotted. */
+interface Poses {
+  source: number;
+  jump: boolean;
+  paused: boolean;
+  generation: number;
+  tick: number;
+  links: Float32Array;
+  values: Float32Array;
+}
+
+interface SourceInfo {
+  id: number;
+  kind: "live" | "capture" | "replay" | "poses";
+  name: string;
+  world: string;
+  tick_ns: number;
+  verbs: string[];
+  span: { first: number; last: number } | null;
+}
+
+interface LinkWindow {
+  from: string;
+  to: string;
+  rule: string;
+  radio: boolean;
+  offered: number;
+  delivered: number;
+  dropped: number;
+  loss: number | null;
+  delay_ms: number | null;
+  queue_ms: number | null;
+  causes: Record<string, number>;
+  from_link: number | null;
+  to_link: number | null;
+  from_at?: Vec3 | null;
+  to_at?: Vec3 | null;
+  walls: Vec3[];
+}
+
+interface Drop { from: string; to: string; cause: string; where: "sender" | "way" | "receiver"; count: number }
+interface Mark { tick: number; kind: string; text: string }
+interface Step { stage: string; outcome: string; text: string }
+interface ExplainedDrop { tick: number; cause: string; head: string; steps: Step[]; verdict: string }
+interface WatchedMessage { source: number; link: [string, string]; rule: string; drops: ExplainedDrop[] }
+interface Answer { id: number; accepted: boolean; text: string; tick: number; verb: string; who: string }
+interface Compared { at: number; entities: { name: string; distance_m: number }[]; series: [number, number][] }
+interface Overlay {
+  source: number;
+  generation: number;
+  tick: number;
+  contacts?: [number, number, number, number][];
+  rays?: [number, number, number, number, number, number][];
+}
+
+/** The status of a run, as the supervisor answers it. */
+type Status = any;
+
+/** One line of a chart: ticks ascending, a value each; null where there is none. */
+interface Series { name: string; unit: string; points: [number, number | null][] }
+
+interface SeriesRequest {
+  id: string;
+  field?: number;
+  link?: [string, string];
+  figure?: string;
+  status?: string;
+  reading?: [string, string];
+  index?: number;
+}
+
+interface Stat {
+  frames: number;
+  tick: number;
+  generation: number;
+  connected: boolean;
+  errors: number;
+  messages: number;
+  poses: number;
+  links: number;
+  bodies: number;
+  drawn: number;
+  role: string;
+  paused: boolean;
+  marks: number;
+  contacts: number;
+  rays: number;
+  radio: number;
+  flashes: number;
+  view: string;
+}
+
+interface Window { foosim: { stat: Stat } }
