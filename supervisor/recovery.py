@@ -120,7 +120,7 @@ class Recovery:
             self._core.requests.order(self._core.released, [Thaw(robot)])
 
     def committed(self, before_ns: int, now_ns: int, tick: int) -> list[Recovered]:
-        """Frame `tick` is committed, the one before it was at `before_ns`: return what is over, as the world goes on."""
+        """Frame `tick` is committed, the one before it was at `before_ns`: return what is over: the world goes on."""
         return close_outages(self.recovered, before_ns, now_ns, tick)
 
     def as_json(self) -> list[dict[str, object]]:
