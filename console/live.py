@@ -37,6 +37,8 @@ FRAMES_MAX: Final = 8
 """That may wait to be received."""
 HZ_MAX: Final = 100.0
 ASKS_AT_ONCE: Final = 4
+OUR_ARGUMENTS: Final = frozenset({"self", "verb", "timeout_s", "give_up"})
+"""Of `Control.ask`, which a page does not give."""
 OVERLAY_S: Final = 0.1
 
 T = TypeVar("T")
@@ -69,8 +71,9 @@ class LiveSource:
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         """Ask the supervisor. Raises RequestRefused, NoAnswer, ConnectError, BadValue."""
-        if not all(key.isidentifier() and key not in ("timeout_s", "give_up", "verb") for key in arguments):
-            raise BadValue("arguments of a request have names", ", ".join(arguments))
+        wrong = [key for key in arguments if not key.isidentifier() or key in OUR_ARGUMENTS]
+        if wrong:
+            raise BadValue("no argument of a request", wrong[0])
         loop = asyncio.get_running_loop()
         answered, sender = await loop.run_in_executor(self._asking, self._ask, verb, dict(arguments))
         self._following.asked(sender, answered.tick, verb, who)
@@ -101,24 +104,25 @@ class LiveSource:
     # --- looking on --------------------------------------------------------------------------------------------------
 
     async def run(self, feed: Feed) -> None:
-        is_told = False
+        trouble = ""  # what was said last of a run that is not there
         try:
             while True:
                 try:
                     control = await self._in_thread(lambda: self._connect_view(self._closing.is_set))
                 except Refused as refused:
-                    if not is_told:
+                    if trouble != str(refused):
+                        trouble = str(refused)
                         feed.tell(_note("warning", f"{self._name} is not there: {refused}; it is looked for"))
-                        is_told = True
                     await asyncio.sleep(AGAIN_S)
                     continue
-                if is_told:
+                if trouble:
+                    trouble = ""
                     feed.tell(_note("info", f"connected to {self._name} again"))
                 try:
                     await self._follow(control, feed)
                 except Refused as refused:
+                    trouble = str(refused)
                     feed.tell(_note("warning", f"lost {self._name}: {refused}; it is looked for"))
-                    is_told = True
                     self._forget_idle()
                     await asyncio.sleep(AGAIN_S)
                 finally:
