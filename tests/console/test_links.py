@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from foosim.console.drawing import Drawing
-from foosim.console.links import Count, Links, Windows
+from foosim.console.shown.drawing import Drawing
+from foosim.console.shown.links import Count, Links, Windows
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout
 from foosim.protocol.start import initial_frame

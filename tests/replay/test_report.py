@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as replace_row
 
-from foosim.console.asked import moves
+from foosim.console.shown.asked import moves
 from foosim.protocol.scene import Box, Cylinder, Shape, turn
 from foosim.rehearsal import report_command
 from foosim.rehearsal.rehearse import rehearse
