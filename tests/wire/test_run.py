@@ -131,7 +131,7 @@ class Trips(Team):
 
     def act(self, tick, samples):
         if self.wire.exists():
-            raise LookupError("tripped")
+            raise SystemExit(0) from LookupError("tripped")
         return super().act(tick, samples)
 """
 
@@ -154,13 +154,14 @@ def test_a_player_that_is_killed_plays_again_and_one_that_raises_ends_the_run(
     code, out, err = house.end(up)
     content = last_json(out)
     raised = next(at for at, line in enumerate(TRIPS.splitlines(), 1) if "raise" in line)
-    place = f'({house.folder / "own_trips.py"}:{raised}: raise LookupError("tripped"))'
-    said, _, where = content["reason"].partition(": LookupError: tripped ")
+    place = f'({house.folder / "own_trips.py"}:{raised}: raise SystemExit(0) from LookupError("tripped"))'
+    said, _, where = content["reason"].partition(": SystemExit: 0 ")
     assert (code, content["failed"], where) == (1, True, place), err
     assert said.startswith("player-red failed at tick ") and content["reason"] in err
     assert "player-blue was killed by SIGKILL" in err and "starts again in 0.5 s" in err
     (run,) = (house.folder / "state" / "foosim" / "runs").iterdir()
-    assert "Traceback (most recent call last):" in (run / "logs" / "player-red.log").read_text()
+    log = (run / "logs" / "player-red.log").read_text()
+    assert "Traceback (most recent call last):" in log and "LookupError: tripped" in log
     assert verify_capture(house.folder / content["capture"]).equal
 
 
