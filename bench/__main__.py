@@ -15,6 +15,8 @@ from typing import Any, Final
 from bench import (
     barrier,
     certificates,
+    console,
+    console_seek,
     distributed,
     echo,
     hub,
@@ -27,6 +29,7 @@ from bench import (
     table_one_process,
     verdict,
     vhub_loss,
+    view,
     warehouse,
     whatif,
 )
@@ -86,6 +89,7 @@ BENCHES: Final = (
         certificates.lines,
     ),
     Bench("realtime", "the same in real time", with_default(realtime.realtime), realtime.lines),
+    Bench("view", "the same as fast as it goes, looked at and not, by turns", with_default(view.view), view.lines),
     Bench("hub", "packets through the vHub's core", with_default(hub.hub), hub.lines),
     Bench(
         "packets",
@@ -97,7 +101,19 @@ BENCHES: Final = (
     Bench("rays", "lines of sight through a hall of shelves and vehicles", with_default(rays.rays), rays.lines),
     Bench("whatif", "captured packets through another network", with_default(whatif.whatif), whatif.lines),
     Bench("echo", "client to node and back, in real time", with_default(echo.echo), echo.lines),
+    Bench(
+        "console",
+        "a page beside the run: what the console takes, and the run",
+        with_default(console.console),
+        console.lines,
+    ),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),
+    Bench(
+        "console-seek",
+        "the time slider of the console over ten minutes of the table",
+        with_default(console_seek.console_seek),
+        console_seek.lines,
+    ),
     Bench("swarm", "rehearsals under random faults, by seed", swarm.swarm, swarm.lines),
     Bench("vhub-loss", "the vHub is killed and comes back", with_default(vhub_loss.vhub_loss), vhub_loss.lines),
     Bench("barrier", "the messages of a tick alone", run_barrier, barrier_lines),

@@ -14,7 +14,7 @@ from typing import Any, Final, Protocol
 from foosim.console.curves import points_of
 from foosim.console.page_messages import Plot, Show, Watch
 from foosim.console.reader import Follows, Reader, Shown, TooSlow
-from foosim.console.source import About, Curve, Moment, Source, Wanted
+from foosim.console.source import About, Curve, Link, Moment, Source, Wanted
 from foosim.protocol.codec import encode_json
 from foosim.protocol.errors import Malformed
 
@@ -46,6 +46,8 @@ class Told:
     shown: Shown | None = None
     kept: dict[str, bytes] = field(default_factory=dict)
     warning: bytes = b""
+    watched: dict[Link, bytes] = field(default_factory=dict)
+    """The last message about each link that somebody watches."""
     marks: list[Mapping[str, Any]] = field(default_factory=list)
 
 
@@ -105,6 +107,9 @@ class Board:
             follows.hz, follows.overlays = message.hz, frozenset(message.overlays)
         elif isinstance(message, Watch):
             follows.link = message.link
+            known = None if message.link is None else self._told[message.source].watched.get(message.link)
+            if known is not None:
+                reader.put_newest(("watched", message.source), known)
         else:
             curves = tuple(series.curve() for series in message.series)
             new = tuple(curve for curve in curves if curve not in follows.curves)
@@ -162,6 +167,9 @@ class Board:
                 tuple(links[:WATCHED_MAX]),
                 tuple(readings[:WATCHED_MAX]),
             )
+            watched = self._told[number].watched
+            for link in [known for known in watched if known not in wanted.links]:
+                del watched[link]
             if wanted != self._wanted[number]:
                 self._wanted[number] = wanted
                 source.want(wanted)
@@ -205,6 +213,8 @@ class Board:
         text = b"" if kind == "readings" else encode_json(whole)
         if kind in KEPT:
             told.kept[kind] = text
+        if kind == "watched":
+            told.watched[message["link"][0], message["link"][1]] = text
         if kind == "note":
             told.warning = b"" if message["level"] == "info" else text
         for reader in list(self.readers.values()):

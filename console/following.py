@@ -1,6 +1,6 @@
 """What becomes of what arrives from a running system: frames as moments, statuses as messages, requests as marks.
 
-Pure; frames are read in a thread of their own, all else in the event loop's. Neighbours: `live` (moves the bytes),
+Pure. Neighbours: `live` (moves the bytes),
 `drawing` (one layout), `links`, `status_marks`.
 """
 
@@ -17,6 +17,7 @@ from foosim.console.links import Links
 from foosim.console.source import About, Moment, Wanted
 from foosim.console.status_marks import StatusMarks
 from foosim.console.timeline import WorldEvents
+from foosim.console.watched import Watched
 from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
@@ -56,6 +57,7 @@ class Following:
         self._is_paused = self._has_changed = False
         self._marks = StatusMarks()
         self._events: WorldEvents | None = None
+        self._watched: Watched | None = None
         self._statuses = 0
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
         """Who has asked: by the request's sender, tick and verb."""
@@ -96,7 +98,7 @@ class Following:
         if is_new:
             self._frame = None
             if before is None or before.drawing.deployment is not deployment:
-                self._events = WorldEvents(deployment)
+                self._events, self._watched = WorldEvents(deployment), Watched(deployment)
             world.links.turn_to(world.drawing.scene)
         return is_new
 
@@ -117,7 +119,7 @@ class Following:
     # --- frames ------------------------------------------------------------------------------------------------------
 
     def read(self, payload: bytes) -> tuple[World, Frame] | None:
-        """Return the frame of a commit; None, and the layout is stale, where it does not fit. Called in a thread."""
+        """Return the frame of a commit; None, and the layout is stale, where it does not fit."""
         world = self._world
         if world is None:
             return None
@@ -132,13 +134,13 @@ class Following:
             return None
         return world, frame
 
-    def show(self, world: World, frame: Frame, moment: Moment) -> Moment | None:
-        """Return the moment as it is to be shown; None for one of a world that is shown no longer."""
-        if self._world is None or self._world.drawing is not world.drawing:
-            return None
+    def show(self, world: World, frame: Frame) -> Moment:
+        """Return what there is to see in a frame that was read just now."""
         jump = self._frame is None or frame.tick < self._frame.tick
         self._frame = frame
-        return replace(moment, jump=jump) if jump else moment
+        if self._watched is not None:
+            self._watched.keep(frame)
+        return world.drawing.moment(frame, jump=jump)
 
     def overlay(self, wanted: Collection[str]) -> dict[str, Any] | None:
         """Return the message with the overlays of the newest frame."""
@@ -184,7 +186,17 @@ class Following:
                 self._world.links.move(self._frame)
             messages.append(self._world.links.message(status))
         self._statuses += 1
+        if self._watched is not None:
+            messages += self._watched.readings(status["watched"])
         return messages
+
+    def explained(self, status: Mapping[str, Any], wanted: Wanted) -> list[dict[str, Any]]:
+        """Return the messages about links that are watched. It takes a while: for a thread."""
+        report, drops = status["watched"], status["watched"].get("drops", {})
+        watched = self._watched
+        if watched is None:
+            return []
+        return watched.drops(report, [link for link in wanted.links if f"{link[0]}>{link[1]}" in drops])
 
     def standing_moment(self) -> Moment | None:
         """Return the last moment again where the run has just paused or gone on, which pages show."""

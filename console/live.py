@@ -18,11 +18,10 @@ from functools import partial
 from typing import Any, Final, TypeVar
 
 from foosim.console.following import Following, World
-from foosim.console.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.console.source import About, Answered, Curve, Feed, Wanted
 from foosim.protocol.errors import BadValue, Refused
-from foosim.protocol.frame import Frame
-from foosim.protocol.inbox import Inbox
-from foosim.supervisor.control import Control, NoAnswer
+from foosim.protocol.inbox import Inbox, Item
+from foosim.supervisor.control import Control, NoAnswer, RequestRefused
 
 VERBS: Final = (
     *("pause", "resume", "step", "rate", "add", "remove", "move", "push", "network", "stop", "start", "down"),
@@ -35,9 +34,11 @@ QUESTION_S: Final = 3.0
 AGAIN_S: Final = 0.5
 """How often it is."""
 FRAMES_MAX: Final = 8
-"""That wait for us: only the newest counts."""
+"""That may wait to be received."""
 HZ_MAX: Final = 100.0
 ASKS_AT_ONCE: Final = 4
+OUR_ARGUMENTS: Final = frozenset({"self", "verb", "timeout_s", "give_up"})
+"""Of `Control.ask`, which a page does not give."""
 OVERLAY_S: Final = 0.1
 
 T = TypeVar("T")
@@ -70,8 +71,9 @@ class LiveSource:
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         """Ask the supervisor. Raises RequestRefused, NoAnswer, ConnectError, BadValue."""
-        if not all(key.isidentifier() and key not in ("timeout_s", "give_up", "verb") for key in arguments):
-            raise BadValue("arguments of a request have names", ", ".join(arguments))
+        wrong = [key for key in arguments if not key.isidentifier() or key in OUR_ARGUMENTS]
+        if wrong:
+            raise BadValue("no argument of a request", wrong[0])
         loop = asyncio.get_running_loop()
         answered, sender = await loop.run_in_executor(self._asking, self._ask, verb, dict(arguments))
         self._following.asked(sender, answered.tick, verb, who)
@@ -102,24 +104,25 @@ class LiveSource:
     # --- looking on --------------------------------------------------------------------------------------------------
 
     async def run(self, feed: Feed) -> None:
-        is_told = False
+        trouble = ""  # what was said last of a run that is not there
         try:
             while True:
                 try:
                     control = await self._in_thread(lambda: self._connect_view(self._closing.is_set))
                 except Refused as refused:
-                    if not is_told:
+                    if trouble != str(refused):
+                        trouble = str(refused)
                         feed.tell(_note("warning", f"{self._name} is not there: {refused}; it is looked for"))
-                        is_told = True
                     await asyncio.sleep(AGAIN_S)
                     continue
-                if is_told:
+                if trouble:
+                    trouble = ""
                     feed.tell(_note("info", f"connected to {self._name} again"))
                 try:
                     await self._follow(control, feed)
                 except Refused as refused:
+                    trouble = str(refused)
                     feed.tell(_note("warning", f"lost {self._name}: {refused}; it is looked for"))
-                    is_told = True
                     self._forget_idle()
                     await asyncio.sleep(AGAIN_S)
                 finally:
@@ -142,20 +145,12 @@ class LiveSource:
     async def _follow(self, control: Control, feed: Feed) -> None:
         """Tell of a run as long as its supervisor answers. Raises Refused."""
         await self._describe(control, feed)
-        inbox = Inbox(FRAMES_MAX)
-        control.view(inbox)
-        ended = threading.Event()
-        loop = asyncio.get_running_loop()
-        frames = threading.Thread(
-            target=self._take_frames, args=(inbox, ended, loop, feed), name="console-frames", daemon=True
-        )
-        frames.start()
+        newest = _Newest(asyncio.get_running_loop(), partial(self._take_frame, feed))
+        control.view(newest)
         try:
             await self._poll(control, feed)
         finally:
-            ended.set()
-            inbox.wake()
-            await asyncio.to_thread(frames.join)
+            newest.end()
 
     async def _describe(self, control: Control, feed: Feed) -> None:
         """Learn which world it is, and tell its scene where that is new."""
@@ -175,22 +170,26 @@ class LiveSource:
 
     async def _poll(self, control: Control, feed: Feed) -> None:
         """Ask for statuses, renew the lease, describe again where frames do not fit; as long as somebody looks."""
-        following, renewed_s, lease = self._following, 0.0, Wanted()
+        following, lease = self._following, Wanted()
+        renewed_s = described_s = 0.0
         while True:
             self._changed.clear()
             wanted = self._wanted
             if wanted.readers == 0:
                 await self._changed.wait()
                 continue
-            if following.is_stale:
+            if following.is_stale and time.monotonic() >= described_s + POLL_S:
                 await self._describe(control, feed)
+                described_s = time.monotonic()
             now_s = time.monotonic()
             if wanted != lease or now_s >= renewed_s + RENEW_S:
-                asked = following.watch_arguments(wanted, HZ_MAX)
-                await self._in_thread(partial(control.ask, "watch", QUESTION_S, self._closing.is_set, **asked))
+                await self._renew(control, feed, following.watch_arguments(wanted, HZ_MAX), wanted != lease)
                 lease, renewed_s = wanted, now_s
             status = await self._in_thread(lambda: control.status(QUESTION_S, self._closing.is_set))
-            for message in following.take_status(status):
+            messages = following.take_status(status)
+            if wanted.links:
+                messages += await self._in_thread(partial(following.explained, status, wanted))
+            for message in messages:
                 feed.tell(message)
             moment = following.standing_moment()
             if moment is not None:
@@ -199,31 +198,61 @@ class LiveSource:
                 async with asyncio.timeout(POLL_S):
                     await self._changed.wait()
 
-    def _take_frames(self, inbox: Inbox, ended: threading.Event, loop: asyncio.AbstractEventLoop, feed: Feed) -> None:
-        """In a thread: wait for frames, and hand what they show to the event loop."""
-        while not ended.is_set():
-            items = inbox.take(1.0)
-            if not items or ended.is_set():
-                continue
-            found = self._following.read(items[-1][2])
-            if found is None:
-                loop.call_soon_threadsafe(self._changed.set)
-            else:
-                world, frame = found
-                loop.call_soon_threadsafe(self._show, feed, world, frame, world.drawing.moment(frame))
+    async def _renew(self, control: Control, feed: Feed, wanted: dict[str, Any], is_new: bool) -> None:
+        """Begin or renew the lease; frames alone, where others watch so many links that there is no room for these."""
+        ask = partial(control.ask, "watch", QUESTION_S, self._closing.is_set)
+        try:
+            await self._in_thread(partial(ask, **wanted))
+        except RequestRefused as refused:
+            if is_new:
+                feed.tell(_note("warning", str(refused)))
+            await self._in_thread(partial(ask, hz=wanted["hz"]))
 
-    def _show(self, feed: Feed, world: World, frame: Frame, moment: Moment) -> None:
-        """Show a frame, if it is of the world that is shown still, and from time to time what lies over it."""
-        shown = self._following.show(world, frame, moment)
-        if shown is None:
+    def _take_frame(self, feed: Feed, payload: bytes) -> None:
+        """Show a commit, and from time to time what lies over it."""
+        wanted = self._wanted
+        if not wanted.readers:
+            return  # a lease is not over at once
+        found = self._following.read(payload)
+        if found is None:
+            self._changed.set()
             return
-        feed.show(shown)
+        world, frame = found
+        feed.show(self._following.show(world, frame))
         now_s = time.monotonic()
-        if self._wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
+        if wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
             self._overlay_s = now_s
-            overlay = self._following.overlay(self._wanted.overlays)
+            overlay = self._following.overlay(wanted.overlays)
             if overlay is not None:
                 feed.tell(overlay)
+
+
+class _Newest(Inbox):
+    """An inbox that has the event loop take the newest frame: what came before it is old by then."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, take: Callable[[bytes], None]) -> None:
+        super().__init__(FRAMES_MAX)
+        self._loop, self._take = loop, take
+        self._payload = b""
+        self._is_due = self._has_ended = False
+
+    def offer(self, item: Item) -> bool:
+        """Keep it. Called in the thread that receives, which does nothing else."""
+        self._payload = item[2]
+        if not self._is_due:
+            self._is_due = True
+            with suppress(RuntimeError):  # the loop is over
+                self._loop.call_soon_threadsafe(self._give)
+        return True
+
+    def end(self) -> None:
+        """Give nothing more."""
+        self._has_ended = True
+
+    def _give(self) -> None:
+        self._is_due = False  # before it is read: a newer one is given again
+        if not self._has_ended:
+            self._take(self._payload)
 
 
 def _note(level: str, text: str) -> dict[str, Any]:

@@ -43,12 +43,12 @@ class ServeOptions:
 
 def serve_sources(make: MakeSources, options: ServeOptions, say: Callable[[str], None]) -> None:
     """Serve until a signal ends it. Raises BadValue, Insecure, and Failed where nobody can listen."""
-    address, tls = _checked(options)
+    address, tls = listening_at(options)
     asyncio.run(_serve(make, options, address, tls, say))
 
 
-def _checked(options: ServeOptions) -> tuple[Address, ssl.SSLContext | None]:
-    """Return where to listen, and the certificate where there is one."""
+def listening_at(options: ServeOptions) -> tuple[Address, ssl.SSLContext | None]:
+    """Return where to listen, and the certificate where there is one. Raises BadValue, and Insecure without one."""
     address = parse_address(options.listen)
     if (options.certificate is None) != (options.key is None):
         raise BadValue("--certificate and --key belong together")

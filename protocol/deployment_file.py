@@ -241,10 +241,13 @@ def _report(found: Sequence[Problem]) -> list[str]:
 
 
 def _problem(tree: Tree, finding: Finding) -> Problem:
+    place = _place(tree, finding)
+    if finding.other is not None and place.rank < (there := _place(tree, finding.other)).rank:
+        finding, place = finding.other, there  # it was set after the file
     location = finding.location if finding.at == "value" else finding.location[:-1]
     text = describe(finding.what, finding.value, finding.nearest)
     path = path_text(location)
-    return Problem(_place(tree, finding), f"{path}: {text}" if path else text)
+    return Problem(place, f"{path}: {text}" if path else text)
 
 
 def _place(tree: Tree, finding: Finding) -> Place:

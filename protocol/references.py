@@ -33,13 +33,17 @@ BODILESS: Final = "camera"
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A problem at a location in the data: at the value there, at its key, or at the mapping that lacks the key."""
+    """A problem at a location in the data: at the value there, at its key, or at the mapping that lacks the key.
+
+    `other` is the same problem at the other of two values that do not fit: it is what is told where that one was set.
+    """
 
     location: Location
     what: str
     value: object
     nearest: str | None = None
     at: Literal["value", "key", "missing"] = "value"
+    other: "Finding | None" = None
 
 
 def check_references(data: object) -> Iterator[Finding]:
@@ -324,22 +328,28 @@ def _lines(view: View) -> Iterator[Finding]:
 
 def _shapes(view: View) -> Iterator[Finding]:
     """The table's lengths describe a table that can be built."""
-    for small, big, what in (
-        (("rod", "inner_radius"), ("rod", "radius"), "not below the rod's radius"),
-        (("rod", "foot_radius"), ("rod", "axis_height"), "the feet would reach the floor: not below rod.axis_height"),
-        (("rod", "figure_com_below_axis"), ("rod", "foot_radius"), "not below rod.foot_radius"),
-        (("goal", "width"), ("field", "width"), "not below the field's width"),
-        (("goal", "height"), ("walls", "height"), "not below the walls' height"),
+    for small, big, why in (
+        (("rod", "inner_radius"), ("rod", "radius"), ""),
+        (("rod", "foot_radius"), ("rod", "axis_height"), "the feet would reach the floor: "),
+        (("rod", "figure_com_below_axis"), ("rod", "foot_radius"), ""),
+        (("goal", "width"), ("field", "width"), ""),
+        (("goal", "height"), ("walls", "height"), ""),
     ):
-        least, most = view.length(*small), view.length(*big)
-        if least is not None and most is not None and least >= most:
-            yield Finding(("table", *small), what, view.get("table", *small))
-    radius = view.length("ball", "radius")
+        yield from _too_big(view, small, big, why)
     for side in ("depth", "width", "height"):
-        most = view.length("goal", side)
-        if radius is not None and most is not None and 2 * radius >= most:
-            what = f"twice that is not below the goal's {side}: the ball would not fit, valid is below {_mm(most / 2)}"
-            yield Finding(("table", "ball", "radius"), what, view.get("table", "ball", "radius"))
+        yield from _too_big(view, ("ball", "radius"), ("goal", side), "the ball would not fit: ", 2)
+
+
+def _too_big(view: View, small: Location, big: Location, why: str, times: int = 1) -> Iterator[Finding]:
+    """A length of the table of which `times` as much is not below another one; `why` that is wrong."""
+    least, most = (view.length(*map(str, where)) for where in (small, big))
+    if least is None or most is None or times * least < most:
+        return
+    small, big = ("table", *small), ("table", *big)
+    twice, half = ("twice that is ", "twice ") if times > 1 else ("", "")
+    below = f"{why}{twice}not below {path_text(big)} ({_mm(most)}), valid is below {_mm(most / times)}"
+    above = f"{why}not above {half}{path_text(small)} ({_mm(least)}), valid is above {_mm(least * times)}"
+    yield Finding(small, below, view.get(*small), other=Finding(big, above, view.get(*big)))
 
 
 def _hall(view: View) -> Iterator[Finding]:

@@ -101,6 +101,7 @@ def _common_settings(mode: str, message_bytes_max: int, protocol: str) -> dict[s
         "transport/link/tx/queue/batching/enabled": True,  # without, also bursts cost a packet for each message
         "transport/link/tx/queue/congestion_control/block/wait_before_close": BLOCK_US,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 1000,
+        "transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments": 1000,  # of each of its parts
         "transport/link/rx/max_message_size": message_bytes_max,  # a gigabyte by default
     }
 

@@ -20,6 +20,7 @@ from foosim.vhub.room_watch import CLOSING
 
 LINKS_SHOWN_MAX: Final = 20
 ENTITIES_SHOWN_MAX: Final = 6
+AWAY: Final = "(before the vHub was lost)"
 
 
 def simulated_s(status: dict[str, Any]) -> float:
@@ -111,12 +112,13 @@ def closing_text(status: dict[str, Any]) -> str:
 def packets_text(status: dict[str, Any]) -> str:
     """`packets 22510 offered, 22390 delivered, 113 dropped`; empty where there were none.
 
-    A vHub that was started again has told of none before its first report.
+    While the vHub is away they are those that it told last; a supervisor that was started again may know of none yet.
     """
     packets = status["packets"]
     if not packets["offered"]:
         return ""
-    return f"packets {packets['offered']} offered, {packets['delivered']} delivered, {packets['dropped']} dropped"
+    text = f"packets {packets['offered']} offered, {packets['delivered']} delivered, {packets['dropped']} dropped"
+    return f"{text} {AWAY}" if status["vhub_away"] else text
 
 
 def plain_line(status: dict[str, Any]) -> str:
@@ -221,6 +223,8 @@ def _links(status: dict[str, Any], links_max: int) -> Table:
     more = f"and {hidden} more" if hidden > 0 else ""
     total = (str(packets["offered"]), str(packets["delivered"]), str(packets["dropped"]))
     table.add_row("all", more, *total, f"{packets['in_flight']} in flight", style="bold")
+    if status["vhub_away"]:
+        table.title = f"links {AWAY}"
     return table
 
 

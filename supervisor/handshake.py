@@ -117,7 +117,7 @@ class Handshake:
             return
         process.heartbeat = heartbeat
         report = decode_json(heartbeat.report)
-        process.report = report if isinstance(report, dict) else {}
+        core.roster.hear(process, report if isinstance(report, dict) else {})
         core.absence.players.hear(process)
         if process.lost and process.name == channels.VHUB:
             core.absence.hear(now_ns)
@@ -137,4 +137,4 @@ class Handshake:
             process.farewell = True
             report = decode_json(farewell.report)
             if isinstance(report, dict) and report:
-                process.report = report
+                self._core.roster.hear(process, report)

@@ -53,6 +53,8 @@ class Roster:
         """Nodes that somebody stopped: they are not let in until somebody starts them."""
         self.starts: dict[str, int] = {}
         """How often somebody asked for a node to be started; a launcher that sees it grow starts its process."""
+        self.hub_account: dict[str, Any] = {}
+        """The last report of a vHub that had its state: one that is started again has none before it has read it."""
         self._fingerprint = fingerprint
         self._simulation = b""
 
@@ -108,6 +110,18 @@ class Roster:
         if known is None or known.lost:
             known = self.by_name[hello.name] = Process(hello.role, hello.name, hello.boot, heard_ns=now_ns)
         return known
+
+    def hear(self, process: Process, report: dict[str, Any]) -> None:
+        """Note what a process reports of itself."""
+        process.report = report
+        if process.name == VHUB and "packets" in report:
+            self.hub_account = report
+
+    @property
+    def is_hub_away(self) -> bool:
+        """Whether the vHub that gave the last account is gone, and no other has given one since."""
+        hub = self.by_name.get(VHUB)
+        return bool(self.hub_account) and (hub is None or hub.lost or hub.report is not self.hub_account)
 
     def lose(self, process: Process) -> None:
         """Go on without a process until it says hello again."""

@@ -45,8 +45,7 @@ NO_PACKETS = {"offered": 0, "delivered": 0, "dropped": 0, "in_flight": 0, "refus
 def result(core: SupervisorCore) -> dict[str, Any]:
     """Return the result of a run, or of a run so far."""
     frame = core.frame
-    hub = core.roster.by_name.get(VHUB)
-    report = {} if hub is None else hub.report
+    report = core.roster.hub_account
     cut_off = core.closing.cut_off
     wall_ns = core.committed_ns - core.started_ns
     origin = core.settings.origin
@@ -84,8 +83,7 @@ def result(core: SupervisorCore) -> dict[str, Any]:
 
 def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
     """Return the result so far and what only a running system has."""
-    hub = core.roster.by_name.get(VHUB)
-    report = {} if hub is None else hub.report
+    report = core.roster.hub_account
     pacer = core.pacer
     waiting_for = ", ".join(core.watch.waiting_for(core))
     return {
@@ -101,6 +99,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "rovers": _rovers(core),
         "processes": _processes(core, waiting_for),
         "starts": dict(core.roster.starts),
+        "vhub_away": core.roster.is_hub_away,
         "links": report.get("links", []),
         "links_in_all": report.get("links_in_all", 0),
         "disruptions": {
@@ -120,7 +119,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
 def _recording(core: SupervisorCore) -> dict[str, Any]:
     """Return how the capture does, as the vHub told last; in a run that is over that is final once it said farewell."""
     hub = core.roster.by_name.get(VHUB)
-    told = NOT_RECORDED if hub is None else hub.report.get("recording") or NOT_RECORDED
+    told = core.roster.hub_account.get("recording") or NOT_RECORDED
     is_open = core.finished and hub is not None and not hub.farewell and told["state"] in ("on", "low", "closing")
     return {**told, "state": UNFINISHED} if is_open else told
 

@@ -23,7 +23,7 @@ from foosim.protocol.member import Member
 register = Register()
 
 
-@register("node takes old epochs", "a node drops orders and parts of older epochs", 1)
+@register("node takes old epochs", "a node drops orders and parts of older epochs", 2)
 def _old_epochs(planting: Planting) -> None:
     def fenced(self: Any, channel: Any, message: Any, payload: bytes) -> bool:
         return message.epoch >= self.epoch and bool(before(self, channel, message, payload))

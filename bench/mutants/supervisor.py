@@ -113,8 +113,13 @@ def _unwritten(planting: Planting) -> None:
 
 @register("refusals are not journalled", "the same id gets the same answer over restarts", 1)
 def _unwritten_refusal(planting: Planting) -> None:
-    def write(self: Any, answer: Any, *added: Any) -> Any:
-        return before(self, answer, *added) if answer.accepted else answer
+    def write(self: Any, verb: str, answer: Any, *added: Any) -> Any:
+        actions = self._core.actions
+        first = len(actions)
+        before(self, verb, answer, *added)
+        if not answer.accepted:
+            actions[first:] = []
+        return answer
 
     before: Any = planting.swap(Requests, "_write", write)
 

@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from websockets.exceptions import ConnectionClosedError
 
+from foosim.console.server import CONNECTIONS_MAX
 from tests.console.memory import Console, MemorySource, console, table
 
 Part = Callable[[Console], Awaitable[None]]
@@ -109,6 +110,9 @@ def test_who_looks_at_what_is_told_to_the_source_until_nobody_does() -> None:
                 assert stage.source.wanted[-1].overlays == {"rays"}
                 stage.source.tell(type="watched", link=["a", "b"], drops=[])
                 assert (await other.hear("watched"))["link"] == ["a", "b"]
+                await one.say(type="watch", link=["a", "b"])  # who comes later gets what was told
+                assert (await one.hear("watched"))["drops"] == []
+                await one.say(type="watch", link=None)
             await until(lambda: stage.source.wanted[-1].links == ())
         await until(lambda: stage.source.wanted[-1].hz == 0.0)
 
@@ -209,6 +213,7 @@ def test_a_thousand_connections_leave_the_others_alone() -> None:
                     stage.source.show(len(opened))
                     stage.server.board.readers["browser 1"].follows[0].next_s = 0.0
                     assert (await good.moment())[0][5] <= len(opened)
+                    assert stage.server.connections <= CONNECTIONS_MAX + 50
             ended = 0
             for reader, _ in opened[300:310]:  # those that are too many are ended at once
                 with pytest.raises((asyncio.IncompleteReadError, ConnectionResetError)):

@@ -21,6 +21,7 @@ from foosim.rehearsal.bus import Traced, Weather
 from foosim.rehearsal.hub_journal import ENDINGS, Ending
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.status import status
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import RECOVERIES
@@ -33,6 +34,7 @@ DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms")
 SLOW: Final = Weather(1, delay_ns=8 * MS)
 """Time passes between what is said and heard."""
+HUB_HEARD: Final = {channel.name for channel in (channels.HELLO, channels.READY, channels.HEARTBEAT)}
 Fault = tuple[int, Callable[[System], object]]
 
 
@@ -45,8 +47,15 @@ class Seen:
     deliveries: dict[int, set[bytes]] = field(default_factory=dict)
     told: dict[str, dict[int, set[bytes]]] = field(default_factory=dict)
     """Go by player and number."""
+    systems: list[System] = field(default_factory=list)
+    shown: list[tuple[bool, int, int, int]] = field(default_factory=list)
+    """What the supervisor's status said as it heard the vHub: whether it is away, packets offered, links, clients."""
 
     def watch(self, traced: Traced) -> None:
+        if traced.process == channels.SUPERVISOR and traced.channel in HUB_HEARD and traced.name == channels.VHUB:
+            said = status(self.systems[0].supervisor, traced.now_ns)
+            counts = said["packets"]["offered"], said["links_in_all"], len(said["clients"])
+            self.shown.append((said["vhub_away"], *counts))
         if traced.what == "publish" and traced.channel == channels.DELIVERIES.name:
             self.deliveries.setdefault(decode(Deliveries, traced.payload).tick, set()).add(traced.payload)
         elif traced.what == "receive" and traced.channel == channels.DOWN.name:
@@ -72,6 +81,7 @@ def fly(faults: Sequence[Fault], ticks: int = TICKS, sets: Sequence[str] = SETS,
     seen = Seen()
 
     def prepare(system: System) -> None:
+        seen.systems.append(system)
         for tick, fault in faults:
             system.at_tick(tick, partial(fault, system))
 
@@ -112,6 +122,18 @@ def test_a_vhub_that_is_killed_comes_back_and_nothing_is_lost(ending: Ending) ->
     assert set(told) == {("vhub", "vhub")} and len(told) in (3, 4), "the last one may come before anything is committed"
     assert all(entry["outage_ms"] is not None for entry in seen.run.json["recoveries"])
     assert max(entry["outage_ms"] for entry in seen.run.json["recoveries"]) >= 300
+    assert_counts_stay(seen)
+
+
+def assert_counts_stay(seen: Seen) -> None:
+    """What the vHub has counted stays while it is away and while another one has not counted anything yet."""
+    away = [shown for shown, *_ in seen.shown]
+    counted = [counts for _, *counts in seen.shown]
+    first = next(at for at, counts in enumerate(counted) if counts[0])
+    assert {*away} == {True, False}
+    assert all(all(counts) for counts in counted[first:])
+    offered = [counts[0] for counts in counted]
+    assert offered == sorted(offered)
 
 
 def test_with_bullet_it_is_the_same() -> None:

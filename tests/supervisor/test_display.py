@@ -57,6 +57,7 @@ def running() -> dict[str, Any]:
             "supervisor": {"role": "supervisor", **HERE, "busy": 0.106, "tick": 6170, "waiting_for": "red"},
         },
         "links_in_all": 2,
+        "vhub_away": False,
         "links": [
             ["player-red", "red.goal", 1234, 1220, 9, 1_302_000, "lan", 0, {}, []],
             ["camera", "player-red", 617, 612, 4, 1_297_000, "lan", 0, {}, [["ball", 600, 6_000_000, 8_000_000]]],
@@ -140,7 +141,15 @@ def test_the_plain_line_has_the_same_in_short(running: dict[str, Any]) -> None:
     )
 
 
-def test_a_vhub_that_was_started_again_and_has_not_told_has_no_count_of_packets(running: dict[str, Any]) -> None:
+def test_counts_of_a_vhub_that_is_away_are_said_to_be_old(running: dict[str, Any]) -> None:
+    assert "the vHub was lost" not in plain_line(running) + render_text(running)
+    running["vhub_away"] = True
+    assert "delivered, 113 dropped (before the vHub was lost) | load" in plain_line(running)
+    assert row_of(render_text(running), "links (before the vHub was lost)")
+    assert row_of(render_text(running), "22510").split()[:4] == ["all", "22510", "22390", "113"]
+
+
+def test_a_vhub_that_has_not_told_has_no_count_of_packets(running: dict[str, Any]) -> None:
     assert "packets" in plain_line(running)
     running["packets"] = NO_PACKETS
     assert "packets" not in plain_line(running)

@@ -13,6 +13,7 @@ from typing import Any, Final
 import pytest
 from msgspec.structs import replace
 
+from foosim.console.watched import Watched as Shown
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode, decode_json, encode_json
 from foosim.protocol.deployment import Deployment
@@ -272,3 +273,19 @@ def test_a_report_of_what_is_looked_at_has_a_size() -> None:
     assert {len(readings) for readings in told["watched"]["readings"].values()} == {1}, "the newest of each"
     assert told["watched"]["readings"]["rover/ranges-0"][-1][0] == 2 * READINGS_KEPT - 1
     assert len(told["watched"]["drops"]["camera>player-red"]) == DROPS_KEPT
+
+
+def test_a_page_is_told_of_drops_with_their_steps_and_of_each_reading_once() -> None:
+    run = seen()
+    console = Shown(run.system.supervisor.deployment)
+    reports = [report["watched"] for report in run.reports if "watched" in report]
+    messages = [console.drops(report, [LINK]) for report in reports]
+    (last,) = next(told for told in reversed(messages) if told)
+    assert (last["type"], last["link"]) == ("watched", list(LINK))
+    assert [drop["cause"] for drop in last["drops"]] == [row.cause for row, _ in explain_drops(evidence(run), *LINK)]
+    assert {"stage", "outcome", "text"} == last["drops"][0]["steps"][0].keys()
+    assert console.drops(reports[-1], [LINK]) == [], "nothing new"
+    told = [message for report in reports for message in console.readings(report)]
+    ticks = [tick for message in told for tick, _ in message["points"]]
+    assert (told[0]["robot"], told[0]["channel"]) == READING
+    assert ticks == list(range(ticks[0], ticks[-1] + 1, 5)), "each one once"

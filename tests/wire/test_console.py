@@ -45,6 +45,10 @@ async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
         assert len(poses) == len(scene["links"])
         while (await browser.moment())[0][5] == head[5]:
             pass
+        await browser.say(type="plot", series=[{"id": "x", "reading": ["camera", "ball"], "index": 0}])
+        await browser.say(type="watch", link=["camera", "red.goal"])
+        assert (await browser.hear("plotted"))["series"][0]["id"] == "x"
+        assert (await browser.hear("watched"))["drops"] == []
         added = await answered(browser, 1, "add", position=[0.1, 0.0, 0.05])
         assert added["accepted"], added
         scene = await browser.hear("scene")

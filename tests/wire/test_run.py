@@ -13,6 +13,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
+from foosim.protocol import channels
+from foosim.protocol.codec import decode
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.frame import frame_from_bytes
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import Commit
 from foosim.protocol.names import LINE_NAMES, TEAMS
 from foosim.rehearsal.verify import verify_capture
 from foosim.supervisor import control
@@ -23,6 +30,7 @@ from tests.wire.conftest import LIMIT_S, LONG
 
 if TYPE_CHECKING:
     from tests.wire.conftest import House
+
 
 def last_json(out: str) -> dict[str, Any]:
     """The object in the last line."""
@@ -55,6 +63,7 @@ def test_a_run_goes_on_whatever_is_asked_wrongly_and_dies_with_its_launcher(hous
     assert logs == {"supervisor.log", "vhub.log", "red.log", "blue.log"}
     assert_wrong_names_are_refused_with_the_nearest_one(house)
     assert_nodes_that_do_not_fit_are_refused(house, info.simulation)
+    assert_a_viewer_sees_and_cannot_touch()
     status = house.ticking(before + 1)
     assert (status["state"], status["epoch"]) == ("running", 1)
     up.kill()
@@ -69,6 +78,22 @@ def assert_wrong_names_are_refused_with_the_nearest_one(house: House) -> None:
     assert code == 1 and "no run 'tabel'" in err
     with pytest.raises(RequestRefused, match="no node 'green'; there are blue, red"):
         control.move("red.goal", "green")
+
+
+def assert_a_viewer_sees_and_cannot_touch() -> None:
+    inbox = Inbox(100)
+    with control.connect(role="viewer") as viewer:
+        described = viewer.describe()
+        viewer.view(inbox)
+        assert viewer.ask("watch", hz=50).accepted
+        deployment = load_deployment(described["deployment"], described["deployment_name"])
+        assert viewer.files(deployment) == {}, "this world has none"
+        key, _, payload = inbox.take(LIMIT_S)[0]
+        shown = decode(Commit, payload)
+        frame = frame_from_bytes(shown.tick, build_layout(deployment), shown.values, shown.outboxes)
+        assert key == channels.VIEW.key and frame.digest == shown.digest
+        with pytest.raises(RequestRefused, match="'down' is for operators: who only looks may ask for status, "):
+            viewer.ask("down")
 
 
 def assert_nodes_that_do_not_fit_are_refused(house: House, address: str) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foosim.protocol import channels
@@ -17,6 +19,8 @@ from tests.wire.conftest import LIMIT_S, LONG
 from tests.wire.test_run import last_json
 
 if TYPE_CHECKING:
+    import subprocess
+
     from tests.wire.conftest import House
 
 
@@ -64,15 +68,20 @@ def test_a_run_survives_a_supervisor_that_is_killed_and_one_that_hangs(house: Ho
 
 
 def test_who_is_left_alone_holds_and_ends(house: House) -> None:
-    """Without a launcher nobody starts the supervisor again. The run has not ended, and it can be gone on with: the
-    vHub leaves its capture as a kill would."""
+    """Without a launcher nobody starts the supervisor again. The run has not ended: the vHub leaves its capture as a
+    kill would. It can be recovered, and the run goes on with it as soon as all are started again."""
     run = ["--set", "players={}", "--set", "engine=pure", "--set", LONG, "--set", "deadlines.orphan=1 s"]
     supervisor = house.start("foosim-supervisor", "run", house.table, *run)
     info = house.wait_for("the run file", house.live().info)
     connect = ["--connect", info.simulation]
-    others = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
     capture = house.folder / "alone.mcap"
-    others.append(house.start("foosim-vhub", *connect, "--capture", capture, "--run-folder", house.folder / "hub"))
+    hub = ("--capture", capture, "--run-folder", house.folder / "hub")
+
+    def start_others(*connect: str) -> list[subprocess.Popen[str]]:
+        nodes = [house.start("foosim-node", "--name", name, *connect) for name in ("red", "blue")]
+        return [*nodes, house.start("foosim-vhub", *connect, *hub)]
+
+    others = start_others(*connect)
     house.ticking(5)
     supervisor.kill()
     for other in others:
@@ -80,12 +89,26 @@ def test_who_is_left_alone_holds_and_ends(house: House) -> None:
         assert code == 1 and "lost the supervisor, and it has not come back" in err, err
     assert f"leaves its capture {capture} without an end: the run can go on with it" in err
     assert not open_capture(capture).about.finished
-    recovered = recover_capture(capture, house.folder / "hub" / "journals")
+    copy = Path(shutil.copy(capture, house.folder / "copy.mcap"))
+    recovered = recover_capture(copy, house.folder / "hub" / "journals")
     assert recovered is not None and recovered.is_whole and recovered.tick >= 5, "its journal is there, and fits"
     other_file = [*run[:-1], "deadlines.orphan=2 s", "--run", info.run]
     again = house.start("foosim-supervisor", "run", house.table, *other_file)
     code, _, err = house.end(again)
     assert code == 3 and f"run {info.run} was started with another deployment" in err
+    again = house.start("foosim-supervisor", "run", house.table, *run, "--run", info.run)
+    others = start_others("--connect", house.wait_for("the run file", house.live().info).simulation)
+    house.ticking(recovered.tick + 50)
+    assert house.ask("foosim-supervisor", "down")[0] == 0
+    for process in (again, *others):
+        code, _, err = house.end(process)
+        assert code == 0, err
+    result = open_run(info.run).result()
+    assert result is not None and result["reason"] == "stopped" and result["ticks"] >= recovered.tick + 50
+    same = rehearse(house.table.read_text(), "table.yaml", result["ticks"], None, ["players={}", "engine=pure"]).json
+    assert result["digest"] == same["digest"] and result["packets"] == same["packets"]
+    whole = open_capture(capture)
+    assert whole.about.finished and whole.ticks.tolist() == list(range(result["ticks"] + 1))
 
 
 def test_a_supervisor_that_is_started_again_by_hand_goes_on(house: House) -> None:
