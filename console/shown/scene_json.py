@@ -75,7 +75,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
         "fields": _fields(layout),
         "sensors": _sensors(deployment),
         "meshes": {key: _mesh(mesh) for key, mesh in meshes.items()},
-        "bounds": _bounds(scene),
+        "bounds": standing_bounds(scene),
         "addable": _addable(deployment),
     }
 
@@ -151,7 +151,7 @@ def _sensors(deployment: Deployment) -> list[dict[str, str]]:
     return found
 
 
-def _bounds(scene: Scene) -> tuple[Vector, Vector]:
+def standing_bounds(scene: Scene) -> tuple[Vector, Vector]:
     """Return the box around what stands; bodies that are free move within it."""
     boxes = [shape_box(shape) for shape in scene.scenery]
     boxes += [swept_box(body) for body in scene.bodies.values() if body.links[0].joint != "free"]
