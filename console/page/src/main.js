@@ -78,14 +78,10 @@ const view = makeView();
 const bar = new ViewBar(options, changedOption, () => view.home());
 
 function makeView() {
-  try {
-    const made = new View3D(byId("view"), store, options, stat);
-    stat.view = "3d";
-    return made;
-  } catch {
-    stat.view = "map";
-    return new MapView(byId("view"), store, stat);
-  }
+  const has3d = document.createElement("canvas").getContext("webgl2") !== null;
+  stat.view = has3d ? "3d" : "map";
+  byId("view-bar").hidden = !has3d;
+  return has3d ? new View3D(byId("view"), store, options, stat) : new MapView(byId("view"), store, stat);
 }
 
 /** @param {string} name of an option of the view */

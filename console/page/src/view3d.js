@@ -33,7 +33,7 @@ const HOME_DROP = 0.06;
 
 export class View3D {
   /**
-   * Throws where the browser has no WebGL.
+   * The browser has WebGL 2.
    * @param {HTMLElement} place
    * @param {import("./store.js").Store} store
    * @param {Options} options
