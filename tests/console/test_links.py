@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from foosim.console.drawing import Drawing
+from foosim.console.link_history import LinkHistory, PacketMark
 from foosim.console.links import Count, Links, Windows
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout
@@ -50,6 +51,12 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
     message = links.message(status(100, row))
     (line,) = message["links"]
     assert (line["radio"], line["loss"], line["delay_ms"]) == (True, 0.4, 2.0)
+    history = LinkHistory(10_000_000)
+    mark = PacketMark("pilot01", 0, "pilot02", 0, 5, 1, "delivered", "", "fleet", "wifi")
+    history.add(mark, 0)
+    (captured,) = links.with_ends(history.windows(10_000_000, 10_000_000))
+    same = "from", "to", "rule", "radio", "from_link", "to_link", "walls", "from_at", "to_at"
+    assert {name: captured[name] for name in same} == {name: line[name] for name in same}
     names = [link.name for body in drawing.scene.bodies.values() for link in body.links]
     assert [names[line[end]] for end in ("from_link", "to_link")] == ["rover01", "rover02"]
     assert [0.0, 0.0] in [[round(x, 1), round(y, 1)] for x, y, _ in line["walls"]]
