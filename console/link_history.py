@@ -193,10 +193,6 @@ class LinkHistory:
                 found += zip(times[start:stop].tolist(), numbers[start:stop].tolist(), strict=True)
         return [number for _, number in sorted(found)[-count:]]
 
-    def rules(self, source: str, destination: str) -> list[str]:
-        """Return the rules by which packets went from one end to another."""
-        return sorted({key[2] for key in self._links if key[:2] == (source, destination)})
-
 
 def _count(span: tuple[int, int]) -> int:
     return span[1] - span[0]

@@ -6,11 +6,23 @@ from typing import Any
 from foosim.console.drawing import Drawing
 from foosim.console.link_history import LinkHistory, PacketMark
 from foosim.console.links import Count, Links, Windows
+from foosim.console.rule_text import rule_text
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout
 from foosim.protocol.start import initial_frame
 
 KEY = ("a", "b", "rule")
+
+
+def test_the_rule_of_a_link_is_told_in_words(fleet_text: Callable[..., str]) -> None:
+    deployment = load_deployment(fleet_text(2), "hall")
+    rule, radio, meaning = rule_text(deployment, "pilot01", "pilot02").splitlines()
+    assert rule.startswith("rule fleet, from pilot*, dispatch to ") and " via wifi: " in rule
+    assert radio.startswith("radio wifi: preset wifi_") and "tx_power" in radio
+    assert meaning.startswith("which is fleet via wifi: wifi, loss ")
+    assert rule_text(deployment, "pilot01", "nobody") == ""
+    perfect, meaning = rule_text(deployment, "rover01", "pilot01").splitlines()
+    assert "perfect" in perfect and meaning == "which is on_board: no medium, loss 0, delay 0"
 
 
 def count(offered: int, dropped: int, delay_ns: int = 0, **causes: int) -> Count:
