@@ -140,7 +140,7 @@ class Following:
         self._frame = frame
         if self._watched is not None:
             self._watched.keep(frame)
-        return world.drawing.moment(frame, jump=jump)
+        return world.drawing.moment(frame, jump=jump, paused=self._is_paused)
 
     def overlay(self, wanted: Collection[str]) -> dict[str, Any] | None:
         """Return the message with the overlays of the newest frame."""

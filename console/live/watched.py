@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from foosim.console.shown.rule_text import rule_text
 from foosim.console.shown.source import Link
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Refused
@@ -22,6 +23,7 @@ from foosim.vhub.rows import PacketRow
 FRAMES_KEPT: Final = 64
 """Frames that were shown, for what stood between the ends of a packet that was dropped."""
 FRAMES_APART_TICKS: Final = 20
+RULES_KEPT: Final = 256
 
 
 class Watched:
@@ -32,6 +34,7 @@ class Watched:
         self._frames: deque[Frame] = deque(maxlen=FRAMES_KEPT)
         self._told: dict[Link, Any] = {}
         """The drops of each link as they were explained last."""
+        self._rules: dict[Link, str] = {}
         self._read: dict[str, int] = {}
         """The tick of the last reading that was told, by robot and channel."""
 
@@ -81,9 +84,16 @@ class Watched:
         return {
             "type": "watched",
             "link": [source, destination],
-            "rule": found[-1][0].rule if found else "",
+            "rule": self._rule(source, destination),
             "drops": [self._drop(row, explained) for row, explained in found],
         }
+
+    def _rule(self, source: str, destination: str) -> str:
+        if (source, destination) not in self._rules:
+            if len(self._rules) >= RULES_KEPT:
+                self._rules.clear()
+            self._rules[source, destination] = rule_text(self._deployment, source, destination)
+        return self._rules[source, destination]
 
     def _drop(self, row: PacketRow, explained: Explained) -> dict[str, Any]:
         return {

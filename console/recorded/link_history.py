@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.protocol.message_types import Counter as Number
+from foosim.vhub.fabric import link_name
 from foosim.vhub.packet import DELIVERED, DROPPED
 from foosim.vhub.rows import CounterOrNone, Fate
 
@@ -26,7 +27,7 @@ DROPS_SHOWN: Final = 8
 SHARE_DIGITS: Final = 6
 
 LinkKey = tuple[str, str, str]
-"""Source, destination, rule."""
+"""Source, destination, and the rule with its radio, as a running vHub names it."""
 
 
 class PacketMark(msgspec.Struct, frozen=True, gc=False):
@@ -81,7 +82,6 @@ class LinkRecord:
     """One link: what was offered (with the wait in the queue, ns), delivered (with the delay, ns), dropped (with the
     number of the packet's row, by cause)."""
 
-    radio: str = ""
     offered: Timed = field(default_factory=Timed)
     delivered: Timed = field(default_factory=Timed)
     dropped: dict[str, Timed] = field(default_factory=dict)
@@ -100,13 +100,13 @@ class LinkHistory:
     def add(self, mark: PacketMark, number: int) -> int:
         """Count a packet, whose row has this number; return when it was dropped (ns), -1 when it was not."""
         self.packets += 1
-        key = mark.source, mark.destination, mark.rule
+        key = mark.source, mark.destination, link_name(mark.rule, mark.radio)
         record = self._links.get(key)
         if record is None:
             if len(self._links) >= LINKS_MAX:
                 self.others += 1
                 return -1
-            record = self._links[key] = LinkRecord(mark.radio)
+            record = self._links[key] = LinkRecord()
         record.offered.add(mark.sent_ns, mark.queue_ns)
         if mark.fate == DELIVERED:
             record.delivered.add(mark.arrival_tick * self._tick_ns, mark.due_ns - mark.sent_ns)
@@ -145,7 +145,6 @@ class LinkHistory:
                     "from": source,
                     "to": destination,
                     "rule": rule,
-                    "radio": bool(record.radio),
                     "offered": last - first,
                     "delivered": delivered,
                     "dropped": dropped,
@@ -193,10 +192,6 @@ class LinkHistory:
                 start = max(0, stop - count)
                 found += zip(times[start:stop].tolist(), numbers[start:stop].tolist(), strict=True)
         return [number for _, number in sorted(found)[-count:]]
-
-    def rules(self, source: str, destination: str) -> list[str]:
-        """Return the rules by which packets went from one end to another."""
-        return sorted({key[2] for key in self._links if key[:2] == (source, destination)})
 
 
 def _count(span: tuple[int, int]) -> int:

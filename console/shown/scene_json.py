@@ -77,6 +77,10 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
         "meshes": {key: _mesh(mesh) for key, mesh in meshes.items()},
         "bounds": standing_bounds(scene),
         "addable": _addable(deployment),
+        "network": {
+            "rules": [rule.id for rule in deployment.network.links],
+            "endpoints": sorted(deployment.endpoints()),
+        },
     }
 
 

@@ -203,7 +203,7 @@ def test_the_last_drops_of_a_link_are_explained_as_the_command_does(history: Cap
         source, destination = lost.source[number], lost.destination[number]
         at_ns = int(max(lost.sent_ns[number], lost.arrival_tick[number] * TICK_NS))
         told = history.watched(source, destination, at_ns)
-        assert told["link"] == [source, destination] and told["rule"] == "everything"
+        assert told["link"] == [source, destination] and "rule everything, from * to *: delay 1 ms" in told["rule"]
         name = PacketName(source, int(lost.sequence[number]), destination, int(lost.copy[number]))
         expected = explain_packet(capture, name)
         (drop,) = [drop for drop in told["drops"] if drop["head"] == expected.head]
