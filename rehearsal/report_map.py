@@ -14,7 +14,7 @@ from math import cos, dist, hypot, pi, sin
 from operator import itemgetter
 from typing import Final
 
-from foosim.console.scene_json import standing_bounds
+from foosim.console.shown.scene_json import standing_bounds
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.frame import Frame

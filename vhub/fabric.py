@@ -222,4 +222,9 @@ def _sender(source: str, destination: str, profile: Profile) -> RadioKey:
 
 def name_of(profile: Profile) -> str:
     """Return a profile's name: its rule, and the radio where the rule does not say it."""
-    return profile.rule if not profile.radio or profile.radio == profile.rule else f"{profile.rule}/{profile.radio}"
+    return link_name(profile.rule, profile.radio)
+
+
+def link_name(rule: str, radio: str) -> str:
+    """Return the name of a rule over a radio, which is empty where there is none."""
+    return rule if not radio or radio == rule else f"{rule}/{radio}"

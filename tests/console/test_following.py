@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from foosim.console.following import Following, World
-from foosim.console.overlays import Overlays
-from foosim.console.source import About, Wanted
+from foosim.console.live.following import Following, World
+from foosim.console.shown.overlays import Overlays
+from foosim.console.shown.source import About, Wanted
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import Frame
@@ -109,7 +109,7 @@ def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_a_request_names_the_browser_that_asked_and_is_marked_once() -> None:
-    found, _ = following()
+    found, world = following()
     found.first_moment()
     found.asked("operator-1-abc", 5, "pause", "browser 2")
     entry = {"tick": 5, "verb": "pause", "text": "paused at tick 5", "who": "operator-1-abc", "accepted": True}
@@ -121,6 +121,7 @@ def test_a_request_names_the_browser_that_asked_and_is_marked_once() -> None:
     standing = found.standing_moment()
     assert standing is not None and standing.paused
     assert found.standing_moment() is None
+    assert found.show(world, frame_of(6)).paused, "the last frame may come behind the status"
     assert "marks" not in {message["type"] for message in found.take_status(status("paused", other, entry))}
 
 
@@ -129,6 +130,17 @@ def test_what_this_world_does_not_have_is_not_asked_for() -> None:
     wanted = Wanted(1, 500.0, links=(("camera", "player-red"), ("a", "b")), readings=(("camera", "ball"), ("x", "y")))
     asked = found.watch_arguments(wanted, 100.0)
     assert asked == {"hz": 100.0, "links": [("camera", "player-red")], "readings": [("camera", "ball")]}
+
+
+def test_a_link_that_is_watched_is_told_with_its_rule_before_it_drops_anything() -> None:
+    found, _ = following()
+    report = {"drops": {"camera>player-red": []}, "readings": {}, "asked": [], "here": []}
+    watched = status("running") | {"watched": report}
+    wanted = Wanted(1, links=(("camera", "player-red"), ("camera", "player-blue")))
+    (told,) = found.explained(watched, wanted)
+    assert (told["link"], told["drops"]) == (["camera", "player-red"], [])
+    assert told["rule"].startswith("rule everything, from * to *: delay 1 ms")
+    assert found.explained(watched, wanted) == []
 
 
 def test_contacts_are_where_balls_touch_something() -> None:

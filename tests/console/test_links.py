@@ -3,13 +3,26 @@
 from collections.abc import Callable
 from typing import Any
 
-from foosim.console.drawing import Drawing
-from foosim.console.links import Count, Links, Windows
+from foosim.console.recorded.link_history import LinkHistory, PacketMark
+from foosim.console.shown.drawing import Drawing
+from foosim.console.shown.links import Count, Links, Windows
+from foosim.console.shown.rule_text import rule_text
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout
 from foosim.protocol.start import initial_frame
 
 KEY = ("a", "b", "rule")
+
+
+def test_the_rule_of_a_link_is_told_in_words(fleet_text: Callable[..., str]) -> None:
+    deployment = load_deployment(fleet_text(2), "hall")
+    rule, radio, meaning = rule_text(deployment, "pilot01", "pilot02").splitlines()
+    assert rule.startswith("rule fleet, from pilot*, dispatch to ") and " via wifi: " in rule
+    assert radio.startswith("radio wifi: preset wifi_") and "tx_power" in radio
+    assert meaning.startswith("which is fleet via wifi: wifi, loss ")
+    assert rule_text(deployment, "pilot01", "nobody") == ""
+    perfect, meaning = rule_text(deployment, "rover01", "pilot01").splitlines()
+    assert "perfect" in perfect and meaning == "which is on_board: no medium, loss 0, delay 0"
 
 
 def count(offered: int, dropped: int, delay_ns: int = 0, **causes: int) -> Count:
@@ -50,6 +63,12 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
     message = links.message(status(100, row))
     (line,) = message["links"]
     assert (line["radio"], line["loss"], line["delay_ms"]) == (True, 0.4, 2.0)
+    history = LinkHistory(10_000_000)
+    mark = PacketMark("pilot01", 0, "pilot02", 0, 5, 1, "delivered", "", "fleet", "wifi")
+    history.add(mark, 0)
+    (captured,) = links.with_ends(history.windows(10_000_000, 10_000_000))
+    same = "from", "to", "rule", "radio", "from_link", "to_link", "walls", "from_at", "to_at"
+    assert {name: captured[name] for name in same} == {name: line[name] for name in same}
     names = [link.name for body in drawing.scene.bodies.values() for link in body.links]
     assert [names[line[end]] for end in ("from_link", "to_link")] == ["rover01", "rover02"]
     assert [0.0, 0.0] in [[round(x, 1), round(y, 1)] for x, y, _ in line["walls"]]

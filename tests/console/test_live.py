@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from foosim.console import live
-from foosim.console.live import LiveSource
-from foosim.console.source import About, Moment
+from foosim.console.live.live_source import LiveSource, live_source
+from foosim.console.shown.source import About, Moment
 from foosim.protocol.errors import BadValue
 from foosim.supervisor.control import Control
 from foosim.supervisor.run_folder import NoRun
@@ -34,7 +33,7 @@ class Heard:
 
 
 def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live, "AGAIN_S", 0.0)
+    monkeypatch.setattr(live_source, "AGAIN_S", 0.0)
     heard, tried = Heard(), [0]
 
     def connect(give_up: Callable[[], bool]) -> Control:

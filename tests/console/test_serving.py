@@ -12,8 +12,8 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosedError
 
-from foosim.console.server import ConsoleServer, new_tokens
-from foosim.console.serving import ServeOptions, listening_at, write_private
+from foosim.console.server.server import ConsoleServer, new_tokens
+from foosim.console.server.serving import ServeOptions, listening_at, write_private
 from foosim.protocol.addresses import Insecure
 from foosim.protocol.errors import BadValue
 from foosim.supervisor import pki

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import pytest
 
-from foosim.console.asked import moves
+from foosim.console.shown.asked import moves
 from foosim.rehearsal import report_command
 from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
 from foosim.rehearsal.report_drawings import drawings

@@ -68,9 +68,9 @@ export class Disturb {
     });
   }
 
-  /** @param {string[]} rules ids of link rules */
-  async set(rules) {
-    const rule = input(rules[0] ?? "", "id of a link rule", { list: "rules", required: true });
+  /** @param {string} chosen id of a link rule */
+  async set(chosen) {
+    const rule = input(chosen, "id of a link rule", { list: "rules", required: true });
     const settings = h("textarea", { rows: 4, required: true, spellcheck: false }, "loss: 5 %\ndelay: 20 ms");
     const content = [
       field("Link rule", rule),

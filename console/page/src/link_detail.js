@@ -53,7 +53,6 @@ export class LinkDetail {
     this.rings.delay.push(source.tick, link.delay_ms);
     this.rings.queue.push(source.tick, link.queue_ms);
     this.rings.loss.push(source.tick, link.loss === null ? null : link.loss * 100);
-    if (this.rule.textContent === "…") setText(this.rule, link.rule || "no rule of its own: the default link");
     bars(this.causes, link.causes);
   }
 
@@ -75,7 +74,7 @@ export class LinkDetail {
   _watched(source) {
     const { watched } = source;
     if (!watched || this.store.link?.join("\n") !== watched.link.join("\n")) return;
-    setText(this.rule, watched.rule || "no rule of its own: the default link");
+    setText(this.rule, watched.rule);
     if (!watched.drops.length) return;
     if (!this.drops.firstElementChild?.matches("details")) this.drops.replaceChildren();
     keyed(this.drops, [...watched.drops].reverse(), (drop) => `${drop.tick} ${drop.head}`, (drop) => this._drop(drop, source));

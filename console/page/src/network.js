@@ -66,16 +66,23 @@ export class Network {
   }
 
   _buttons() {
-    const rulesOf = () => [...new Set((this.store.main?.links ?? []).map((link) => link.rule).filter(Boolean))];
     return h(
       "div",
       { class: "row", role: "group", "aria-label": "Disturb the network" },
       button("Partition …", () => void this.disturb.partition(), { id: "partition" }),
       button("Clog …", () => void this.disturb.clog(), { id: "clog" }),
-      button("Set …", () => void this.disturb.set(rulesOf()), { id: "set" }),
+      button("Set …", () => void this.disturb.set(this._rule()), { id: "set" }),
       button("Chaos …", () => void this.disturb.chaos(), { id: "chaos" }),
       button("Heal …", () => void this.disturb.heal(), { id: "heal" }),
     );
+  }
+
+  /** The link rule of the selected link, or the first one. A link's `rule` has its radio behind a slash. */
+  _rule() {
+    const rules = this.store.main?.scene?.network?.rules ?? [];
+    const [from, to] = this.store.link ?? [];
+    const link = this.store.main?.links.find((one) => one.from === from && one.to === to);
+    return rules.find((id) => link && (link.rule === id || link.rule.startsWith(`${id}/`))) ?? rules[0] ?? "";
   }
 
   /** @param {number} column */
@@ -135,6 +142,7 @@ export class Network {
       : "Nothing is known of packets yet.");
     this.buttons.hidden = !source.may("network");
     for (const one of this.buttons.children) /** @type {HTMLButtonElement} */ (one).disabled = !this.desk.may("network");
+    if (!source.scene?.network?.rules.length) /** @type {HTMLButtonElement} */ (byId("set")).disabled = true;
     const last = (source.status?.disruptions?.last ?? []).slice(-DISTURBANCES_SHOWN).reverse();
     keyed(
       this.disturbances, last, (one) => `${one.tick} ${JSON.stringify(one.event)}`,
@@ -144,10 +152,9 @@ export class Network {
 
   /** @param {import("./store.js").Source} source */
   _draw_lists(source) {
-    const ends = new Set(source.links.flatMap((link) => [link.from, link.to]));
-    const rules = new Set(source.links.map((link) => link.rule).filter(Boolean));
-    for (const [list, names] of /** @type {[HTMLElement, Set<string>][]} */ ([[this.endpoints, ends], [this.rules, rules]])) {
-      keyed(list, [...names].sort(), (name) => name, (value) => h("option", { value }));
+    const { endpoints = [], rules = [] } = source.scene?.network ?? {};
+    for (const [list, names] of /** @type {[HTMLElement, string[]][]} */ ([[this.endpoints, endpoints], [this.rules, rules]])) {
+      keyed(list, names, (name) => name, (value) => h("option", { value }));
     }
   }
 }

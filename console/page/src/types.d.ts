@@ -35,6 +35,8 @@ interface SceneMessage {
   meshes: Record<string, { vertices: string; triangles: string }>;
   bounds: [Vec3, Vec3];
   addable: Addable[];
+  /** Ids of the link rules that can be set, and all endpoints; absent where there is no deployment. */
+  network?: {rules: string[], endpoints: string[]};
 }
 
 /** Poses of all links: 7 numbers each (x, y, z in m; quaternion x, y, z, w); behind them the values that are plotted. */

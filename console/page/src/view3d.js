@@ -8,7 +8,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Labels } from "./labels.js";
 import { Overlays } from "./overlays.js";
 import { RadioLines } from "./radio_lines.js";
-import { h } from "./ui.js";
+import { byId, h } from "./ui.js";
 import { World } from "./world.js";
 
 const CLICK_PX = 5;
@@ -53,7 +53,7 @@ export class View3D {
     place.append(this.canvas);
     this.labels = new Labels(place);
     this.halves = h("div", { id: "halves", hidden: true });
-    place.append(this.halves);
+    byId("over").append(this.halves);
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(45, 1, 0.01, 500);
     this.camera.up.set(0, 0, 1);
