@@ -17,7 +17,7 @@ from foosim.console.live.watched import Watched
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Links
 from foosim.console.shown.source import About, Moment, Wanted
-from foosim.console.shown.timeline import WorldEvents
+from foosim.console.shown.timeline import NETWORK, Mark, WorldEvents
 from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
@@ -25,7 +25,9 @@ from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, frame_from_bytes
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit
+from foosim.protocol.network import Event
 from foosim.protocol.start import initial_frame
+from foosim.vhub.settings_text import event_text
 
 ASKERS_KEPT: Final = 256
 LINKS_EVERY: Final = 2
@@ -57,6 +59,8 @@ class Following:
         self._is_paused = self._has_changed = False
         self._marks = StatusMarks()
         self._events: WorldEvents | None = None
+        self._planned: list[Event] = []
+        """Events of the deployment's network that are not marked yet, the last one first."""
         self._watched: Watched | None = None
         self._statuses = 0
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
@@ -99,6 +103,7 @@ class Following:
             self._frame = None
             if before is None or before.drawing.deployment is not deployment:
                 self._events, self._watched = WorldEvents(deployment), Watched(deployment)
+                self._planned = sorted(deployment.network.events, key=lambda event: event.at_ns, reverse=True)
             world.links.turn_to(world.drawing.scene)
         return is_new
 
@@ -177,6 +182,9 @@ class Following:
         self._has_changed = was_paused != self._is_paused
         messages: list[dict[str, Any]] = [{"type": "status", "status": status}]
         marks = self._marks.new(status)
+        while self._planned and self._planned[-1].at_ns <= status["ticks"] * status["tick_ns"]:
+            event = self._planned.pop()
+            marks.append(asdict(Mark(event.at_ns // status["tick_ns"], NETWORK, event_text(event))))
         if self._events is not None and self._frame is not None:
             marks += map(asdict, self._events.take(self._frame))
         if marks:

@@ -321,7 +321,7 @@ def _response(status: int, content_type: str, content: bytes) -> Response:
 
 def _silent() -> logging.Logger:
     """Return a log for what strangers do to a connection, which says nothing: it is their matter."""
-    logger = logging.getLogger("foosim.console.server.server.server.server.connections")
+    logger = logging.getLogger("foosim.console.connections")
     logger.setLevel(logging.CRITICAL)
     logger.propagate = False
     return logger

@@ -56,17 +56,28 @@ class Windows:
 
     def __init__(self, window_s: float = WINDOW_S) -> None:
         self._window_s = window_s
+        self._is_beginning = False
+        """Whether the only count is one of the run's first seconds: all of it is in the window."""
         self._kept: deque[tuple[float, dict[Key, Count]]] = deque()
         """Simulated time in s, and the counts then; the first is the one that the window begins with."""
 
+    @property
+    def length_s(self) -> float:
+        """How long the window is: shorter where nobody has counted so long, 0 at the first count amid a run."""
+        if len(self._kept) > 1:
+            return self._kept[-1][0] - self._kept[0][0]
+        return self._kept[0][0] if self._is_beginning else 0.0
+
     def take(self, at_s: float, counts: dict[Key, Count]) -> dict[Key, Count]:
-        """Return what has happened on each link since the window began; time that goes back begins a new one."""
-        if self._kept and at_s < self._kept[-1][0]:
+        """Return what has happened on each link since the window began; time that goes back begins a new one, and so
+        does a time in which nobody has counted."""
+        if self._kept and not 0.0 <= at_s - self._kept[-1][0] <= self._window_s:
             self._kept.clear()
+        self._is_beginning = not self._kept and at_s <= self._window_s
         self._kept.append((at_s, counts))
         while len(self._kept) > 2 and self._kept[1][0] <= at_s - self._window_s:
             self._kept.popleft()
-        before = self._kept[0][1] if len(self._kept) > 1 else {}
+        before = {} if self._is_beginning else self._kept[0][1]
         return {key: _between(before.get(key, _NOTHING), count) for key, count in counts.items()}
 
 
@@ -126,7 +137,8 @@ class Links:
         seen = self._windows.take(status["ticks"] * status["tick_ns"] / 1e9, counts)
         self._look([key for key in rows if self._is_on_air(key)])
         links = [self._line(key, rows[key][7], count) for key, count in seen.items()]
-        return {"type": "links", "at": status["ticks"], "window_s": WINDOW_S, "links": links, "drops": _drops(seen)}
+        window_s = round(self._windows.length_s, 1)
+        return {"type": "links", "at": status["ticks"], "window_s": window_s, "links": links, "drops": _drops(seen)}
 
     def _line(self, key: Key, queue_ns: int, count: Count) -> dict[str, Any]:
         source, destination, rule = key

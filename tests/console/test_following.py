@@ -125,6 +125,18 @@ def test_a_request_names_the_browser_that_asked_and_is_marked_once() -> None:
     assert "marks" not in {message["type"] for message in found.take_status(status("paused", other, entry))}
 
 
+def test_events_of_the_deployment_are_marked_when_their_time_is_reached() -> None:
+    events = "events: [{at: 4 ms, partition: [[camera], [rest]], for: 1 s}, {at: 1 s, heal: all}]"
+    text = TABLE.read_text().replace("\nnetwork:\n", f"\nnetwork:\n  {events}\n")
+    found = Following(About("live", "test", "", 1, ()))
+    what = described(frame_of(9), []) | {"deployment": text}
+    found.turn_to(what, found.world_of(what, lambda deployment: {}))
+    marks = {"tick": 2, "kind": "network", "text": "partition camera | rest, for 1 s"}
+    messages = {message["type"]: message for message in found.take_status(status("running"))}
+    assert messages["marks"]["marks"] == [marks]
+    assert "marks" not in {message["type"] for message in found.take_status(status("running"))}
+
+
 def test_what_this_world_does_not_have_is_not_asked_for() -> None:
     found, _ = following()
     wanted = Wanted(1, 500.0, links=(("camera", "player-red"), ("a", "b")), readings=(("camera", "ball"), ("x", "y")))

@@ -38,6 +38,14 @@ def test_a_window_is_what_was_counted_in_the_last_seconds() -> None:
     assert windows.take(8.0, {KEY: count(31, 5, 300, snr=1, blocked=4)})[KEY] == count(11, 4, 10, blocked=4)
 
 
+def test_what_was_counted_while_nobody_looked_is_in_no_window() -> None:
+    windows = Windows(5.0)
+    assert windows.take(60.0, {KEY: count(600, 60, snr=60)})[KEY] == count(0, 0) and windows.length_s == 0.0
+    assert windows.take(61.0, {KEY: count(610, 61, snr=61)})[KEY] == count(10, 1, snr=1) and windows.length_s == 1.0
+    assert windows.take(90.0, {KEY: count(900, 90, snr=90)})[KEY] == count(0, 0)
+    assert windows.take(92.0, {KEY: count(920, 90, snr=90)})[KEY] == count(20, 0) and windows.length_s == 2.0
+
+
 def test_a_link_that_counts_anew_and_time_that_goes_back_begin_a_window() -> None:
     windows = Windows(5.0)
     windows.take(1.0, {KEY: count(10, 0)})

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from foosim.console.live.live_source import LiveSource, live_source
+from foosim.console.live import live_source
+from foosim.console.live.live_source import LiveSource
 from foosim.console.shown.source import About, Moment
 from foosim.protocol.errors import BadValue
 from foosim.supervisor.control import Control
