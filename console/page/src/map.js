@@ -75,18 +75,19 @@ function drawn(shape, px) {
 }
 
 /** Where a drawing shows what: metres on the one side, pixels on the other. */
-class Plan {
+export class Plan {
   /** @param {[[number, number], [number, number]]} bounds @param {number} width @param {number | undefined} height px */
   constructor([[left, bottom], [right, top]], width, height) {
     const room = Math.max(0.06 * Math.max(right - left, top - bottom), 1e-6);
-    this.left = left - room;
-    this.top = top + room;
-    this.width_m = right - left + 2 * room;
-    this.height_m = top - bottom + 2 * room;
+    const [width_m, height_m] = [right - left + 2 * room, top - bottom + 2 * room];
     this.width = width;
-    this.height = height ?? Math.min(MAX_HEIGHT, Math.round((width * this.height_m) / this.width_m)) + FOOT;
+    this.height = height ?? Math.min(MAX_HEIGHT, Math.round((width * height_m) / width_m)) + FOOT;
     /** Metres a pixel. */
-    this.px = Math.max(this.width_m / width, this.height_m / Math.max(1, this.height - FOOT));
+    this.px = Math.max(width_m / width, height_m / Math.max(1, this.height - FOOT));
+    this.width_m = width * this.px;
+    this.height_m = Math.max(1, this.height - FOOT) * this.px;
+    this.left = (left + right - this.width_m) / 2;
+    this.top = (top + bottom + this.height_m) / 2;
   }
 
   /** The pixel of a place; a place beyond the edge has the nearest one. @param {[number, number]} at */
