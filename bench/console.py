@@ -20,9 +20,9 @@ from typing import Any, Final
 import numpy as np
 
 from bench.runs import ROOT, TABLE, watch
-from foosim.console.following import Following
-from foosim.console.server import ConsoleServer, new_tokens
-from foosim.console.source import About, Answered, Curve, Feed, Wanted
+from foosim.console.live.following import Following
+from foosim.console.server.server import ConsoleServer, new_tokens
+from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment

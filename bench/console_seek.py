@@ -3,7 +3,7 @@
 A rehearsal is repeated, row by row and moved in time, until there are ten minutes; each packet, tick, frame and pose is
 there. A browser without a page asks for a tick and waits for the poses of it, while the pass over what happened reads
 on; then it asks again when that is done. Chunks are as of a run in real time (flushed each 100 ms), and as large as
-they get. Neighbours: `foosim.console.file_source`, `runs`.
+they get. Neighbours: `foosim.console.recorded.capture_source`, `runs`.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from msgspec.structs import replace
 from websockets.asyncio.client import ClientConnection, connect
 
 from bench.runs import TABLE, BenchError
-from foosim.console.file_source import FileSource
-from foosim.console.poses import HEAD
-from foosim.console.server import ConsoleServer, new_tokens
+from foosim.console.recorded.capture_source import FileSource
+from foosim.console.server.server import ConsoleServer, new_tokens
+from foosim.console.shown.poses import HEAD
 from foosim.rehearsal.between import Between
 from foosim.rehearsal.rehearse import rehearse
 from foosim.vhub.capture_file import CHUNK_BYTES, declare_topics, write_all

@@ -11,8 +11,8 @@ from typing import Annotated
 
 import typer
 
-from foosim.console.live import LiveSource
-from foosim.console.serving import ServeOptions, serve_sources
+from foosim.console.live.live_source import LiveSource
+from foosim.console.server.serving import ServeOptions, serve_sources
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.command import VersionOption, new_app, run_app
 from foosim.protocol.process import die_with_parent

@@ -80,6 +80,7 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
         "every process",
         "a reader that takes nothing; its connection is closed",
     ),
+    ("protocol.inbox", "ALARM_S"): ("every process", "its own time-keeping thread to end; then it ends without it"),
     ("protocol.standstill", "STOOD_NS"): ("every process", "its own loop; what is longer is its own standstill"),
     ("protocol.standstill", "TOLD_NS"): (
         "supervisor, vHub",

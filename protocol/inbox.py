@@ -24,6 +24,8 @@ Item = tuple[str, str, bytes]
 
 _NS: Final = 1_000_000_000
 _NEVER_NS: Final = 1 << 63
+ALARM_S: Final = 1.0
+"""How long the end of the alarm thread is waited for."""
 
 
 class Source(Protocol):
@@ -207,7 +209,7 @@ class _Alarm:
             self._stopped = True
             self._changed.notify()
         if self._thread is not None:
-            self._thread.join(1.0)
+            self._thread.join(ALARM_S)
 
     def _run(self) -> None:
         while self._sleep():

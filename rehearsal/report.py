@@ -14,7 +14,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from foosim.console.asked import edit_text, moves
+from foosim.console.shown.asked import edit_text, moves
 from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.network import event_of
 from foosim.protocol.radios import Radio

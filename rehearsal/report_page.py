@@ -1,76 +1,71 @@
-"""A report as one HTML page that stands by itself: no script, nothing that is fetched from elsewhere.
+"""A report as one HTML page that stands by itself: nothing is fetched from elsewhere, and its tables need no script.
 
-Every text is escaped, also those that the capture's own makers chose. Neighbours: `report` finds what is on it,
-`report_svg` draws.
+The script that draws is that of the console's page, in the page with the data that it reads. Every text is escaped,
+also those that the capture's own makers chose. Neighbours: `report` finds what is on it, `report_drawings` says what is
+drawn.
 """
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from hashlib import sha256
 from html import escape
-from typing import Final
+from typing import Any, Final
 
-from foosim.rehearsal.report import BinReport, ChannelReport, LinkReport, Report
-from foosim.rehearsal.report_svg import (
-    PALETTE,
-    SHARES,
-    Span,
-    bar_chart,
-    lanes,
-    legend,
-    line_chart,
-    map_picture,
-    matrix,
-)
+from foosim.console.server.page_files import page_files
+from foosim.protocol.codec import encode_json
+from foosim.rehearsal.report import ChannelReport, LinkReport, Report
+from foosim.rehearsal.report_drawings import drawings, has_map
 
-WIDE: Final = 1000
-HALF: Final = 490
 ENDPOINTS_MAX: Final = 60
 LINKS_SHOWN: Final = 100
 ROWS_SHOWN: Final = 200
-P50: Final = "#1971c2"
-P95: Final = "#e0a100"
-LOST: Final = "#c92a2a"
-
-_STYLE: Final = """
-body { font: 14px/1.45 system-ui, sans-serif; color: #212529; max-width: 1040px; margin: 24px auto; padding: 0 16px; }
-h1 { font-size: 22px; } h2 { font-size: 17px; margin: 32px 0 6px; border-bottom: 1px solid #dee2e6; }
-h3 { font-size: 14px; margin: 10px 0 2px; }
-table { border-collapse: collapse; font-size: 13px; } td, th { padding: 2px 10px 2px 0; vertical-align: top; }
-th { text-align: left; border-bottom: 1px solid #adb5bd; } td.n, th.n { text-align: right; white-space: nowrap; }
-code { font-size: 12px; overflow-wrap: anywhere; } p { margin: 4px 0; } .note { color: #495057; }
-svg { max-width: 100%; height: auto; display: block; } svg text { font-size: 11px; fill: #495057; }
-.scroll { overflow-x: auto; } .scroll svg { max-width: none; }
-.rows { overflow: auto; max-height: 480px; } .rows th { position: sticky; top: 0; background: #fff; }
-@media print { .rows { max-height: none; } }
-.grid { stroke: #dee2e6; } .mark { stroke: #212529; stroke-dasharray: 3 2; stroke-width: 1.5; }
-.track { fill: none; stroke: #495057; stroke-width: 1.2; stroke-opacity: 0.7; }
-.two { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 4px 20px; }
-.legend span { margin-right: 14px; white-space: nowrap; }
-.legend i { display: inline-block; width: 11px; height: 11px; margin-right: 4px; }
-"""
 
 
 def page(found: Report) -> str:
     """Return the page."""
     title = escape(f"{found.name}: the network of {found.metadata.get('world', 'a run')}")
+    names = _busiest(found)
     sections = (
-        *(_head(found), _network(found), _events(found), _links(found), _over_time(found), _causes(found)),
+        *(_head(found), _network(found), _events(found), _links(found, names), _over_time(found), _causes(found)),
         *(_ages(found), _uses(found), _senders(found), _configured(found), _places(found)),
     )
+    files = page_files()
+    script, style = files["/report.js"].content.decode(), files["/report.css"].content.decode()
+    policy = f"default-src 'none'; script-src '{_digest(script)}'; style-src '{_digest(style)}'"
     return "\n".join(
         [
             "<!DOCTYPE html>",
-            f'<html lang="en"><head><meta charset="utf-8"><title>{title}</title>',
+            f'<html lang="en" data-theme="auto"><head><meta charset="utf-8"><title>{title}</title>',
+            f"<meta http-equiv=\"Content-Security-Policy\" content=\"{policy}; base-uri 'none'; form-action 'none'\">",
             '<meta name="viewport" content="width=device-width">',
-            f"<style>{_STYLE}</style></head><body>",
+            f"<style>{style}</style></head><body>",
             f"<h1>{title}</h1>",
+            '<noscript><p class="note">Charts and map need JavaScript. The tables do not.</p></noscript>',
             *(part for section in sections for part in section),
+            f'<script type="application/json" id="report-data">{_inlined(drawings(found, names))}</script>',
+            f"<script>{script}</script>",
             "</body></html>",
             "",
         ]
     )
+
+
+def _digest(content: str) -> str:
+    """Return how a Content-Security-Policy names what stands in the page itself."""
+    return f"sha256-{b64encode(sha256(content.encode()).digest()).decode()}"
+
+
+def _inlined(content: Mapping[str, Any]) -> str:
+    """Return JSON that ends no element of HTML, and begins none, whatever the texts in it are."""
+    text = encode_json(content).decode()
+    return text.replace("<", r"\u003c").replace(">", r"\u003e").replace("&", r"\u0026")
+
+
+def _drawing(name: str, label: str) -> str:
+    return f'<figure data-drawing="{name}" aria-label="{escape(label)}"></figure>'
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[object]], texts: int = 1) -> str:
@@ -92,10 +87,6 @@ def _percent(share: float) -> str:
 
 def _seconds(ns: int) -> str:
     return f"{ns / 1e9:.9g} s"
-
-
-def _colours(found: Report) -> dict[str, str]:
-    return {cause: PALETTE[number % len(PALETTE)] for number, cause in enumerate(found.causes)}
 
 
 # --- sections ---------------------------------------------------------------------------------------------------------
@@ -140,7 +131,7 @@ def _events(found: Report) -> Iterator[str]:
     if not (found.happenings or found.bands or found.marks):
         yield _note("Nothing happened to the network, nobody changed the world, and no process was lost.")
         return
-    yield lanes(WIDE, found.start_ns, found.end_ns, found.bands, found.marks, "events over time")
+    yield _drawing("events", "events over time")
     if found.bands_left:
         yield _note(f"The first {len(found.bands)} times are drawn, {found.bands_left} more are not.")
     happened = [
@@ -154,21 +145,25 @@ def _events(found: Report) -> Iterator[str]:
         yield _note(f"And {len(happened) - ROWS_SHOWN} more.")
 
 
-def _links(found: Report) -> Iterator[str]:
-    yield "<h2>Links</h2>"
+def _busiest(found: Report) -> list[str]:
+    """Return the endpoints of most packets, by name."""
     packets: Counter[str] = Counter()
     for link in found.links:
         packets[link.source] += link.offered
         packets[link.destination] += link.offered
-    if not packets:
+    return sorted(name for name, _ in packets.most_common(ENDPOINTS_MAX))
+
+
+def _links(found: Report, names: Sequence[str]) -> Iterator[str]:
+    yield "<h2>Links</h2>"
+    if not names:
         yield _note("No packets.")
         return
-    names = sorted(name for name, _ in packets.most_common(ENDPOINTS_MAX))
-    yield _note("From each row to each column, coloured by the share delivered of what has a fate; at least:")
-    yield legend((name, colour) for _, colour, name in SHARES)
-    if len(packets) > len(names):
-        yield _note(f"The {len(names)} busiest of {len(packets)} endpoints.")
-    yield f'<div class="scroll">{matrix(names, found.links, "share delivered per link")}</div>'
+    yield _note("From each row to each column, coloured by the share lost of what has a fate.")
+    endpoints = {end for link in found.links for end in (link.source, link.destination)}
+    if len(endpoints) > len(names):
+        yield _note(f"The {len(names)} busiest of {len(endpoints)} endpoints.")
+    yield _drawing("links", "share lost per link")
 
 
 def _over_time(found: Report) -> Iterator[str]:
@@ -176,53 +171,31 @@ def _over_time(found: Report) -> Iterator[str]:
     if not found.channels:
         yield _note("No packets.")
         return
-    yield _note(f"By channel, in spans of {_seconds(found.bin_ns)} by the time of sending; the busiest channels.")
-    yield legend((("median delay", P50), ("95th percentile", P95), ("lost", LOST)))
+    yield _note(
+        f"By channel, in spans of {_seconds(found.bin_ns)} by the time of sending; the busiest channels. Partitions "
+        "and clogs are shades, losses and returns of processes dashed lines."
+    )
     yield '<div class="two">'
-    for channel in found.channels:
-        yield f"<div>{_channel(found, channel)}</div>"
+    for number, channel in enumerate(found.channels):
+        yield f"<div>{_channel(number, channel)}</div>"
     yield "</div>"
 
 
-def _channel(found: Report, channel: ChannelReport) -> str:
-    span = Span(found.start_ns, found.end_ns, found.bin_ns, HALF, 120)
-    low = Span(found.start_ns, found.end_ns, found.bin_ns, HALF, 70)
-    p50 = _runs(channel.bins, [a.p50_ms for a in channel.bins])
-    p95 = _runs(channel.bins, [a.p95_ms for a in channel.bins])
-    lost = [100.0 * a.dropped / (a.delivered + a.dropped) if a.dropped else 0.0 for a in channel.bins]
+def _channel(number: int, channel: ChannelReport) -> str:
     judged = channel.delivered + channel.dropped
     share = f", {_percent(channel.dropped / judged)} lost" if judged else ""
-    around = found.bands, found.marks
     return "\n".join(
         [
             f"<h3>{escape(channel.name)}: {channel.packets} packets{share}</h3>",
-            line_chart(span, [(P95, p95), (P50, p50)], " ms", *around, f"delay of {channel.name}"),
-            bar_chart(low, {"lost": (LOST, lost)}, " %", *around, f"loss of {channel.name}"),
+            _drawing(f"delay-{number}", f"delay of {channel.name}"),
+            _drawing(f"loss-{number}", f"loss of {channel.name}"),
         ]
     )
 
 
-def _runs(bins: Sequence[BinReport], values: Sequence[float]) -> list[list[tuple[int, float]]]:
-    """Return values as runs: broken where all was lost, and passing over where nothing was sent."""
-    runs: list[list[tuple[int, float]]] = [[]]
-    for number, (content, value) in enumerate(zip(bins, values, strict=True)):
-        if content.delivered:
-            runs[-1].append((number, value))
-        elif content.dropped:
-            runs.append([])
-    return [run for run in runs if run]
-
-
 def _causes(found: Report) -> Iterator[str]:
     yield "<h2>Causes of losses over time</h2>"
-    if not found.causes:
-        yield _note("Nothing was lost.")
-        return
-    colours = _colours(found)
-    yield legend(colours.items())
-    span = Span(found.start_ns, found.end_ns, found.bin_ns, WIDE, 200)
-    series = {cause: (colours[cause], counts) for cause, counts in found.causes_over_time.items()}
-    yield bar_chart(span, series, "", found.bands, found.marks, "packets lost by cause over time")
+    yield _drawing("causes", "packets lost by cause over time") if found.causes else _note("Nothing was lost.")
 
 
 def _ages(found: Report) -> Iterator[str]:
@@ -341,17 +314,15 @@ def _configured(found: Report) -> Iterator[str]:
 
 def _places(found: Report) -> Iterator[str]:
     where = found.map
-    if not (where.outlines or where.tracks):
+    if not has_map(where):
         return
     yield "<h2>Map</h2>"
     yield _note(
-        "From above: scenery, the ways of bodies with their last places, and where packets were lost: in the middle "
-        "between their ends, as of the captured frame before."
+        "From above: what stands, the ways of bodies with their last places, and where packets were lost: in the "
+        "middle between their ends, as of the captured frame before. A way is cut where a body was put elsewhere. "
+        "What is beyond the field stands at its edge."
     )
-    colours = _colours(found)
-    if colours:
-        yield legend(colours.items())
-    yield map_picture(where, colours, "the world from above")
+    yield _drawing("map", "the world from above")
     drawn = where.lost - where.placeless
     if drawn > len(where.losses):
         yield _note(f"A sample of {len(where.losses)} of {drawn} lost packets.")

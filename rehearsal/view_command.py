@@ -1,6 +1,6 @@
 """The command `foosim-replay view`: the console over a capture, beside or under another one or a table of poses.
 
-Neighbours: `console` (`file_source`, `poses_source`, `played`, `serving`), `between` (computes ticks in between).
+Neighbours: `console.recorded` (the sources), `console.server.serving`, `between` (computes ticks in between).
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from typing import Annotated, Final
 import typer
 
 from foosim.client.replay import hear_replay
-from foosim.console.file_source import FileSource
-from foosim.console.played import PlayedSource
-from foosim.console.poses_source import PosesSource
-from foosim.console.serving import ServeOptions, serve_sources
-from foosim.console.source import Source
+from foosim.console.recorded.capture_source import FileSource
+from foosim.console.recorded.poses_source import PosesSource
+from foosim.console.recorded.replay_source import PlayedSource
+from foosim.console.server.serving import ServeOptions, serve_sources
+from foosim.console.shown.source import Source
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.command import PkiOption
 from foosim.protocol.errors import BadValue, read_at

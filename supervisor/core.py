@@ -16,6 +16,7 @@ from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.channels import Channel
+from foosim.protocol.closed import closed
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, basis_of, chain_next, layout_after
@@ -214,7 +215,7 @@ class SupervisorCore:
         process.gone_ns = now_ns
         is_certain = not self.watch.doubts(process, now_ns)
         if is_certain and not process.farewell and not process.lost and self.end is None:
-            self._lose({name: "its connection closed"}, now_ns)
+            self._lose({name: closed(now_ns - process.heard_ns)}, now_ns)
 
     def _lose(self, lost: Mapping[str, str], now_ns: int) -> None:
         """Go on without the nodes among those who are lost, wait for the vHub; without any other the run ends."""

@@ -158,6 +158,7 @@ def test_generated_parts_are_current(page: Path) -> None:
 NO_DEADLINES = {
     "POLL_S",
     "WATCH_S",
+    "_NEVER_NS",
     "LATE_EVERY_NS",
     "AGAIN_S",
     "QUERY_S",
@@ -177,6 +178,23 @@ def test_every_constant_that_waits_for_somebody_is_in_the_table_of_deadlines() -
         for name in re.findall(r"^([A-Z_]+_(?:NS|MS|US|S)(?:_MAX)?)\b", text, re.M)
     }
     assert {(module, name) for module, name in found - told if name not in NO_DEADLINES} == set()
+
+
+WAITS = ("acquire", "communicate", "join", "poll", "result", "select", "settimeout", "wait", "wait_for")
+"""Methods whose number is how long is waited. How often is looked (`sleep`) is no deadline."""
+
+
+def test_no_wait_has_its_number_in_its_call() -> None:
+    """It would be in no table: a constant with a name is, whose end is its unit."""
+    found = []
+    for path in sorted(path for package in (*PACKAGES, "console") for path in (ROOT / package).rglob("*.py")):
+        for call in (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)):
+            named = [k.value for k in call.keywords if re.search(r"timeout|_n?s$|_ms$", k.arg or "")]
+            is_wait = isinstance(call.func, ast.Attribute) and call.func.attr in WAITS
+            for given in [*named, *(call.args if is_wait else ())]:
+                if isinstance(given, ast.Constant) and type(given.value) in (int, float) and given.value:
+                    found.append(f"{path.relative_to(ROOT)}:{call.lineno}: {ast.unparse(call)}")
+    assert found == []
 
 
 def test_every_part_that_can_be_generated_stands_in_a_page() -> None:

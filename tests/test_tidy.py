@@ -34,7 +34,11 @@ MAY_IMPORT: dict[str, set[str]] = {
 PACKAGES = sorted(MAY_IMPORT)
 
 # The one file that knows a library which would otherwise spread.
-ONLY_IN = {"zenoh": "protocol/session.py", "pybullet": "node/engines/bullet.py", "websockets": "console/server.py"}
+ONLY_IN = {
+    "zenoh": "protocol/session.py",
+    "pybullet": "node/engines/bullet.py",
+    "websockets": "console/server/server.py",
+}
 
 # The files that touch the world. Every other module is a core: it gets messages and the time and returns what to do,
 # which is why rehearsal can run all of them in one process on virtual time.
@@ -43,18 +47,18 @@ SHELLS = {
     "client/client.py",
     "client/main.py",
     "client/replay.py",
-    "console/branch_text.py",
-    "console/capture_index.py",
-    "console/comparing.py",
-    "console/deck.py",
-    "console/file_source.py",
-    "console/live.py",
+    "console/recorded/branch_text.py",
+    "console/recorded/capture_index.py",
+    "console/recorded/comparing.py",
+    "console/recorded/deck.py",
+    "console/recorded/capture_source.py",
+    "console/live/live_source.py",
     "console/main.py",
-    "console/played.py",
-    "console/poses_source.py",
-    "console/recording.py",
-    "console/server.py",
-    "console/serving.py",
+    "console/recorded/replay_source.py",
+    "console/recorded/poses_source.py",
+    "console/recorded/recording.py",
+    "console/server/server.py",
+    "console/server/serving.py",
     "node/engines/probation.py",
     "node/main.py",
     "protocol/assets.py",

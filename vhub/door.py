@@ -255,8 +255,9 @@ class Door:
             return
         session.is_gone = True
         if self._is_waited_for(name):
+            session.why_gone = session.closed(now_ns)
             session.leave(self._back_ns(name), now_ns)
-            self._miss(name, session.boot, "its connection closed")
+            self._miss(name, session.boot, session.why_gone)
             return
         self._leave(name)
 
@@ -351,7 +352,7 @@ class Door:
         assert deployment is not None
         if may_restart(deployment, session.name):
             return f"it was not started again within {deployment.deadlines.start_ns / 1e9:g} s (deadlines.start)"
-        return "its connection closed" if session.boot else "it did not come back to the vHub"
+        return session.why_gone if session.boot else "it did not come back to the vHub"
 
     def _go_on_without(self, name: str) -> None:
         """A player leaves until it is started again: at the tick whose Done it owes, or at the next one."""

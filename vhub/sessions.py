@@ -18,6 +18,7 @@ from typing import Final, NamedTuple, TypeVar
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish
 from foosim.protocol.client_messages import ClientRefusal
+from foosim.protocol.closed import CLOSED, closed
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import (
@@ -65,6 +66,8 @@ class Session:
     """Whether it is to be told what it had not received then."""
     is_gone: bool = False
     """Whether its process has gone, and has not come back, nor another one."""
+    why_gone: str = CLOSED
+    """What was known of that."""
     returns: int = 0
     """How often its process had lost the vHub when it said hello."""
     before: dict[str, None] = field(default_factory=dict)
@@ -111,6 +114,7 @@ class Session:
             self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
         self.is_present = self.is_present and boot == self.boot
         self.boot, self.received, self.is_behind, self.is_gone = boot, received, True, False
+        self.why_gone = CLOSED
         self.away_ns = self.away_ns if joins_first else -1
         self.next_sequence = max(self.next_sequence, sequence + 1)
 
@@ -159,6 +163,11 @@ class Session:
         """What is said when the deadline has passed."""
         told = f"{self.name} has not answered tick {self.go_tick} for {self.allowed_ns / 1e9:g} s"
         return f"{told} (deadlines.{self.deadline})"
+
+    def closed(self, now_ns: int) -> str:
+        """Return what is known of its process, whose connection has ended: whether it owed an answer until then."""
+        owed_ns = now_ns - (self.deadline_ns - self.allowed_ns) if self.deadline_ns else 0
+        return closed(owed_ns, f"it had not answered tick {self.go_tick}")
 
     def wait(self, now_ns: int, allowed_ns: int, again_after_ns: int) -> None:
         """Begin to wait for a Done."""

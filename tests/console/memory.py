@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
-from foosim.console.poses import HEAD, Poser
-from foosim.console.scene_json import scene_content
-from foosim.console.server import ConsoleServer, Tokens
-from foosim.console.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.console.server.server import ConsoleServer, Tokens
+from foosim.console.shown.poses import HEAD, Poser
+from foosim.console.shown.scene_json import scene_content
+from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Refused

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foosim.console.compare import POINTS, Comparison
-from foosim.console.recording import Recording
-from foosim.console.tracks import Track
-from foosim.console.whereabouts import Whereabouts
+from foosim.console.recorded.recording import Recording
+from foosim.console.recorded.whereabouts import Whereabouts
+from foosim.console.shown.compare import POINTS, Comparison
+from foosim.console.shown.tracks import Track
 
 MS = 1_000_000
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)

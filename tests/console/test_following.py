@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from foosim.console.following import Following, World
-from foosim.console.overlays import Overlays
-from foosim.console.source import About, Wanted
+from foosim.console.live.following import Following, World
+from foosim.console.shown.overlays import Overlays
+from foosim.console.shown.source import About, Wanted
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import Frame

@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from foosim.console.asked import edit_text
-from foosim.console.capture_curves import curve_points, reading_points
-from foosim.console.capture_history import CaptureHistory
-from foosim.console.link_history import PACKET_MARKS, LinkHistory, PacketMark
-from foosim.console.recording import Recording
-from foosim.console.source import Curve
-from foosim.console.timeline import MARKS_MAX, Mark, Timeline, WorldEvents
+from foosim.console.recorded.capture_curves import curve_points, reading_points
+from foosim.console.recorded.capture_history import CaptureHistory
+from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory, PacketMark
+from foosim.console.recorded.recording import Recording
+from foosim.console.shown.asked import edit_text
+from foosim.console.shown.source import Curve
+from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import Frame
@@ -215,7 +215,7 @@ def test_the_last_drops_of_a_link_are_explained_as_the_command_does(history: Cap
 def test_packets_of_more_links_than_are_told_apart_are_counted(
     history: CaptureHistory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("foosim.console.link_history.LINKS_MAX", 3)
+    monkeypatch.setattr("foosim.console.recorded.link_history.LINKS_MAX", 3)
     few = opened(history.recording.path)
     assert few.links.packets == history.links.packets and few.links.others > 0
     assert few.links.totals(SECOND_NS)["offered"] == few.links.packets - few.links.others

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
-from foosim.console.drawing import Drawing
-from foosim.console.link_history import LinkHistory, PacketMark
-from foosim.console.links import Count, Links, Windows
-from foosim.console.rule_text import rule_text
+from foosim.console.recorded.link_history import LinkHistory, PacketMark
+from foosim.console.shown.drawing import Drawing
+from foosim.console.shown.links import Count, Links, Windows
+from foosim.console.shown.rule_text import rule_text
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout
 from foosim.protocol.start import initial_frame

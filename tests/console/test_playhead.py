@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from foosim.console.playhead import Playhead
+from foosim.console.recorded.playhead import Playhead
 from foosim.protocol.errors import BadValue
 
 TICK_NS = 2_000_000

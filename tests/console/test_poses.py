@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from foosim.console.poses import Poser
-from foosim.console.scene_json import scene_content
+from foosim.console.shown.poses import Poser
+from foosim.console.shown.scene_json import scene_content
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foosim.console.poses_csv import BadPoses, read_tracks
-from foosim.console.poses_source import load_tracks
+from foosim.console.recorded.poses_csv import BadPoses, read_tracks
+from foosim.console.recorded.poses_source import load_tracks
 from tests.replay.conftest import replay
 
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from foosim.console.capture_index import CaptureIndex
-from foosim.console.poses import Poser
-from foosim.console.recording import TOPICS, Recording
+from foosim.console.recorded.capture_index import CaptureIndex
+from foosim.console.recorded.recording import TOPICS, Recording
+from foosim.console.shown.poses import Poser
 from foosim.protocol.frame import Frame
 from foosim.rehearsal.between import Between
 from foosim.vhub.capture_parts import files_from, part_path

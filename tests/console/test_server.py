@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from websockets.exceptions import ConnectionClosedError
 
-from foosim.console.server import CONNECTIONS_MAX
+from foosim.console.server.server import CONNECTIONS_MAX
 from tests.console.memory import Console, MemorySource, console, table
 
 Part = Callable[[Console], Awaitable[None]]

@@ -17,13 +17,15 @@ from typer.testing import CliRunner
 from foosim.protocol.errors import Refused
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.replay_command import app
+from foosim.rehearsal.report import Report, gather
 from foosim.rehearsal.system import System
 from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_file import declare_topics, write_all
+from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.mcap_writer import McapWriter
-from foosim.vhub.rows import PROFILE
+from foosim.vhub.rows import PROFILE, Fate, PacketRow
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -32,6 +34,15 @@ TICK_NS: Final = 2_000_000
 ADDED_AT: Final = 60
 SETS: Final = ("engine=pure", *(text for text in BY_PERIOD if "player-blue" in text))
 """One player acts at arrival, the other at ticks of its own."""
+
+NETWORK: Final = (
+    "network={radios: {w: {preset: wifi_5_indoor, fading: {kind: rician}, loss: 4 %}}, robots: {'*': [w]},"
+    " links: [{id: fast, from: 'player*', to: '*', delay: 2 ms, jitter: {shape: uniform, width: 1 ms}}],"
+    " places: {player-red: [-20 m, 3 m, 1 m], player-blue: [3 m, 0 m, 1 m], camera: [0 m, 0 m, 2 m]},"
+    " events: [{at: 100 ms, for: 60 ms, partition: [[player-red], [rest]]}, {at: 200 ms,"
+    " set: {link: fast, loss: 30 %}}]}"
+)
+CLOG: Final = {"clog": {"from": "player-blue", "to": "*"}, "for": "50 ms"}
 
 
 def disturb(system: System) -> None:
@@ -57,6 +68,33 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def again(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same run once more, in a large chunk."""
     return capture_to(tmp_path_factory.mktemp("replay") / "again.mcap")
+
+
+def disrupt(system: System) -> None:
+    system.at_tick(20, lambda: system.request("push", impulse=[0.02, 0.0, -0.01]))
+    system.at_tick(40, lambda: system.request("move", robot="red.goal", node="n2"))
+    system.at_tick(60, lambda: system.request("network", event=CLOG))
+    system.at_tick(70, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
+    system.at_tick(150, lambda: system.request("remove", name="ball2"))
+
+
+@pytest.fixture(scope="session")
+def radio_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of 0.4 s over radio with places, a partition, changed settings and a clog that was asked for."""
+    path = tmp_path_factory.mktemp("report") / "radio.mcap"
+    rehearse(TABLE.read_text(), TABLE.name, 200, 2, ["engine=pure", NETWORK], prepare=disrupt, capture=path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def found(radio_run: Path) -> Report:
+    return gather(open_capture(radio_run), radio_run.name)
+
+
+def packet(sent_ns: int, due_ns: int, cause: str = "", copy: int = 0) -> PacketRow:
+    fate: Fate = "dropped" if cause else "delivered"
+    times = sent_ns, sent_ns, due_ns, 0
+    return PacketRow("a", sent_ns, copy, "b", "c", *times, fate, cause, "rule", "", "", 0, b"", 0)
 
 
 def contents_of(path: Path) -> list[Any]:

@@ -7,90 +7,26 @@ import resource
 import signal
 from dataclasses import replace
 from html import escape
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import pytest
-from msgspec.structs import replace as replace_row
 
-from foosim.console.asked import moves
-from foosim.protocol.scene import Box, Cylinder, Shape, turn
+from foosim.console.shown.asked import moves
 from foosim.rehearsal import report_command
-from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
-from foosim.rehearsal.report_map import MapMaker, outline
-from foosim.rehearsal.report_page import _runs, page
-from foosim.rehearsal.report_svg import WHOLE, round_up
+from foosim.rehearsal.report_drawings import drawings
+from foosim.rehearsal.report_page import page
 from foosim.rehearsal.report_tallies import SAMPLES, LinkTally, Sample
-from foosim.rehearsal.system import System
 from foosim.rehearsal.whatif import what_if
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import PACKETS, EpochRow, Fate, OwnerRow, PacketRow
-from tests.replay.conftest import TABLE, damaged, messages_of, replay, rewritten, with_row
+from foosim.vhub.rows import PACKETS, EpochRow, OwnerRow, PacketRow
+from tests.replay.conftest import damaged, messages_of, packet, replay, rewritten, with_row
+from tests.replay.report_pages import Page
 
-NETWORK: Final = (
-    "network={radios: {w: {preset: wifi_5_indoor, fading: {kind: rician}, loss: 4 %}}, robots: {'*': [w]},"
-    " links: [{id: fast, from: 'player*', to: '*', delay: 2 ms, jitter: {shape: uniform, width: 1 ms}}],"
-    " places: {player-red: [-20 m, 3 m, 1 m], player-blue: [3 m, 0 m, 1 m], camera: [0 m, 0 m, 2 m]},"
-    " events: [{at: 100 ms, for: 60 ms, partition: [[player-red], [rest]]}, {at: 200 ms,"
-    " set: {link: fast, loss: 30 %}}]}"
-)
-CLOG: Final = {"clog": {"from": "player-blue", "to": "*"}, "for": "50 ms"}
-
-
-def disrupt(system: System) -> None:
-    system.at_tick(20, lambda: system.request("push", impulse=[0.02, 0.0, -0.01]))
-    system.at_tick(40, lambda: system.request("move", robot="red.goal", node="n2"))
-    system.at_tick(60, lambda: system.request("network", event=CLOG))
-    system.at_tick(70, lambda: system.request("add", position=[0.2, 0.1, 0.05], velocity=[-1.0, 0.0, 0.0]))
-    system.at_tick(150, lambda: system.request("remove", name="ball2"))
-
-
-@pytest.fixture(scope="module")
-def radio_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of 0.4 s over radio with places, a partition, changed settings and a clog that was asked for."""
-    path = tmp_path_factory.mktemp("report") / "radio.mcap"
-    rehearse(TABLE.read_text(), TABLE.name, 200, 2, ["engine=pure", NETWORK], prepare=disrupt, capture=path)
-    return path
-
-
-@pytest.fixture(scope="module")
-def found(radio_run: Path) -> Report:
-    return gather(open_capture(radio_run), radio_run.name)
-
-
-class Page(HTMLParser):
-    """Checks that elements are closed in order, and that nothing is run or fetched; keeps texts and table rows."""
-
-    def __init__(self, content: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.texts: list[str] = []
-        self.rows: list[list[str]] = []
-        self.drawings = 0
-        self.feed(content)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        assert tag not in ("script", "link", "img", "iframe", "object") and not {"href", "src"} & dict(attrs).keys()
-        if tag != "meta":
-            self.open.append(tag)
-        self.drawings += tag == "svg"
-        if tag == "tr":
-            self.rows.append([])
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if data.strip():
-            self.texts.append(data)
-            if self.open[-1] in ("td", "code") and "tr" in self.open:
-                self.rows[-1].append(data)
+WWW: Final = Path(__file__).parents[2] / "console" / "www"
 
 
 def test_the_report_has_the_numbers_that_the_capture_gives(radio_run: Path, found: Report) -> None:
@@ -124,12 +60,6 @@ def test_links_are_those_of_the_other_tools(radio_run: Path, found: Report) -> N
         assert link.delivered + link.dropped <= link.offered and sum(link.causes.values()) == link.dropped
         assert link.age_most_ms is not None and link.age_mean_ms is not None
         assert link.age_most_ms > link.age_mean_ms >= other.before.age_ms * 0.5
-
-
-def packet(sent_ns: int, due_ns: int, cause: str = "", copy: int = 0) -> PacketRow:
-    fate: Fate = "dropped" if cause else "delivered"
-    times = sent_ns, sent_ns, due_ns, 0
-    return PacketRow("a", sent_ns, copy, "b", "c", *times, fate, cause, "rule", "", "", 0, b"", 0)
 
 
 def test_ages_grow_until_something_newer_comes() -> None:
@@ -219,59 +149,71 @@ def test_the_page_is_whole_and_says_what_was_found(found: Report) -> None:
     assert found.digest in read.texts and found.chain in read.texts
     for sender in found.senders:
         assert any(row[:3] == [sender.source, sender.medium, str(sender.transmissions)] for row in read.rows)
-    assert read.drawings == 2 + 2 * len(found.channels) + 1 + 1
-    titles = [text for text in read.texts if " to player-red: " in text]
-    assert any("delivered" in text for text in titles)
+    channels = len(found.channels)
+    assert len(read.drawings) == 2 + 2 * channels + 1 + 1 == len(read.places)
     (radio,) = [row for row in read.rows if row[:2] == ["w", "wifi_5_indoor"]]
     assert {"loss 4 %", "frequency 5.25 GHz", "mtu 1500 B"} < set(radio[2].split(", ")) and "None" not in radio[2]
-    assert "http" not in page(found) and "url(" not in page(found)
+    assert all("http" not in text for text in read.texts)
 
 
-def test_lines_break_where_all_was_lost_and_pass_over_silence() -> None:
-    bins = [BinReport(delivered, dropped, 1.0, 2.0) for delivered, dropped in ((1, 0), (0, 0), (1, 1), (0, 1), (1, 0))]
-    assert _runs(bins, [5.0, 0.0, 6.0, 0.0, 7.0]) == [[(0, 5.0), (2, 6.0)], [(4, 7.0)]]
-    assert _runs(bins[3:4], [0.0]) == []
+def test_the_page_is_small_and_draws_with_the_modules_of_the_console(found: Report) -> None:
+    content = page(found)
+    read = Page(content)
+    shipped = {name: (WWW / f"report.{end}").read_text() for name, end in (("script", "js"), ("style", "css"))}
+    assert read.inlined == shipped
+    assert "</script" not in shipped["script"].lower() and "</style" not in shipped["style"].lower()
+    assert "Permission is hereby granted" in shipped["script"], "the licence of the library travels with it"
+    assert len(content) < sum(map(len, shipped.values())) + 150_000
 
 
-def test_the_map_has_scenery_paths_and_where_packets_were_lost(found: Report) -> None:
-    where = found.map
-    assert {track.name for track in where.tracks} >= {"ball", "red.goal"} and len(where.tracks) == 10
-    assert where.standing["player-red"] == (-20.0, 3.0) and where.placeless == 0
-    assert len(where.losses) == where.lost == found.fates["dropped"]
-    assert sum(count for *_, count in where.links) <= where.lost
-    middle = next(loss for loss in where.losses if {loss.source, loss.destination} == {"camera", "player-red"})
-    assert middle.at == (-10.0, 1.5)
+def test_each_chart_has_its_series(found: Report) -> None:
+    drawn = Page(page(found)).drawings
+    span = [found.start_ns / 1e9, found.end_ns / 1e9]
+    for number, channel in enumerate(found.channels):
+        delay, loss = drawn[f"delay-{number}"], drawn[f"loss-{number}"]
+        for line, values in zip(delay["series"], ("p95_ms", "p50_ms"), strict=True):
+            told = [value for _, value in line["points"] if value is not None]
+            assert told == [getattr(content, values) for content in channel.bins if content.delivered]
+        (lost,) = loss["series"]
+        shares = [content.dropped / max(1, content.dropped + content.delivered) for content in channel.bins]
+        assert [value for _, value in lost["points"]] == pytest.approx([100.0 * share for share in shares])
+        assert delay["range"] == loss["range"] == span and loss["stacked"]
+        assert [shade["text"].split(":")[0] for shade in delay["shades"]] == ["partition", "clog"]
+    causes = drawn["causes"]["series"]
+    assert {one["name"]: [value for _, value in one["points"]] for one in causes} == {
+        cause: [*counts] for cause, counts in found.causes_over_time.items()
+    }
+    times = [time for time, _ in causes[0]["points"]]
+    assert times == sorted(times) and span[0] < times[0] and times[-1] < span[1]
 
 
-def test_a_packet_is_lost_where_its_sender_was_when_it_sent(radio_run: Path) -> None:
-    """Not where the sender is when the loss is known; without a place of either end it is counted and not drawn."""
-    capture = open_capture(radio_run)
-    places = capture.poses("red.midfield").positions
-    maker = MapMaker(capture.deployment, capture.deployment.tick_ns)
-    frames = [block.frame(index) for block in capture.frame_blocks for index in range(len(block))]
-    for frame in frames:
-        maker.take_frame(frame)
-    moved = max(range(len(frames)), key=lambda number: float(abs(places[number] - places[-1]).sum()))
-    sent_ns = frames[moved].tick * capture.deployment.tick_ns
-    maker.take_loss(replace_row(packet(sent_ns + 1, -1, "snr"), source="red.midfield"))
-    maker.take_loss(packet(sent_ns, -1, "snr"))
-    where = maker.result(10)
-    assert [loss.at for loss in where.losses] == [tuple(places[moved][:2])] != [tuple(places[-1][:2])]
-    assert (where.lost, where.placeless) == (2, 1)
+def test_links_and_events_are_drawn_with_what_they_are(found: Report) -> None:
+    drawn = Page(page(found)).drawings
+    names, cells = drawn["links"]["names"], drawn["links"]["cells"]
+    links = {(link.source, link.destination): link for link in found.links}
+    assert len(cells) == len(links)
+    for cell in cells:
+        link = links[names[cell["from"]], names[cell["to"]]]
+        judged = link.delivered + link.dropped
+        assert cell["loss"] == (pytest.approx(link.dropped / judged, abs=1e-6) if judged else None)
+        assert cell["text"].startswith(f"{link.source} to {link.destination}: {link.delivered} of {link.offered} ")
+    lanes = {lane["name"]: lane["entries"] for lane in drawn["events"]["lanes"]}
+    assert list(lanes) == ["partition", "clog", "settings", "asked for"]
+    assert (lanes["partition"][0]["from"], lanes["partition"][0]["to"]) == (0.1, 0.16)
+    asked = [entry["text"].split(" s: ")[1].split()[0] for entry in lanes["asked for"]]
+    assert asked == ["push", "move", "clog", "add", "remove"]
 
 
-def test_outlines_are_what_a_thing_covers() -> None:
-    half_turn = turn((0.0, 0.0, 1.0), np.pi / 4)
-    diamond = outline(Shape(Box((1.0, 1.0, 0.5)), "walls", (0, 0, 0, 1), (5.0, 0.0, 0.5), half_turn))
-    assert len(diamond.corners) >= 4 and max(x for x, _ in diamond.corners) == pytest.approx(5.0 + 2**0.5)
-    assert diamond.top_m == pytest.approx(1.0)
-    lying = outline(Shape(Cylinder(0.5, 4.0), "walls", (0, 0, 0, 1), orientation=turn((1.0, 0.0, 0.0), np.pi / 2)))
-    assert max(y for _, y in lying.corners) == pytest.approx(2.0)
-    assert max(x for x, _ in lying.corners) == pytest.approx(0.5)
+def test_lines_break_where_all_was_lost_and_pass_over_silence(found: Report) -> None:
+    bins = tuple(BinReport(got, lost, 5.0, 7.0) for got, lost in ((1, 0), (0, 0), (1, 1), (0, 1), (1, 0)))
+    channel = replace(found.channels[0], bins=bins)
+    drawn = drawings(replace(found, channels=(channel,), start_ns=0, end_ns=50, bin_ns=10), [])["delay-0"]
+    points = [(round(time * 1e9), value) for time, value in drawn["series"][1]["points"]]
+    assert points == [(5, 5.0), (25, 5.0), (35, None), (45, 5.0)]
 
 
 def test_names_are_escaped_wherever_they_stand(found: Report) -> None:
-    evil = '"><b onload=x>&'
+    evil = '"></script><b onload=x>&<!--<script>'
     links = tuple(replace(link, source=evil, causes={evil: 1}) for link in found.links[:2])
     losses = tuple(replace(loss, source=evil) for loss in found.map.losses)
     where = replace(found.map, losses=losses, standing={evil: (0.0, 0.0)}, links=((evil, evil, evil, 1),))
@@ -297,6 +239,11 @@ def test_names_are_escaped_wherever_they_stand(found: Report) -> None:
     )
     read = Page(content)
     assert "b" not in read.open and evil not in content and content.count(escape(evil)) > 40
+    assert content.count("<script") == content.count("</script") == 2 and "<!--" not in content
+    drawn = read.drawings
+    assert evil in drawn["links"]["names"] and evil in drawn["events"]["lanes"][0]["entries"][0]["text"]
+    assert {body["name"] for body in drawn["map"]["map"]["bodies"]} == {evil}
+    assert drawn["causes"]["series"][-1]["name"] == evil and drawn["map"]["legend"][-1]["text"] == evil
 
 
 def test_the_command_writes_a_page_and_overwrites_none(radio_run: Path, tmp_path: Path, found: Report) -> None:
@@ -373,5 +320,3 @@ def test_spans_are_round_and_few() -> None:
     assert bin_width_ns(0, 2_000_000) == 2_000_000
     for span in (1, 7_000_000, 3_600_000_000_000):
         assert span / bin_width_ns(span, 1) <= 60
-    assert [round_up(value) for value in (0.0, 0.3, 1.0, 2.1, 99.0)] == pytest.approx([1.0, 0.3, 1.0, 3.0, 100.0])
-    assert round_up(2.1, WHOLE) == 5.0

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from foosim.client.replay import hear_replay
-from foosim.console.file_source import FileSource
-from foosim.console.played import PlayedSource
-from foosim.console.poses_source import PosesSource
-from foosim.console.source import Wanted
+from foosim.console.recorded.capture_source import FileSource
+from foosim.console.recorded.poses_source import PosesSource
+from foosim.console.recorded.replay_source import PlayedSource
+from foosim.console.shown.source import Wanted
 from foosim.protocol.errors import BadValue, Refused
 from foosim.rehearsal.view_command import open_sources
-from tests.console.test_file_source import Heard, running
+from tests.console.test_capture_source import Heard, running
 from tests.replay.conftest import TICKS, replay
 from tests.replay.test_play import playing
 

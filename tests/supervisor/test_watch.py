@@ -279,17 +279,21 @@ def test_a_lockstep_client_that_does_not_answer_is_lost(pace: Pace) -> None:
     assert not [line for line in seen.lines if "overdue" in line or "waits for" in line], "only it can be overdue"
 
 
-def test_a_lockstep_client_whose_connection_closes_is_lost() -> None:
-    short = ("deadlines.client_back=300 ms", "deadlines.lockstep_realtime=300 ms")
+@pytest.mark.parametrize(
+    ("silent_ms", "known"), [(0, ""), (1_200, ": it had not answered tick 60 for 1.2 s")], ids=["ended", "stopped"]
+)
+def test_a_lockstep_client_whose_connection_closes_is_lost(silent_ms: int, known: str) -> None:
+    short = ("deadlines.client_back=300 ms", f"deadlines.lockstep_realtime={silent_ms + 300} ms")
     seen = Seen(ticks=400, sets=(*LONG, *short, "players.player-blue.restart=false"))
 
     def close(system: System) -> None:
         system.pause("player-blue", 3_600_000_000_000)  # nothing comes of it, as of one that is gone
-        system.hub.client_gone("player-blue", system.bus.now_ns)
+        gone = partial(system.hub.client_gone, "player-blue")
+        system.later(silent_ms * MS, lambda: gone(system.bus.now_ns))
 
     seen.prepare = lambda system: system.at_tick(60, partial(close, system))
     reason, _ = ended(seen.go())
-    assert reason == "lost player-blue: its connection closed"
+    assert reason == f"lost player-blue: its connection closed{known}"
 
 
 def presence_ends(process: str) -> Seen:

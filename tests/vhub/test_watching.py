@@ -13,7 +13,7 @@ from typing import Any, Final
 import pytest
 from msgspec.structs import replace
 
-from foosim.console.watched import Watched as Shown
+from foosim.console.live.watched import Watched as Shown
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode, decode_json, encode_json
 from foosim.protocol.deployment import Deployment

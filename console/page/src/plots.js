@@ -1,7 +1,8 @@
-// Charts from data alone: lines over time, distributions, bars. They need no server and no scene: a report inlines them.
+// Charts from data alone: lines and stacked bars over time, counts. They need no server and no scene: a report inlines them.
 
 import uPlot from "uplot";
 import { paletteColour } from "./colours.js";
+import { lonely, stack } from "./series.js";
 import { number } from "./text.js";
 import { h, keyed, setText } from "./ui.js";
 
@@ -34,13 +35,51 @@ function axis(label, text, size) {
 const plain = (value) => String(+value.toPrecision(6));
 
 /**
+ * @typedef {{from: number, to: number, colour: string, text: string}} Shade something that held meanwhile
+ *
  * @typedef {object} ChartOptions
  * @property {string} [title]
  * @property {string} [unit] of the values
  * @property {string} [x] what the horizontal axis shows
  * @property {number} [height] px
- * @property {boolean} [step] values hold until the next one
+ * @property {boolean} [stacked] bars, each series on those before it; all have the same points
+ * @property {string[]} [colours] of the series, instead of the palette's
+ * @property {Shade[]} [shades] behind the values
+ * @property {number[]} [moments] where something happened: upright lines
  */
+
+/** @param {uPlot} plot @param {ChartOptions} options */
+function drawShades(plot, { shades = [] }) {
+  const { ctx, bbox } = plot;
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  ctx.globalAlpha = 0.22;
+  for (const { from, to, colour } of shades) {
+    const left = plot.valToPos(from, "x", true);
+    ctx.fillStyle = colour;
+    ctx.fillRect(left, bbox.top, Math.max(1, plot.valToPos(to, "x", true) - left), bbox.height);
+  }
+  ctx.restore();
+}
+
+/** @param {uPlot} plot @param {ChartOptions} options */
+function drawMoments(plot, { moments = [] }) {
+  const { ctx, bbox } = plot;
+  ctx.save();
+  ctx.strokeStyle = variable("--text")();
+  ctx.setLineDash([5, 4]);
+  ctx.beginPath();
+  for (const at of moments) {
+    const x = plot.valToPos(at, "x", true);
+    if (x < bbox.left || x > bbox.left + bbox.width) continue;
+    ctx.moveTo(x, bbox.top);
+    ctx.lineTo(x, bbox.top + bbox.height);
+  }
+  ctx.stroke();
+  ctx.restore();
+}
 
 /** A chart of lines that share a horizontal axis. It is as wide as its place. */
 class LineChart {
@@ -65,7 +104,8 @@ class LineChart {
    */
   update(series, range = null) {
     const names = series.map(({ name, unit }) => `${name} ${unit}`).join("\n");
-    const tables = series.map(({ points }) => /** @type {uPlot.AlignedData} */ ([points.map(([x]) => x), points.map(([, y]) => y)]));
+    const drawn = this.options.stacked ? stack(series) : series;
+    const tables = drawn.map(({ points }) => /** @type {uPlot.AlignedData} */ ([points.map(([x]) => x), points.map(([, y]) => y)]));
     const data = tables.length ? uPlot.join(tables) : /** @type {uPlot.AlignedData} */ ([[]]);
     this.range = range;
     if (!this.plot || names !== this.names) {
@@ -78,32 +118,54 @@ class LineChart {
   /** @param {Series[]} series @param {uPlot.AlignedData} data */
   _make(series, data) {
     this.plot?.destroy();
-    const paths = this.options.step ? uPlot.paths.stepped?.({ align: 1 }) : undefined;
     this.plot = new uPlot(
       {
         title: this.options.title,
         width: Math.max(120, this.place.clientWidth),
         height: this.height,
-        scales: { x: { time: false }, y: { range: spread } },
+        scales: { x: { time: false }, y: { range: this.options.stacked ? fromZero : spread } },
         axes: [axis(this.options.x ?? "simulated time (s)", plain), axis(this.options.unit ?? "", plain, 62)],
-        series: [
-          { label: this.options.x ?? "s", value: (_, value) => (value === null ? "–" : plain(value)) },
-          ...series.map(({ name, unit }, index) => ({
-            label: name,
-            stroke: paletteColour(index),
-            width: 1.5,
-            paths,
-            dash: index >= 8 ? [6, 4] : undefined,
-            points: { show: false },
-            value: (/** @type {uPlot} */ _, /** @type {number | null} */ value) => `${number(value, 4)} ${unit}`,
-          })),
-        ],
+        series: [{ label: this.options.x ?? "s", value: (_, value) => this._when(value) }, ...this._lines(series)],
         cursor: { drag: { x: true, y: false, setScale: !this.onzoom } },
-        hooks: { setSelect: [(plot) => this._selected(plot)] },
+        hooks: {
+          setSelect: [(plot) => this._selected(plot)],
+          drawClear: [(plot) => drawShades(plot, this.options)],
+          draw: [(plot) => drawMoments(plot, this.options)],
+        },
       },
       data,
       this.place,
     );
+  }
+
+  /** @param {Series[]} series @returns {uPlot.Series[]} */
+  _lines(series) {
+    const { stacked, colours } = this.options;
+    const paths = stacked ? uPlot.paths.bars?.({ size: [0.9, 60] }) : undefined;
+    const lines = series.map(({ name, unit, points }, index) => {
+      const colour = colours?.[index] ?? paletteColour(index);
+      return {
+        label: name,
+        stroke: colour,
+        fill: stacked ? colour : undefined,
+        width: stacked ? 0 : 1.5,
+        paths,
+        dash: index >= 8 && !stacked ? [6, 4] : undefined,
+        points: { show: !stacked, filter: (/** @type {uPlot} */ plot, /** @type {number} */ line) => lonely(plot.data[line]), size: 4 },
+        value: (/** @type {uPlot} */ _, /** @type {number | null} */ value, /** @type {number} */ _line, /** @type {number | null} */ at) => {
+          const own = stacked ? (at === null ? null : points[at]?.[1]) : value;
+          return `${number(own, 4)} ${unit}`;
+        },
+      };
+    });
+    return stacked ? lines.reverse() : lines;
+  }
+
+  /** The place of the cursor, and what held there. @param {number | null} x */
+  _when(x) {
+    if (x === null) return "–";
+    const held = (this.options.shades ?? []).filter(({ from, to }) => from <= x && x < to).map(({ text }) => text);
+    return [plain(x), ...held].join(" · ");
   }
 
   /** @param {uPlot} plot */
@@ -146,37 +208,21 @@ function spread(_, low, high) {
 }
 
 /**
+ * The range of the vertical axis of bars.
+ * @param {uPlot} _
+ * @param {number | null} _low
+ * @param {number | null} high
+ * @returns {[number, number]}
+ */
+function fromZero(_, _low, high) {
+  return [0, high ? high * 1.05 : 1];
+}
+
+/**
  * Lines over simulated time (s). @param {HTMLElement} place @param {ChartOptions} [options]
  */
 export function timeChart(place, options = {}) {
   return new LineChart(place, options);
-}
-
-/**
- * The share of values at or below each: a line for each sample.
- * @param {HTMLElement} place
- * @param {{name: string, unit: string, values: number[]}[]} samples
- * @param {ChartOptions} [options]
- */
-export function distributionChart(place, samples, options = {}) {
-  const unit = samples[0]?.unit ?? "";
-  const chart = new LineChart(place, { step: true, unit: "share", x: unit, ...options });
-  chart.update(samples.map(({ name, values }) => ({ name, unit: "", points: distribution(values) })));
-  return chart;
-}
-
-/** @param {number[]} values @returns {[number, number][]} */
-export function distribution(values) {
-  const sorted = [...values].sort((a, b) => a - b);
-  /** @type {[number, number][]} */
-  const points = [];
-  sorted.forEach((value, index) => {
-    const share = (index + 1) / sorted.length;
-    const last = points.at(-1);
-    if (last && last[0] === value) last[1] = share;
-    else points.push([value, share]);
-  });
-  return points;
 }
 
 /**

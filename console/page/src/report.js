@@ -3,36 +3,66 @@
 // The document has one `<script type="application/json" id="report-data">`: a mapping from names to drawings. Each element
 // with `data-drawing="NAME"` gets the one of that name.
 
+import { drawLanes } from "./lanes.js";
 import { drawMap } from "./map.js";
-import { bars, distributionChart, timeChart } from "./plots.js";
+import { drawMatrix } from "./matrix.js";
+import { timeChart } from "./plots.js";
+import { h } from "./ui.js";
 
 /**
- * @typedef {{kind: "time", unit?: string, height?: number, step?: boolean, series: Series[]}} TimeDrawing points: [s, value]
- * @typedef {{kind: "distribution", samples: {name: string, unit: string, values: number[]}[]}} DistributionDrawing
- * @typedef {{kind: "bars", counts: Record<string, number>}} BarsDrawing
- * @typedef {{kind: "map", map: import("./map.js").MapData}} MapDrawing
+ * @typedef {{kind: "time", range: [number, number], series: Series[]} & import("./plots.js").ChartOptions} TimeDrawing
+ *   points: [s, value]; a value of null breaks the line
+ * @typedef {{kind: "lanes", range: [number, number], lanes: import("./lanes.js").Lane[]}} LanesDrawing
+ * @typedef {{kind: "matrix", names: string[], cells: import("./matrix.js").Cell[]}} MatrixDrawing
+ * @typedef {{kind: "map", legend: {sign: string, colour: string, text: string}[], map: import("./map.js").MapData}} MapDrawing
  */
 
-/** @param {HTMLElement} place @param {TimeDrawing | DistributionDrawing | BarsDrawing | MapDrawing} drawing */
+/** What is drawn again when the page gets another width or other colours. @type {(() => void)[]} */
+const again = [];
+
+/** What the signs of a map mean. @param {MapDrawing["legend"]} entries */
+function legend(entries) {
+  const signs = entries.map(({ sign, colour, text }) => {
+    const drawn = h("b", {}, sign);
+    drawn.style.color = colour;
+    return h("span", {}, drawn, ` ${text}`);
+  });
+  return h("p", { class: "legend" }, ...signs);
+}
+
+/** @param {HTMLElement} place @param {TimeDrawing | LanesDrawing | MatrixDrawing | MapDrawing} drawing */
 function draw(place, drawing) {
   switch (drawing.kind) {
-    case "time":
-      timeChart(place, { unit: drawing.unit, height: drawing.height, step: drawing.step }).update(drawing.series);
+    case "time": {
+      const chart = timeChart(place, drawing);
+      chart.update(drawing.series, drawing.range);
+      again.push(() => chart.redraw());
       return;
-    case "distribution":
-      distributionChart(place, drawing.samples);
+    }
+    case "lanes":
+      drawLanes(place, drawing.lanes, drawing.range);
       return;
-    case "bars":
-      bars(place, drawing.counts);
+    case "matrix":
+      drawMatrix(place, drawing.names, drawing.cells);
       return;
-    case "map":
-      drawMap(place, drawing.map);
-      window.addEventListener("resize", () => drawMap(place, drawing.map));
+    case "map": {
+      const map = h("div");
+      place.replaceChildren(legend(drawing.legend), map);
+      drawMap(map, drawing.map);
+      again.push(() => drawMap(map, drawing.map));
+    }
   }
 }
 
+let count = 0;
 const drawings = JSON.parse(document.getElementById("report-data")?.textContent ?? "{}");
 for (const place of document.querySelectorAll("[data-drawing]")) {
   const drawing = drawings[/** @type {HTMLElement} */ (place).dataset.drawing ?? ""];
-  if (drawing) draw(/** @type {HTMLElement} */ (place), drawing);
+  if (!drawing) continue;
+  draw(/** @type {HTMLElement} */ (place), drawing);
+  count += 1;
 }
+const redraw = () => again.forEach((one) => one());
+window.addEventListener("resize", redraw);
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+document.documentElement.dataset.drawn = String(count);

@@ -39,6 +39,21 @@ export function time(seconds) {
     : `${sign}${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, "0")}:${rest}`;
 }
 
+/**
+ * Round numbers between two, about so many, a step of 1, 2 or 5 times a power of ten apart.
+ * @param {number} low @param {number} high @param {number} count
+ * @returns {number[]}
+ */
+export function ticks(low, high, count) {
+  if (!(high > low)) return [low];
+  const rough = (high - low) / count;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = ([1, 2, 5].find((digit) => digit * power >= rough) ?? 10) * power;
+  const found = [];
+  for (let number = Math.ceil(low / step); number * step <= high * (1 + 1e-12); number += 1) found.push(+(number * step).toPrecision(12));
+  return found;
+}
+
 /** @param {Record<string, number>} causes */
 export function causesText(causes) {
   return Object.entries(causes)

@@ -1,0 +1,1 @@
+"""A running system as a source of the page."""

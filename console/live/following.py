@@ -1,0 +1,223 @@
+"""What becomes of what arrives from a running system: frames as moments, statuses as messages, requests as marks.
+
+Pure. Neighbours: `live_source` (moves the bytes),
+`drawing` (one layout), `links`, `status_marks`.
+"""
+
+from __future__ import annotations
+
+from base64 import b64decode
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Final
+
+from foosim.console.live.status_marks import StatusMarks
+from foosim.console.live.watched import Watched
+from foosim.console.shown.drawing import Drawing
+from foosim.console.shown.links import Links
+from foosim.console.shown.source import About, Moment, Wanted
+from foosim.console.shown.timeline import NETWORK, Mark, WorldEvents
+from foosim.protocol.codec import decode
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import Malformed
+from foosim.protocol.frame import Frame, frame_from_bytes
+from foosim.protocol.layout import build_layout
+from foosim.protocol.messages import Commit
+from foosim.protocol.network import Event
+from foosim.protocol.start import initial_frame
+from foosim.vhub.settings_text import event_text
+
+ASKERS_KEPT: Final = 256
+LINKS_EVERY: Final = 2
+"""Statuses: the vHub counts links anew twice a second."""
+Files = Callable[[Deployment], Mapping[str, bytes]]
+"""Fetches the files that a deployment names."""
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """One layout of a run: how it is drawn, what its links are, the frame that it is described with."""
+
+    drawing: Drawing
+    links: Links
+    first: Frame | None
+
+
+class Following:
+    """What is known of one run."""
+
+    def __init__(self, about: About) -> None:
+        self.about = about
+        self.is_stale = False
+        """Frames came that do not fit the layout."""
+        self._text = ""
+        self._world: World | None = None
+        self._frame: Frame | None = None
+        """The newest one that was shown."""
+        self._is_paused = self._has_changed = False
+        self._marks = StatusMarks()
+        self._events: WorldEvents | None = None
+        self._planned: list[Event] = []
+        """Events of the deployment's network that are not marked yet, the last one first."""
+        self._watched: Watched | None = None
+        self._statuses = 0
+        self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
+        """Who has asked: by the request's sender, tick and verb."""
+
+    # --- the world ---------------------------------------------------------------------------------------------------
+
+    def world_of(self, what: Mapping[str, Any], files: Files) -> World:
+        """Return the world that an answer to `describe` is about: the known one where it is the same.
+
+        It may take a while, and changes nothing: for a thread. Raises Refused for what cannot be read.
+        """
+        known = self._world
+        if known is not None and what["deployment"] == self._text:
+            deployment = known.drawing.deployment
+            if known.drawing.layout.digest.hex() == what["layout"]:
+                return replace(known, first=_first(known.drawing, what))
+        else:
+            known = None
+            deployment = load_deployment(what["deployment"], what["deployment_name"])
+            if deployment.files():
+                deployment = deployment.with_assets(files(deployment))
+        layout = build_layout(deployment, [(name, model) for name, model in what["added"]])
+        if layout.digest.hex() != what["layout"]:
+            raise Malformed(
+                f"run {what['run']} has another layout of its deployment: another version of foosim runs it"
+            )
+        drawing = Drawing(deployment, layout)
+        links = Links(deployment) if known is None else known.links
+        return World(drawing, links, _first(drawing, what))
+
+    def turn_to(self, what: Mapping[str, Any], world: World) -> bool:
+        """Show this world from here on; return whether its scene is new."""
+        self._text, self.is_stale = what["deployment"], False
+        before, self._world = self._world, world
+        deployment = world.drawing.deployment
+        self.about = replace(self.about, name=what["run"], world=deployment.world, tick_ns=deployment.tick_ns)
+        is_new = before is None or before.drawing is not world.drawing
+        if is_new:
+            self._frame = None
+            if before is None or before.drawing.deployment is not deployment:
+                self._events, self._watched = WorldEvents(deployment), Watched(deployment)
+                self._planned = sorted(deployment.network.events, key=lambda event: event.at_ns, reverse=True)
+            world.links.turn_to(world.drawing.scene)
+        return is_new
+
+    def content(self) -> dict[str, Any]:
+        """Return the scene of the world as pages read it."""
+        assert self._world is not None, "described first"
+        return self._world.drawing.content()
+
+    def first_moment(self) -> Moment | None:
+        """Return what there is to see in the frame that came with the description."""
+        assert self._world is not None, "described first"
+        world, frame = self._world, self._world.first
+        if frame is None or (self._frame is not None and self._frame.tick == frame.tick):
+            return None
+        self._frame = frame
+        return world.drawing.moment(frame, jump=True, paused=self._is_paused)
+
+    # --- frames ------------------------------------------------------------------------------------------------------
+
+    def read(self, payload: bytes) -> tuple[World, Frame] | None:
+        """Return the frame of a commit; None, and the layout is stale, where it does not fit."""
+        world = self._world
+        if world is None:
+            return None
+        try:
+            commit = decode(Commit, payload)
+            frame = frame_from_bytes(commit.tick, world.drawing.layout, commit.values, commit.outboxes)
+        except Malformed:
+            self.is_stale = True
+            return None
+        if frame.digest != commit.digest:
+            self.is_stale = True
+            return None
+        return world, frame
+
+    def show(self, world: World, frame: Frame) -> Moment:
+        """Return what there is to see in a frame that was read just now."""
+        jump = self._frame is None or frame.tick < self._frame.tick
+        self._frame = frame
+        if self._watched is not None:
+            self._watched.keep(frame)
+        return world.drawing.moment(frame, jump=jump, paused=self._is_paused)
+
+    def overlay(self, wanted: Collection[str]) -> dict[str, Any] | None:
+        """Return the message with the overlays of the newest frame."""
+        if self._world is None or self._frame is None:
+            return None
+        return self._world.drawing.overlay(self._frame, wanted)
+
+    # --- statuses ----------------------------------------------------------------------------------------------------
+
+    def watch_arguments(self, wanted: Wanted, hz_max: float) -> dict[str, Any]:
+        """Return what a lease is asked for with: what this world does not have is left out."""
+        assert self._world is not None, "described first"
+        deployment = self._world.drawing.deployment
+        ends = set(deployment.endpoints())
+        links = [link for link in wanted.links if ends.issuperset(link)]
+        robots = deployment.robots
+        readings = [pair for pair in wanted.readings if pair[0] in robots and pair[1] in robots[pair[0]].sensors]
+        return {"hz": min(wanted.hz, hz_max), "links": links, "readings": readings}
+
+    def asked(self, sender: str, tick: int, verb: str, who: str) -> None:
+        """Remember which browser has asked for something."""
+        self._askers[sender, tick, verb] = who
+        if len(self._askers) > ASKERS_KEPT:
+            self._askers.popitem(last=False)
+
+    def take_status(self, status: dict[str, Any]) -> list[dict[str, Any]]:
+        """Return the messages that a status makes, itself among them."""
+        requests = [
+            {**asked, "who": self._askers.get((asked["who"], asked["tick"], asked["verb"]), asked["who"])}
+            for asked in status["requests"]
+        ]
+        status = {**status, "requests": requests}
+        was_paused, self._is_paused = self._is_paused, status["state"] == "paused"
+        self._has_changed = was_paused != self._is_paused
+        messages: list[dict[str, Any]] = [{"type": "status", "status": status}]
+        marks = self._marks.new(status)
+        while self._planned and self._planned[-1].at_ns <= status["ticks"] * status["tick_ns"]:
+            event = self._planned.pop()
+            marks.append(asdict(Mark(event.at_ns // status["tick_ns"], NETWORK, event_text(event))))
+        if self._events is not None and self._frame is not None:
+            marks += map(asdict, self._events.take(self._frame))
+        if marks:
+            messages.append({"type": "marks", "marks": marks})
+        if self._statuses % LINKS_EVERY == 0 and self._world is not None:
+            if self._frame is not None:
+                self._world.links.move(self._frame)
+            messages.append(self._world.links.message(status))
+        self._statuses += 1
+        if self._watched is not None:
+            messages += self._watched.readings(status["watched"])
+        return messages
+
+    def explained(self, status: Mapping[str, Any], wanted: Wanted) -> list[dict[str, Any]]:
+        """Return the messages about links that are watched. It takes a while: for a thread."""
+        report, drops = status["watched"], status["watched"].get("drops", {})
+        watched = self._watched
+        if watched is None:
+            return []
+        return watched.drops(report, [link for link in wanted.links if f"{link[0]}>{link[1]}" in drops])
+
+    def standing_moment(self) -> Moment | None:
+        """Return the last moment again where the run has just paused or gone on, which pages show."""
+        if not self._has_changed or self._world is None or self._frame is None:
+            return None
+        self._has_changed = False
+        return self._world.drawing.moment(self._frame, paused=self._is_paused)
+
+
+def _first(drawing: Drawing, what: Mapping[str, Any]) -> Frame | None:
+    """Return the frame that a description has; before the first tick of a run from the start that is frame 0."""
+    if what["frame"] is None:
+        is_start = what["tick"] == 0 and not what["added"]
+        return initial_frame(drawing.deployment) if is_start else None
+    commit = decode(Commit, b64decode(what["frame"]))
+    return frame_from_bytes(commit.tick, drawing.layout, commit.values, commit.outboxes)

@@ -1,0 +1,259 @@
+"""A running system as a source: frames of the simulation plane's `view`, statuses, and requests of an operator.
+
+Looking on costs the run what its leases say: they are renewed only while a browser looks. A supervisor that dies is
+looked for again under the run's name, and what was seen stays in sight meanwhile. Asking waits in threads, one
+connection each, so that nobody waits for another's answer. Neighbours: `following` (what becomes of what arrives),
+`supervisor.control`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
+from typing import Any, Final, TypeVar
+
+from foosim.console.live.following import Following, World
+from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
+from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.inbox import Inbox, Item
+from foosim.supervisor.control import Control, NoAnswer, RequestRefused
+
+VERBS: Final = (
+    *("pause", "resume", "step", "rate", "add", "remove", "move", "push", "network", "stop", "start", "down"),
+)
+POLL_S: Final = 0.25
+"""How often the status is asked for while a browser looks."""
+RENEW_S: Final = 1.5
+QUESTION_S: Final = 3.0
+"""How long a status is waited for; a supervisor that does not answer is looked for again."""
+AGAIN_S: Final = 0.5
+"""How often it is."""
+FRAMES_MAX: Final = 8
+"""That may wait to be received."""
+HZ_MAX: Final = 100.0
+ASKS_AT_ONCE: Final = 4
+OUR_ARGUMENTS: Final = frozenset({"self", "verb", "timeout_s", "give_up"})
+"""Of `Control.ask`, which a page does not give."""
+OVERLAY_S: Final = 0.1
+
+T = TypeVar("T")
+Connect = Callable[[Callable[[], bool]], Control]
+"""Makes a connection; gives up when the function says so."""
+
+
+class LiveSource:
+    """One run."""
+
+    def __init__(self, name: str, view: Connect, operate: Connect | None) -> None:
+        """`name` is the run's; `operate` None lets nobody ask for anything."""
+        self._name, self._connect_view, self._connect_operator = name, view, operate
+        self._verbs = () if operate is None else VERBS
+        self.about = About("live", name, "", 1_000_000, self._verbs)
+        self._following = Following(self.about)
+        self._overlay_s = 0.0
+        self._wanted = Wanted()
+        self._changed = asyncio.Event()
+        """Something else is wanted, or frames do not fit the layout."""
+        self._closing = threading.Event()
+        self._viewing = ThreadPoolExecutor(1, "console-view")
+        self._asking = ThreadPoolExecutor(ASKS_AT_ONCE, "console-ask")
+        self._idle: list[Control] = []
+        """Connections over which nobody is asking."""
+
+    def want(self, wanted: Wanted) -> None:
+        self._wanted = wanted
+        self._changed.set()
+
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        """Ask the supervisor. Raises RequestRefused, NoAnswer, ConnectError, BadValue."""
+        wrong = [key for key in arguments if not key.isidentifier() or key in OUR_ARGUMENTS]
+        if wrong:
+            raise BadValue("no argument of a request", wrong[0])
+        loop = asyncio.get_running_loop()
+        answered, sender = await loop.run_in_executor(self._asking, self._ask, verb, dict(arguments))
+        self._following.asked(sender, answered.tick, verb, who)
+        self._changed.set()
+        return answered
+
+    def _ask(self, verb: str, arguments: dict[str, Any]) -> tuple[Answered, str]:
+        assert self._connect_operator is not None, "a source without verbs is not asked"
+        try:
+            control = self._idle.pop()
+        except IndexError:
+            control = self._connect_operator(self._closing.is_set)
+        try:
+            answer = control.ask(verb, give_up=self._closing.is_set, **arguments)
+        except NoAnswer:
+            control.close()
+            raise
+        except Refused:
+            self._idle.append(control)
+            raise
+        self._idle.append(control)
+        return Answered(answer.text, answer.tick), answer.sender
+
+    async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
+        """Nothing is kept of a run but what its capture has: a page keeps what it has plotted."""
+        return "", "", []
+
+    # --- looking on --------------------------------------------------------------------------------------------------
+
+    async def run(self, feed: Feed) -> None:
+        trouble = ""  # what was said last of a run that is not there
+        try:
+            while True:
+                try:
+                    control = await self._in_thread(lambda: self._connect_view(self._closing.is_set))
+                except Refused as refused:
+                    if trouble != str(refused):
+                        trouble = str(refused)
+                        feed.tell(_note("warning", f"{self._name} is not there: {refused}; it is looked for"))
+                    await asyncio.sleep(AGAIN_S)
+                    continue
+                if trouble:
+                    trouble = ""
+                    feed.tell(_note("info", f"connected to {self._name} again"))
+                try:
+                    await self._follow(control, feed)
+                except Refused as refused:
+                    trouble = str(refused)
+                    feed.tell(_note("warning", f"lost {self._name}: {refused}; it is looked for"))
+                    self._forget_idle()
+                    await asyncio.sleep(AGAIN_S)
+                finally:
+                    await self._in_thread(control.close)
+        finally:
+            self._closing.set()
+            self._forget_idle()
+            self._viewing.shutdown(wait=False)
+            self._asking.shutdown(wait=False)
+
+    def _forget_idle(self) -> None:
+        """Close connections of operators that wait: the supervisor that they lead to may be gone."""
+        while self._idle:
+            with suppress(IndexError):
+                self._idle.pop().close()
+
+    async def _in_thread(self, work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._viewing, work)
+
+    async def _follow(self, control: Control, feed: Feed) -> None:
+        """Tell of a run as long as its supervisor answers. Raises Refused."""
+        await self._describe(control, feed)
+        newest = _Newest(asyncio.get_running_loop(), partial(self._take_frame, feed))
+        control.view(newest)
+        try:
+            await self._poll(control, feed)
+        finally:
+            newest.end()
+
+    async def _describe(self, control: Control, feed: Feed) -> None:
+        """Learn which world it is, and tell its scene where that is new."""
+
+        def ask() -> tuple[dict[str, Any], World]:
+            what = control.describe(QUESTION_S, self._closing.is_set)
+            files = partial(control.files, timeout_s=QUESTION_S, give_up=self._closing.is_set)
+            return what, self._following.world_of(what, files)
+
+        what, world = await self._in_thread(ask)
+        if self._following.turn_to(what, world):
+            self.about = self._following.about
+            feed.describe(self.about, self._following.content())
+        moment = self._following.first_moment()
+        if moment is not None:
+            feed.show(moment)
+
+    async def _poll(self, control: Control, feed: Feed) -> None:
+        """Ask for statuses, renew the lease, describe again where frames do not fit; as long as somebody looks."""
+        following, lease = self._following, Wanted()
+        renewed_s = described_s = 0.0
+        while True:
+            self._changed.clear()
+            wanted = self._wanted
+            if wanted.readers == 0:
+                await self._changed.wait()
+                continue
+            if following.is_stale and time.monotonic() >= described_s + POLL_S:
+                await self._describe(control, feed)
+                described_s = time.monotonic()
+            now_s = time.monotonic()
+            if wanted != lease or now_s >= renewed_s + RENEW_S:
+                await self._renew(control, feed, following.watch_arguments(wanted, HZ_MAX), wanted != lease)
+                lease, renewed_s = wanted, now_s
+            status = await self._in_thread(lambda: control.status(QUESTION_S, self._closing.is_set))
+            messages = following.take_status(status)
+            if wanted.links:
+                messages += await self._in_thread(partial(following.explained, status, wanted))
+            for message in messages:
+                feed.tell(message)
+            moment = following.standing_moment()
+            if moment is not None:
+                feed.show(moment)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(POLL_S):
+                    await self._changed.wait()
+
+    async def _renew(self, control: Control, feed: Feed, wanted: dict[str, Any], is_new: bool) -> None:
+        """Begin or renew the lease; frames alone, where others watch so many links that there is no room for these."""
+        ask = partial(control.ask, "watch", QUESTION_S, self._closing.is_set)
+        try:
+            await self._in_thread(partial(ask, **wanted))
+        except RequestRefused as refused:
+            if is_new:
+                feed.tell(_note("warning", str(refused)))
+            await self._in_thread(partial(ask, hz=wanted["hz"]))
+
+    def _take_frame(self, feed: Feed, payload: bytes) -> None:
+        """Show a commit, and from time to time what lies over it."""
+        wanted = self._wanted
+        if not wanted.readers:
+            return  # a lease is not over at once
+        found = self._following.read(payload)
+        if found is None:
+            self._changed.set()
+            return
+        world, frame = found
+        feed.show(self._following.show(world, frame))
+        now_s = time.monotonic()
+        if wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
+            self._overlay_s = now_s
+            overlay = self._following.overlay(wanted.overlays)
+            if overlay is not None:
+                feed.tell(overlay)
+
+
+class _Newest(Inbox):
+    """An inbox that has the event loop take the newest frame: what came before it is old by then."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, take: Callable[[bytes], None]) -> None:
+        super().__init__(FRAMES_MAX)
+        self._loop, self._take = loop, take
+        self._payload = b""
+        self._is_due = self._has_ended = False
+
+    def offer(self, item: Item) -> bool:
+        """Keep it. Called in the thread that receives, which does nothing else."""
+        self._payload = item[2]
+        if not self._is_due:
+            self._is_due = True
+            with suppress(RuntimeError):  # the loop is over
+                self._loop.call_soon_threadsafe(self._give)
+        return True
+
+    def end(self) -> None:
+        """Give nothing more."""
+        self._has_ended = True
+
+    def _give(self) -> None:
+        self._is_due = False  # before it is read: a newer one is given again
+        if not self._has_ended:
+            self._take(self._payload)
+
+
+def _note(level: str, text: str) -> dict[str, Any]:
+    return {"type": "note", "level": level, "text": text}

@@ -1,0 +1,105 @@
+"""What people watch closely: the last drops of a link, explained, and a sensor's readings, as the vHub reports them.
+
+Pure; explaining takes milliseconds a packet, so it is done where it holds up nobody, and once for each packet.
+Neighbours: `following` (feeds it with statuses), `vhub.watching` (what is reported),
+`supervisor.drops_shown`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from foosim.console.shown.rule_text import rule_text
+from foosim.console.shown.source import Link
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Refused
+from foosim.protocol.frame import Frame
+from foosim.supervisor.drops_shown import Reported, explain_drops
+from foosim.vhub.explain import Explained
+from foosim.vhub.rows import PacketRow
+
+FRAMES_KEPT: Final = 64
+"""Frames that were shown, for what stood between the ends of a packet that was dropped."""
+FRAMES_APART_TICKS: Final = 20
+RULES_KEPT: Final = 256
+
+
+class Watched:
+    """What was told of what is watched."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._deployment = deployment
+        self._frames: deque[Frame] = deque(maxlen=FRAMES_KEPT)
+        self._told: dict[Link, Any] = {}
+        """The drops of each link as they were explained last."""
+        self._rules: dict[Link, str] = {}
+        self._read: dict[str, int] = {}
+        """The tick of the last reading that was told, by robot and channel."""
+
+    def keep(self, frame: Frame) -> None:
+        """Keep a frame that was shown, some ticks apart."""
+        if self._frames and frame.tick < self._frames[-1].tick:
+            self._frames.clear()
+        if not self._frames or frame.tick >= self._frames[-1].tick + FRAMES_APART_TICKS:
+            self._frames.append(frame)
+
+    def readings(self, report: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return the messages with the readings that came since."""
+        messages = []
+        for name, readings in report.get("readings", {}).items():
+            last = self._read.get(name, -1)
+            if readings and readings[-1][0] < last:
+                last = -1  # time went back
+            new = [reading for reading in readings if reading[0] > last]
+            if new:
+                self._read[name] = new[-1][0]
+                robot, _, channel = name.partition("/")
+                messages.append({"type": "readings", "robot": robot, "channel": channel, "points": new})
+        return messages
+
+    def drops(self, report: Mapping[str, Any], links: Iterable[Link]) -> list[dict[str, Any]]:
+        """Return the messages about links whose drops are others than those that were told."""
+        told: dict[Link, Any] = {}
+        messages = []
+        for source, destination in links:
+            rows = report.get("drops", {}).get(f"{source}>{destination}", [])
+            told[source, destination] = rows
+            if (source, destination) not in self._told or self._told[source, destination] != rows:
+                messages.append(self._message(report, source, destination))
+        self._told = told
+        return messages
+
+    def _message(self, report: Mapping[str, Any], source: str, destination: str) -> dict[str, Any]:
+        frames = list(self._frames)  # more of them come meanwhile
+
+        def frame(tick: int) -> Frame | None:
+            return next((frame for frame in reversed(frames) if frame.tick <= tick), None)
+
+        try:
+            found = explain_drops(Reported(self._deployment, report, frame), source, destination)
+        except Refused:  # such as a model of links that is not installed here
+            found = []
+        return {
+            "type": "watched",
+            "link": [source, destination],
+            "rule": self._rule(source, destination),
+            "drops": [self._drop(row, explained) for row, explained in found],
+        }
+
+    def _rule(self, source: str, destination: str) -> str:
+        if (source, destination) not in self._rules:
+            if len(self._rules) >= RULES_KEPT:
+                self._rules.clear()
+            self._rules[source, destination] = rule_text(self._deployment, source, destination)
+        return self._rules[source, destination]
+
+    def _drop(self, row: PacketRow, explained: Explained) -> dict[str, Any]:
+        return {
+            "tick": row.sent_ns // self._deployment.tick_ns,
+            "cause": row.cause,
+            "head": explained.head,
+            "steps": [{"stage": step.stage, "outcome": step.outcome, "text": step.text} for step in explained.steps],
+            "verdict": explained.verdict,
+        }

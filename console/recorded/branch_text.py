@@ -1,0 +1,53 @@
+"""The command that begins a run with the frame that is seen: what `foosim-supervisor up --from` accepts.
+
+Neighbours: `vhub.branching` reads it, `capture_source` answers with it.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from pathlib import Path
+
+from foosim.console.recorded.recording import Recording
+from foosim.console.shown.source import Answered
+from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.protocol.errors import BadValue, Refused
+from foosim.protocol.units import format_ns
+from foosim.vhub.rows import FRAME
+
+
+def branch_answer(recording: Recording, tick: int) -> Answered:
+    """Return the command that goes on from a tick; its tick is that of the captured frame that the run begins with.
+
+    Behind a `#` it says where the deployment's file is not the captured one. Raises BadValue for a tick without a frame
+    before it, CaptureError, Refused for a frame whose payloads are hashed.
+    """
+    number = recording.index.places[FRAME].newest(tick * recording.tick_ns)
+    if number < 0:
+        first, last = recording.span
+        raise BadValue(f"branch: no captured frame at or before this tick; there are ticks {first} to {last}", tick)
+    row = recording.row(FRAME, number)
+    if any(outbox.packets_hash for outbox in row.outboxes):
+        raise Refused(f"frame {row.tick} has outboxes whose payloads are hashed: no run can begin with it")
+    name = recording.about.deployment_name
+    time = format_ns(row.tick * recording.tick_ns).replace(" ", "")
+    command = ["foosim-supervisor", "up", name, "--from", f"{_near(recording.path)}@{time}"]
+    return Answered(shlex.join(command) + _remark(recording, Path(name)), row.tick)
+
+
+def _near(path: Path) -> Path:
+    """Return a path as it is said from here: relative where it lies below this folder."""
+    whole = Path(os.path.abspath(path))
+    return whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else whole
+
+
+def _remark(recording: Recording, file: Path) -> str:
+    """Return what a reader should know of the deployment's file, empty when it is the captured one."""
+    try:
+        there = load_deployment(read_deployment_text(file), str(file))
+    except Refused:
+        return f"  # {file} is not here: name the file that the run was started with"
+    if there.model_dump() != recording.deployment.model_dump():
+        return f"  # {file} is not what the run had: it was changed, or the run had options (--set)"
+    return ""

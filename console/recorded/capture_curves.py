@@ -1,0 +1,111 @@
+"""Curves over a captured run: numbers of frames, figures of links, values of the status, readings of sensors.
+
+Neighbours: `capture_history` (whose thread this runs in), `curves` (names and units, and how a path is followed).
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping
+from typing import Any, Final
+
+from foosim.client.errors import UnknownName
+from foosim.client.payloads import channel_kind, decode_payload
+from foosim.console.recorded.capture_history import CaptureHistory
+from foosim.console.recorded.capture_status import status_at
+from foosim.console.recorded.link_history import PACKET_MARKS
+from foosim.console.recorded.playhead import Playhead
+from foosim.console.shown.curves import link_figure, value_at
+from foosim.console.shown.source import Curve
+from foosim.protocol.errors import Malformed
+from foosim.vhub.rows import FRAME, PACKETS
+
+POINTS: Final = 600
+STATUS_POINTS: Final = 200
+WINDOW_NS: Final = 5_000_000_000
+READING_NS: Final = 30_000_000_000
+"""How far back readings are looked for."""
+SPREAD_NS: Final = 1_000_000_000
+"""By how much rows of packets may stand behind later ones: what is longer on its way is not found."""
+
+Points = list[tuple[float, float]]
+
+
+def curve_points(history: CaptureHistory, curve: Curve, tick: int, world: int) -> Points:
+    """Return the points of a curve, of the whole run or, of a reading, of the last time before a tick.
+
+    `world` is that whose scene the page has: numbers of frames of another layout are no points. Raises CaptureError.
+    """
+    recording = history.recording
+    if curve.field is not None:
+        return _field(history, curve.field, world)
+    if curve.reading is not None:
+        at_ns = tick * recording.tick_ns
+        found = reading_points(history, *curve.reading, at_ns - READING_NS, at_ns)
+        return [(at, numbers[curve.index]) for at, numbers in found if curve.index < len(numbers)]
+    first, last = recording.span
+    count = POINTS if curve.link is not None else STATUS_POINTS
+    ticks = range(first, last + 1, max(1, (last - first) // count))
+    values = [
+        (at, _link(history, curve, at) if curve.link is not None else _status(history, curve, at)) for at in ticks
+    ]
+    return [(at, value) for at, value in values if value is not None]
+
+
+def _field(history: CaptureHistory, field: int, world: int) -> Points:
+    recording = history.recording
+    numbers = range(len(recording.index.places[FRAME]))
+    points: Points = []
+    for number in numbers[:: max(1, len(numbers) // POINTS)]:
+        frame = recording.frame(number)
+        if frame is not None and recording.world_at(frame.tick) == world and field < frame.layout.size:
+            points.append((frame.tick, float(frame.values[field])))
+    return points
+
+
+def _link(history: CaptureHistory, curve: Curve, tick: int) -> float | None:
+    rows: list[Mapping[str, Any]] = [*history.links.windows(tick * history.recording.tick_ns, WINDOW_NS, curve.link)]
+    return link_figure(rows, curve.figure)
+
+
+def _status(history: CaptureHistory, curve: Curve, tick: int) -> float | None:
+    recording = history.recording
+    if curve.status.startswith("packets."):
+        return value_at({"packets": history.links.totals(tick * recording.tick_ns)}, curve.status)
+    playhead = Playhead(*recording.span, recording.tick_ns)
+    return value_at(status_at(recording, playhead, tick, recording.look(tick)), curve.status)
+
+
+def reading_points(
+    history: CaptureHistory, robot: str, channel: str, after_ns: int, until_ns: int
+) -> list[tuple[int, list[float]]]:
+    """Return what a robot sent on a channel in a time: tick and numbers of each reading. Raises CaptureError."""
+    recording = history.recording
+    try:
+        kind = channel_kind(recording.deployment, robot, channel)
+    except UnknownName:
+        return []
+    times = recording.index.places[PACKETS].log_ns
+    found: dict[int, list[float]] = {}
+    first = bisect_right(times, after_ns)
+    for number in range(first, min(len(times), bisect_left(times, until_ns + SPREAD_NS))):
+        if not after_ns < times[number] <= until_ns:
+            continue
+        mark = recording.decoded(PACKET_MARKS, recording.index.read(PACKETS, number))
+        if mark.source != robot or mark.sent_ns in found:
+            continue
+        row = history.packet(number)
+        if row.channel == channel and row.payload:
+            found[row.sent_ns] = _numbers(kind, row.payload)
+    return [(sent_ns // recording.tick_ns, numbers) for sent_ns, numbers in sorted(found.items())]
+
+
+def _numbers(kind: str, payload: bytes) -> list[float]:
+    try:
+        value: Any = decode_payload(kind, payload)
+    except Malformed:
+        return []
+    if isinstance(value, bytes):
+        return []
+    parts = [part for number in value for part in (number if isinstance(number, tuple) else (number,))]
+    return [float(part) for part in parts]

@@ -1,0 +1,166 @@
+"""What happened in a capture, read in slices so that others get their turn: marks, and each link's windows.
+
+The rows are read topic by topic, the few ones first; of a capture that grows, from where the last pass ended. All of it
+belongs to one thread, and so does the `Recording` that it reads. Pure: the caller says how much a slice is.
+Neighbours: `timeline` (marks), `link_history` (windows), `capture_source` (runs it in a thread of its own).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory
+from foosim.console.recorded.recording import Recording
+from foosim.console.shown.rule_text import rule_text
+from foosim.console.shown.timeline import Mark, Timeline
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame
+from foosim.vhub.capture_reader import TICK_MARKS
+from foosim.vhub.explain import Explained, explain_row, network_events
+from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, PACKETS, RECOVERIES, TICK, ClientRow, PacketRow
+
+SLICE_ROWS: Final = 500
+RULES_KEPT: Final = 256
+TOLD_MAX: Final = 1024
+"""Drops whose explanations are kept."""
+PACKETS_MAX: Final = 10_000_000
+"""Packets whose times are kept: some hundred MB. What comes behind them is in no window, and a note says so."""
+
+
+class CaptureHistory:
+    """Gathers what happened. `gather` reads on; all else tells of what was read so far."""
+
+    def __init__(self, recording: Recording) -> None:
+        """`recording` has the topics /packets and /clients in its index."""
+        self.recording: Final = recording
+        self.links: LinkHistory
+        self.timeline: Timeline
+        self._begin()
+
+    def _begin(self) -> None:
+        recording = self.recording
+        self.links = LinkHistory(recording.tick_ns)
+        self.timeline = Timeline(recording.deployment)
+        self._done: dict[str, int] = dict.fromkeys((EPOCHS, RECOVERIES, TICK, FRAME, PACKETS), 0)
+        self._asked: list[tuple[int, str]] = []
+        """What was asked of the network, by tick."""
+        self._told: dict[int, Explained] = {}
+        self._rules: dict[tuple[str, str], str] = {}
+        self._generation = recording.index.generation
+
+    def refresh(self) -> None:
+        """Take note of what was written since. Raises CaptureError."""
+        self.recording.refresh()
+        if self.recording.index.generation != self._generation:
+            self._begin()
+
+    @property
+    def share(self) -> float:
+        """How much of what there is was read, 0 to 1."""
+        rows = sum(self._there(topic) for topic in self._done)
+        return sum(self._done.values()) / rows if rows else 1.0
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all that there is was read."""
+        return all(done >= self._there(topic) for topic, done in self._done.items())
+
+    @property
+    def left_packets(self) -> int:
+        """Packets that are in no window, for want of room."""
+        return max(0, len(self.recording.index.places[PACKETS]) - PACKETS_MAX)
+
+    def _there(self, topic: str) -> int:
+        count = len(self.recording.index.places[topic])
+        return min(count, PACKETS_MAX) if topic == PACKETS else count
+
+    def gather(self, rows: int = SLICE_ROWS) -> None:
+        """Read some further rows. Raises CaptureError where the capture is damaged; that row is passed by then."""
+        for topic, done in self._done.items():
+            stop = min(done + rows, self._there(topic))
+            for number in range(done, stop):
+                self._done[topic] = number + 1
+                self._take(topic, number)
+            rows -= stop - done
+
+    def _take(self, topic: str, number: int) -> None:
+        recording = self.recording
+        if topic == PACKETS:
+            mark = recording.decoded(PACKET_MARKS, recording.index.read(topic, number))
+            dropped_ns = self.links.add(mark, number)
+            if dropped_ns >= 0:
+                self.timeline.take_drop(dropped_ns, mark.cause)
+        elif topic == TICK:
+            tick = recording.decoded(TICK_MARKS, recording.index.read(topic, number))
+            if tick.edits:
+                self.timeline.take_edits(tick.tick, tick.edits)
+                self._asked += network_events(tick)
+        elif topic == FRAME:
+            frame = recording.frame(number)
+            assert frame is not None
+            self.timeline.take_frame(frame)
+        elif topic == EPOCHS:
+            self.timeline.take_epoch(recording.row(topic, number))
+        else:
+            self.timeline.take_recovery(recording.row(topic, number))
+
+    def news(self) -> list[Mark]:
+        """Return the marks since the last call."""
+        return self.timeline.news()
+
+    # --- packets -----------------------------------------------------------------------------------------------------
+
+    def packet(self, number: int) -> PacketRow:
+        """Return the row of a packet by its number. Raises CaptureError."""
+        row = self.recording.row(PACKETS, number)
+        assert isinstance(row, PacketRow)
+        return row
+
+    def watched(self, source: str, destination: str, at_ns: int) -> dict[str, Any]:
+        """Return the last drops of a link up to a time, each explained: what `watched` says. Raises CaptureError."""
+        drops = []
+        for number in self.links.last_drops(source, destination, at_ns):
+            row = self.packet(number)
+            told = self._told.get(number) or explain_row(self, row)
+            if len(self._told) >= TOLD_MAX:
+                self._told.clear()
+            self._told[number] = told
+            dropped_ns = row.sent_ns if row.arrival_tick < 0 else row.arrival_tick * self.recording.tick_ns
+            drops.append(
+                {
+                    "tick": dropped_ns // self.recording.tick_ns,
+                    "cause": told.cause,
+                    "head": told.head,
+                    "steps": [{"stage": s.stage, "outcome": s.outcome, "text": s.text} for s in told.steps],
+                    "verdict": told.verdict,
+                }
+            )
+        return {"link": [source, destination], "rule": self._rule(source, destination), "drops": drops}
+
+    def _rule(self, source: str, destination: str) -> str:
+        if (source, destination) not in self._rules:
+            if len(self._rules) >= RULES_KEPT:
+                self._rules.clear()
+            self._rules[source, destination] = rule_text(self.deployment, source, destination)
+        return self._rules[source, destination]
+
+    # What `explain` asks for: this is its evidence.
+
+    @property
+    def deployment(self) -> Deployment:
+        return self.recording.deployment
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        return self.recording.about.versions
+
+    def asked(self, until: int) -> Iterable[tuple[int, str]]:
+        return [asked for asked in self._asked if asked[0] <= until]
+
+    def frame(self, tick: int) -> Frame | None:
+        return self.recording.frame_up_to(tick)
+
+    def clients(self) -> Iterable[ClientRow]:
+        rows = len(self.recording.index.places[CLIENTS])
+        return [self.recording.row(CLIENTS, number) for number in range(rows)]

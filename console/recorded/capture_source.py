@@ -1,0 +1,331 @@
+"""A capture as a source of the page: played, sought and stepped to the tick, with marks, links and drops at that time.
+
+Two threads read: one what is seen, so that the slider does not wait, one what happened, in slices. Each has the capture
+open by itself. A capture that is still being written is looked at again every second.
+Neighbours: `recording` (the world at a tick), `capture_history` (what happened), `deck` (where one is), `branching`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from foosim.console.recorded.branch_text import branch_answer
+from foosim.console.recorded.capture_curves import curve_points, reading_points
+from foosim.console.recorded.capture_history import CaptureHistory
+from foosim.console.recorded.capture_status import status_at
+from foosim.console.recorded.comparing import Comparing
+from foosim.console.recorded.deck import ARGUMENTS, VERBS, Deck, checked
+from foosim.console.recorded.playhead import Playhead
+from foosim.console.recorded.recording import Look, Recording
+from foosim.console.recorded.whereabouts import Whereabouts
+from foosim.console.shown.compare import Where
+from foosim.console.shown.curves import name_and_unit
+from foosim.console.shown.links import Links, lost_where
+from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.protocol.errors import Refused
+from foosim.protocol.frame import Frame
+from foosim.vhub.capture_reader import CapturedTick
+from foosim.vhub.rows import CLIENTS, PACKETS, CaptureError
+
+T = TypeVar("T")
+Recompute = Callable[[Frame, Iterable[CapturedTick]], Frame | None]
+"""Gives the frame that captured inputs lead to from a captured frame; None where it has another digest."""
+BRANCH: Final = "branch"
+WINDOW_NS: Final = 5_000_000_000
+STATUS_S: Final = 0.25
+LINKS_S: Final = 0.5
+OVERLAY_NS: Final = 100_000_000
+EARLY_NS: Final = 500_000
+REFRESH_S: Final = 1.0
+MARKS_TOLD: Final = 500
+"""Of one message."""
+UNSEEN_HZ: Final = 2.0
+"""How often a recording moves on that nobody looks at."""
+
+
+class FileSource:
+    """A capture file. Without a `deck` it has one of its own, and is what people ask for; with one it follows."""
+
+    def __init__(
+        self,
+        path: Path,
+        deck: Deck | None = None,
+        offset_ns: int = 0,
+        recompute: Recompute | None = None,
+        compare: Callable[[], Where] | None = None,
+    ) -> None:
+        """`offset_ns`: this capture's time at time 0 of the deck. `compare`: opens what it is compared with.
+
+        Raises CaptureError.
+        """
+        self.recording: Final = Recording(path)
+        self.is_master: Final = deck is None
+        first, last = self.recording.span
+        tick_ns = self.recording.tick_ns
+        self.deck: Final = deck or Deck(Playhead(first, last, tick_ns), tick_ns, time.monotonic_ns)
+        self.offset_ns: Final = offset_ns
+        verbs = (*VERBS, BRANCH) if self.is_master else (BRANCH,)
+        self._about = About("capture", path.name, self.recording.deployment.world, tick_ns, verbs, (first, last))
+        self._recompute = recompute
+        self._wanted = Wanted()
+        self._front = ThreadPoolExecutor(1, "seen")
+        self._back = ThreadPoolExecutor(1, "happened")
+        self._exact = ThreadPoolExecutor(1, "computed")
+        self._history: CaptureHistory | None = None
+        self._look: Look | None = None
+        self._world = -1
+        self._compare = compare
+        self._ends = Links(self.recording.deployment)
+        self._placed = -1
+        """Number of the world whose scene they are in."""
+        self._overlay_ns = 0
+        self._readings_ns = 0
+        """Up to which time readings were told."""
+        self._is_inexact = False
+        """Whether frames between the captured ones cannot be computed."""
+
+    @property
+    def about(self) -> About:
+        return self._about
+
+    def want(self, wanted: Wanted) -> None:
+        self._wanted = wanted
+        self.deck.changed()
+
+    # --- running -----------------------------------------------------------------------------------------------------
+
+    async def run(self, feed: Feed) -> None:
+        """Tell the feed until it is cancelled; what is damaged in the file is told, and the rest is shown."""
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                for work in (self._show, self._gather, self._tell_status, self._tell_links, self._refresh):
+                    tasks.create_task(work(feed))
+                if self._compare is not None:
+                    tasks.create_task(Comparing(self.deck, self._compare, self.opened()).run(feed))
+        finally:
+            for pool in (self._front, self._back, self._exact):
+                pool.shutdown(wait=False, cancel_futures=True)
+
+    def opened(self, *, links: bool = False) -> Callable[[], Where]:
+        """Return what opens the capture once more, for a comparison in a thread of its own."""
+        return lambda: Whereabouts(Recording(self.recording.path), self.offset_ns, links=links)
+
+    async def _in(self, pool: ThreadPoolExecutor, work: Callable[..., T], *arguments: Any) -> T:
+        return await asyncio.get_running_loop().run_in_executor(pool, work, *arguments)
+
+    def tick(self) -> int:
+        """Return the own tick at the deck's time, within what there is."""
+        first, last = self.recording.span
+        return min(max((self.deck.time_ns() + self.offset_ns) // self.recording.tick_ns, first), last)
+
+    async def _show(self, feed: Feed) -> None:
+        """Tell what is seen, the newest wish alone, at most as often as somebody looks."""
+        shown: tuple[int, int, bool] | None = None
+        head, jumps, due_ns = self.deck.playhead, self.deck.playhead.jumps, 0
+        while True:
+            tick = self.tick()
+            wish = tick, head.jumps, head.paused
+            if wish != shown or self._look is None:
+                try:
+                    look = await self._in(self._front, self.recording.look, tick)
+                except CaptureError as error:
+                    feed.tell({"type": "note", "level": "error", "text": str(error)})
+                    look = None
+                if look is not None:
+                    self._tell_moment(feed, look, jump=head.jumps != jumps)
+                    jumps = head.jumps
+                shown = wish
+                if head.paused and look is not None and look.kind != "frame":
+                    await self._show_exactly(feed, look)
+                    if self.tick() != tick:
+                        continue
+            due_ns = self._next_ns(tick, due_ns)
+            await self.deck.wait(None if head.paused and self._look is not None else due_ns)
+
+    def _next_ns(self, tick: int, due_ns: int) -> int:
+        """Return the wall time at which there is something else to see: that of the next frame, but not too soon."""
+        now_ns = self.deck.clock_ns()
+        period_ns = round(1e9 / (self._wanted.hz or UNSEEN_HZ))
+        later = self.recording.neighbour(tick, later=True)
+        wall_ns = None
+        if later is not None:
+            wall_ns = self.deck.wall_ns(later * self.recording.tick_ns - self.offset_ns)
+        soonest_ns = max(due_ns + period_ns * 9 // 10, now_ns + 1_000_000)
+        # A little behind its time: a timer that is early would find the frame before.
+        next_ns = now_ns + period_ns if wall_ns is None else wall_ns + EARLY_NS
+        return min(max(soonest_ns, next_ns), now_ns + 10**9)
+
+    def _tell_moment(self, feed: Feed, look: Look, *, jump: bool) -> None:
+        if look.world != self._world:
+            self._world = look.world
+            self._describe(feed)
+        self._look = look
+        paused = self.deck.playhead.paused
+        feed.show(Moment(look.tick, look.poses, look.values, jump, paused))
+        now_ns = self.deck.clock_ns()
+        if self._wanted.overlays and look.frame is not None and (paused or now_ns >= self._overlay_ns):
+            self._overlay_ns = now_ns + OVERLAY_NS
+            drawing = self.recording.worlds[look.world].drawing
+            feed.tell(drawing.overlay(look.frame, self._wanted.overlays))
+
+    def _describe(self, feed: Feed) -> None:
+        if self._world >= 0:
+            feed.describe(self._about, self.recording.worlds[self._world].drawing.content())
+
+    async def _show_exactly(self, feed: Feed, look: Look) -> None:
+        """Tell the frame of a tick that has none, computed again; it is told what stands in the way."""
+        if self._recompute is None or self._is_inexact or look.asked == look.tick == 0:
+            return
+        try:
+            found = await self._in(self._front, self._start, look.asked)
+            if found is None:
+                return
+            frame = await self._in(self._exact, self._recompute, *found)
+        except Refused as error:
+            self._is_inexact = True
+            text = f"ticks between captured frames are not computed again: {error}"
+            feed.tell({"type": "note", "level": "info", "text": text})
+            return
+        if frame is None:
+            self._is_inexact = True
+            text = "this machine computes another world than the capture has: between captured frames the last is seen"
+            feed.tell({"type": "note", "level": "warning", "text": text})
+        elif frame.tick == self.tick():
+            self._tell_moment(feed, self.recording.seen(look.asked, frame, "computed"), jump=False)
+
+    def _start(self, tick: int) -> tuple[Frame, list[CapturedTick]] | None:
+        """Return the newest captured frame up to a tick, and what led from there to it."""
+        frame = self.recording.frame_up_to(tick)
+        return None if frame is None else (frame, [*self.recording.inputs(frame.tick, tick)])
+
+    # --- what happened -----------------------------------------------------------------------------------------------
+
+    async def _gather(self, feed: Feed) -> None:
+        """Read what happened, slice by slice, and tell the marks as they are found."""
+        history = await self._in(self._back, self._open_history)
+        told = False
+        while True:
+            try:
+                await self._in(self._back, history.gather)
+            except CaptureError as error:
+                feed.tell({"type": "note", "level": "error", "text": str(error)})
+            self._history = history
+            if history.is_complete:
+                marks = await self._in(self._back, history.news)
+                content = [{"tick": mark.tick, "kind": mark.kind, "text": mark.text} for mark in marks]
+                for start in range(0, len(content), MARKS_TOLD):
+                    feed.tell({"type": "marks", "marks": content[start : start + MARKS_TOLD]})
+                if history.left_packets and not told:
+                    text = f"{history.left_packets} packets at the end of the capture are in no figure of a link"
+                    feed.tell({"type": "note", "level": "warning", "text": text})
+                    told = True
+                if history.recording.index.finished:
+                    return
+                await asyncio.sleep(REFRESH_S)
+                await self._in(self._back, history.refresh)
+
+    def _open_history(self) -> CaptureHistory:
+        return CaptureHistory(Recording(self.recording.path, (PACKETS, CLIENTS)))
+
+    async def _refresh(self, feed: Feed) -> None:
+        """Take what was written to the file since; a capture that ends is not looked at any more."""
+        while not self.recording.index.finished:
+            await asyncio.sleep(REFRESH_S)
+            try:
+                if not await self._in(self._front, self.recording.refresh):
+                    continue
+            except CaptureError as error:
+                feed.tell({"type": "note", "level": "error", "text": str(error)})
+                continue
+            first, last = self.recording.span
+            self._about = replace(self._about, span=(first, last))
+            if self.is_master:
+                self.deck.playhead.grow(first, last, self.deck.clock_ns())
+                self.deck.changed()
+            self._describe(feed)
+            if self._look is not None and self._world >= 0:
+                self._tell_moment(feed, self._look, jump=False)
+
+    async def _tell_status(self, feed: Feed) -> None:
+        before: Mapping[str, Any] | None = None
+        while True:
+            history = self._history
+            look = self._look
+            status = status_at(self.recording, self.deck.playhead, self.tick(), look)
+            status["gathered"] = 0.0 if history is None else round(history.share, 3)
+            if history is not None and history.is_complete:
+                at_ns = self.tick() * self.recording.tick_ns
+                status["packets"] = await self._in(self._back, history.links.totals, at_ns)
+            if status != before:
+                feed.tell({"type": "status", "status": status})
+                before = status
+            await asyncio.sleep(STATUS_S)
+
+    async def _tell_links(self, feed: Feed) -> None:
+        """Tell what links did in the window up to now, the last drops of those that are watched, and readings."""
+        before: Any = None
+        while True:
+            history, at = self._history, self.tick()
+            key = at, self._wanted.links, None if history is None else history.share
+            if history is not None and key != before:
+                try:
+                    for message in await self._in(self._back, self._link_messages, history, at):
+                        feed.tell(message)
+                except CaptureError as error:
+                    feed.tell({"type": "note", "level": "error", "text": str(error)})
+                before = key
+            await asyncio.sleep(LINKS_S)
+
+    def _link_messages(self, history: CaptureHistory, tick: int) -> list[dict[str, Any]]:
+        at_ns = tick * self.recording.tick_ns
+        drops = [
+            {"from": key[0], "to": key[1], "cause": cause, "where": lost_where(cause), "count": count}
+            for key, cause, count in history.links.drops(at_ns - WINDOW_NS, at_ns)
+        ]
+        frame = history.recording.frame_up_to(tick)
+        if frame is not None:
+            world = history.recording.world_at(frame.tick)
+            if world != self._placed:
+                self._ends.turn_to(history.recording.worlds[world].drawing.scene)
+                self._placed = world
+            self._ends.move(frame)
+        links = self._ends.with_ends(history.links.windows(at_ns, WINDOW_NS))
+        told: list[dict[str, Any]] = [
+            {"type": "links", "at": tick, "window_s": WINDOW_NS / 1e9, "links": links, "drops": drops}
+        ]
+        for source, destination in self._wanted.links:
+            told.append({"type": "watched", **history.watched(source, destination, at_ns)})
+        after_ns = self._readings_ns if at_ns - WINDOW_NS < self._readings_ns <= at_ns else at_ns - WINDOW_NS // 10
+        self._readings_ns = at_ns
+        for robot, channel in self._wanted.readings:
+            points = reading_points(history, robot, channel, after_ns, at_ns)
+            if points:
+                told.append({"type": "readings", "robot": robot, "channel": channel, "points": points})
+        return told
+
+    # --- asked -------------------------------------------------------------------------------------------------------
+
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        if verb == BRANCH or not self.is_master:
+            checked(verb, arguments, {BRANCH: {"tick": (int,)}})
+            tick = arguments.get("tick", self.tick())
+            return await self._in(self._front, branch_answer, self.recording, tick)
+        checked(verb, arguments, {**ARGUMENTS, BRANCH: {}})
+        return self.deck.ask(verb, arguments, lambda tick, later: self.recording.neighbour(tick, later=later))
+
+    async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
+        name, unit = name_and_unit(curve)
+        history = self._history
+        if history is None:
+            return name, unit, []
+        try:
+            points = await self._in(self._back, curve_points, history, curve, self.tick(), max(self._world, 0))
+        except CaptureError:  # the pass over the whole capture tells of it
+            points = []
+        return name, unit, points

@@ -1,0 +1,157 @@
+"""Recorded poses as a source of the page: a recorded reality, beside or as a ghost in what a capture has.
+
+What has the name of a link or an entity of the other source is drawn as that; all else is a small ball.
+Neighbours: `poses_csv` (the table), `tracks` (what is known between its lines), `deck`, `comparing`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from foosim.console.recorded.comparing import Comparing
+from foosim.console.recorded.deck import VERBS, Deck
+from foosim.console.recorded.playhead import Playhead
+from foosim.console.recorded.poses_csv import BadPoses, read_tracks
+from foosim.console.shown.compare import Where
+from foosim.console.shown.scene_json import scene_content
+from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, NotAsked, Wanted
+from foosim.console.shown.tracks import Pose, Track
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.layout import build_layout
+from foosim.protocol.scenes import build_scene
+
+TICK_NS: Final = 1_000_000
+"""Of a table that is looked at by itself."""
+MARKER_M: Final = 0.03
+MARKER_COLOUR: Final = (0.9, 0.6, 0.1, 1.0)
+UNSEEN_HZ: Final = 2.0
+BYTES_MAX: Final = 4 * 1024**3
+NOWHERE: Final = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0)
+"""Where a link is drawn that is not known at a time: out of sight."""
+
+
+def load_tracks(path: Path) -> dict[str, Track]:
+    """Return the tracks of a file. Raises BadPoses."""
+    try:
+        if path.stat().st_size > BYTES_MAX:
+            raise BadPoses(f"{path}: larger than {BYTES_MAX} bytes")
+        with path.open(encoding="utf-8", newline="") as lines:
+            return read_tracks(lines, str(path))
+    except UnicodeDecodeError as error:
+        raise BadPoses(f"{path}: not a text in UTF-8, {error.reason} at byte {error.start}") from None
+    except OSError as error:
+        raise BadPoses(f"{path}: cannot be read, {error.strerror or error}") from None
+
+
+class PosesSource:
+    """A table of poses. Without a `deck` it has one of its own, else it follows."""
+
+    def __init__(
+        self,
+        path: Path,
+        deck: Deck | None = None,
+        offset_ns: int = 0,
+        deployment: Deployment | None = None,
+        compare: Callable[[], Where] | None = None,
+    ) -> None:
+        """`offset_ns`: the table's time at time 0 of the deck. `deployment`: whose links are drawn. `compare`:
+        opens what it is compared with. Raises BadPoses.
+        """
+        self.tracks: Final = load_tracks(path)
+        first_ns = min(int(track.times_ns[0]) for track in self.tracks.values())
+        last_ns = max(int(track.times_ns[-1]) for track in self.tracks.values())
+        self.is_master: Final = deck is None
+        self.offset_ns: Final = offset_ns
+        if deck is None:
+            deck = Deck(Playhead(first_ns // TICK_NS, -(-last_ns // TICK_NS), TICK_NS), TICK_NS, time.monotonic_ns)
+        self.deck: Final = deck
+        first, last = ((time_ns - offset_ns) // deck.tick_ns for time_ns in (first_ns, last_ns))
+        verbs = VERBS if self.is_master else ()
+        world = "" if deployment is None else deployment.world
+        self._about = About("poses", path.name, world, deck.tick_ns, verbs, (first, last))
+        self._scene = _scene(self.tracks, deployment)
+        self._compare = compare
+        self._wanted = Wanted()
+
+    @property
+    def about(self) -> About:
+        return self._about
+
+    def want(self, wanted: Wanted) -> None:
+        self._wanted = wanted
+        self.deck.changed()
+
+    def where(self, time_ns: int) -> dict[str, Pose]:
+        """Return what is known at a time of the deck, by name."""
+        found = {name: track.at(time_ns + self.offset_ns) for name, track in self.tracks.items()}
+        return {name: pose for name, pose in found.items() if pose is not None}
+
+    async def run(self, feed: Feed) -> None:
+        feed.describe(self._about, self._scene)
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._show(feed))
+            if self._compare is not None:
+                tasks.create_task(Comparing(self.deck, self._compare, lambda: self.where).run(feed))
+
+    async def _show(self, feed: Feed) -> None:
+        names = [link["name"] for link in self._scene["links"]]
+        head, jumps = self.deck.playhead, self.deck.playhead.jumps
+        shown: tuple[int, int, bool] | None = None
+        while True:
+            time_ns = self.deck.time_ns()
+            wish = time_ns, head.jumps, head.paused
+            if wish != shown:
+                known = self.where(time_ns)
+                rows = [(*known[name][0], *known[name][1]) if name in known else NOWHERE for name in names]
+                poses = np.array(rows, np.float32).reshape(len(names), 7)
+                moment = Moment(time_ns / self.deck.tick_ns, poses, np.empty(0), head.jumps != jumps, head.paused)
+                feed.show(moment)
+                shown, jumps = wish, head.jumps
+            period_ns = round(1e9 / (self._wanted.hz or UNSEEN_HZ))
+            await self.deck.wait(None if head.paused else self.deck.clock_ns() + period_ns)
+
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        if not self.is_master:
+            raise NotAsked("recorded poses follow the first source: ask that one")
+        return self.deck.ask(verb, arguments, lambda tick, later: tick + (1 if later else -1))
+
+    async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
+        return "", "", []
+
+
+def _scene(tracks: Mapping[str, Track], deployment: Deployment | None) -> dict[str, Any]:
+    """Return the scene of what a table has: shapes of a deployment where names are its own, markers for the rest."""
+    links: list[dict[str, Any]] = []
+    models: dict[str, str] = {}
+    known: dict[str, dict[str, Any]] = {}
+    content: dict[str, Any] = {}
+    if deployment is not None:
+        layout = build_layout(deployment)
+        scene = build_scene(deployment, layout)
+        content = scene_content(deployment, layout, scene)
+        known = {link["name"]: link for link in content["links"]}
+        last = {name: body.links[-1].name for name, body in scene.bodies.items()}
+        known |= {name: known[link] for name, link in last.items()}
+        models = {name: body.model for name, body in scene.bodies.items()}
+    marker = {"kind": "sphere", "radius": MARKER_M, "position": (0.0, 0.0, 0.0), "orientation": (0.0, 0.0, 0.0, 1.0)}
+    for name in tracks:
+        shapes = known[name]["shapes"] if name in known else [{**marker, "colour": MARKER_COLOUR, "name": ""}]
+        links.append({"name": name, "body": name, "shapes": shapes})
+    bodies = [
+        {"name": name, "model": models.get(name, ""), "links": [place], "removable": False, "pushable": False}
+        for place, name in enumerate(tracks)
+    ]
+    empty = {"layout": "", "scenery": [], "fields": [], "sensors": [], "meshes": {}, "addable": []}
+    return {**empty, "meshes": content.get("meshes", {}), "links": links, "bodies": bodies, "bounds": _bounds(tracks)}
+
+
+def _bounds(tracks: Mapping[str, Track]) -> tuple[list[float], list[float]]:
+    places = np.concatenate([track.poses[:, :3] for track in tracks.values()])
+    low, high = places.min(axis=0) - MARKER_M, places.max(axis=0) + MARKER_M
+    return low.tolist(), high.tolist()

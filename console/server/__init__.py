@@ -1,0 +1,1 @@
+"""The server: pages over HTTP, a WebSocket for each browser."""

@@ -1,0 +1,258 @@
+"""What the console knows: what each source has last told, who looks at what, and who gets what of it.
+
+A browser that joins is told the sources, their scenes, the last moment and the last of each message, so that it draws
+at once. Pure: time is given by `clock`, bytes leave through each reader's outbox. Neighbours: `source` (tells it),
+`reader`, `page_messages` (what pages say), `server` (moves the bytes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final, Protocol
+
+from foosim.console.server.page_messages import Plot, Show, Watch
+from foosim.console.server.reader import Follows, Reader, Shown, TooSlow
+from foosim.console.shown.curves import points_of
+from foosim.console.shown.source import About, Curve, Link, Moment, Source, Wanted
+from foosim.protocol.codec import encode_json
+from foosim.protocol.errors import Malformed
+
+MARKS_MAX: Final = 4096
+"""Of one source: the last so many."""
+WATCHED_MAX: Final = 64
+"""Links, and readings, that all browsers together have looked at."""
+KEPT: Final = frozenset({"status", "links", "compared", "overlay"})
+"""Messages of which the last one is kept for those that join, and of which only the newest waits."""
+PLOTTED: Final = frozenset({"status", "links", "readings"})
+
+
+class Onlooker(Protocol):
+    """Looks at the moments of all sources, as a comparison of two of them does."""
+
+    def saw(self, source: int, moment: Moment) -> Iterable[Mapping[str, Any]]:
+        """Return what there is to tell of it: messages of pages, whole."""
+
+
+@dataclass
+class Told:
+    """What one source has told last."""
+
+    about: About
+    generation: int = 0
+    scene: bytes = b""
+    links: int = 0
+    numbers: int = 0
+    shown: Shown | None = None
+    kept: dict[str, bytes] = field(default_factory=dict)
+    warning: bytes = b""
+    watched: dict[Link, bytes] = field(default_factory=dict)
+    """The last message about each link that somebody watches."""
+    marks: list[Mapping[str, Any]] = field(default_factory=list)
+
+
+class Board:
+    """The one place that sources tell and readers are served from; all of it in one thread."""
+
+    def __init__(
+        self,
+        sources: Sequence[Source],
+        version: str,
+        clock: Callable[[], float],
+        onlookers: Sequence[Onlooker] = (),
+        cut_off: Callable[[Reader, str], None] = lambda reader, why: None,
+    ) -> None:
+        """`clock` gives seconds; `cut_off` ends the connection of a reader."""
+        self.sources = sources
+        self.readers: dict[str, Reader] = {}
+        """By name."""
+        self._version, self._clock, self._onlookers, self._cut_off = version, clock, onlookers, cut_off
+        self._told = [Told(source.about) for source in sources]
+        self._wanted = [Wanted() for _ in sources]
+
+    def feed(self, source: int) -> SourceFeed:
+        """Return where a source tells of its world."""
+        return SourceFeed(self, source)
+
+    # --- browsers ----------------------------------------------------------------------------------------------------
+
+    def join(self, reader: Reader) -> None:
+        """Serve one more browser: all that it needs to draw waits for it."""
+        self.readers[reader.name] = reader
+        reader.follows = {source: Follows() for source in range(len(self.sources))}
+        reader.put_first("sources", self._welcome(reader, "welcome"))
+        for source, told in enumerate(self._told):
+            if told.scene:
+                reader.put_first(("scene", source), told.scene)
+            if told.shown is not None:
+                reader.show(told.shown, self._clock())
+            for kind, message in told.kept.items():
+                reader.put_newest((kind, source), message)
+            if told.marks:
+                reader.put(encode_json({"type": "marks", "source": source, "marks": told.marks}))
+            if told.warning:
+                reader.put(told.warning)
+        self._look()
+
+    def leave(self, reader: Reader) -> None:
+        """Forget a browser."""
+        if self.readers.pop(reader.name, None) is not None:
+            self._look()
+
+    def follow(self, reader: Reader, message: Show | Watch | Plot) -> tuple[Curve, ...]:
+        """Take what a page wants of a source; return the curves that it did not plot before. Raises Malformed."""
+        follows = reader.follows[self.checked(message.source)]
+        new: tuple[Curve, ...] = ()
+        if isinstance(message, Show):
+            follows.hz, follows.overlays = message.hz, frozenset(message.overlays)
+        elif isinstance(message, Watch):
+            follows.link = message.link
+            known = None if message.link is None else self._told[message.source].watched.get(message.link)
+            if known is not None:
+                reader.put_newest(("watched", message.source), known)
+        else:
+            curves = tuple(series.curve() for series in message.series)
+            new = tuple(curve for curve in curves if curve not in follows.curves)
+            follows.curves = curves
+            follows.fields = self._fields(message, curves)
+        shown = self._told[message.source].shown
+        if shown is not None:  # a paused world shows no other one
+            follows.next_s = 0.0
+            reader.show(shown, self._clock())
+        self._look()
+        return new
+
+    def _fields(self, message: Plot, curves: Iterable[Curve]) -> tuple[int, ...]:
+        """Return the numbers of the frame among curves. Raises Malformed for one that the frame does not have."""
+        told = self._told[message.source]
+        if not told.scene or message.generation not in (None, told.generation):
+            return ()
+        fields = tuple(curve.field for curve in curves if curve.field is not None)
+        wrong = [place for place in fields if place >= told.numbers]
+        if wrong:
+            raise Malformed(f"series of field {wrong[0]}: the frame has {told.numbers} numbers")
+        return fields
+
+    def checked(self, source: int) -> int:
+        """Return the number of a source, or raise `Malformed`."""
+        if source >= len(self.sources):
+            raise Malformed(f"no source {source}: there are 0 to {len(self.sources) - 1}")
+        return source
+
+    def _welcome(self, reader: Reader, kind: str) -> bytes:
+        sources = [
+            {
+                "id": source,
+                **asdict(told.about),
+                "verbs": told.about.verbs if reader.role == "operator" else (),
+                "span": None if told.about.span is None else dict(zip(("first", "last"), told.about.span, strict=True)),
+            }
+            for source, told in enumerate(self._told)
+        ]
+        return encode_json(
+            {"type": kind, "role": reader.role, "name": reader.name, "sources": sources, "version": self._version}
+        )
+
+    def _look(self) -> None:
+        """Tell each source what all browsers together look at, where that has changed."""
+        for number, source in enumerate(self.sources):
+            all_follow = [reader.follows[number] for reader in self.readers.values()]
+            links = sorted({follows.link for follows in all_follow if follows.link is not None})
+            curves = [curve for follows in all_follow for curve in follows.curves]
+            readings = sorted({curve.reading for curve in curves if curve.reading is not None})
+            wanted = Wanted(
+                len(self.readers),
+                max((follows.hz for follows in all_follow), default=0.0),
+                frozenset().union(*(follows.overlays for follows in all_follow)),
+                tuple(links[:WATCHED_MAX]),
+                tuple(readings[:WATCHED_MAX]),
+            )
+            watched = self._told[number].watched
+            for link in [known for known in watched if known not in wanted.links]:
+                del watched[link]
+            if wanted != self._wanted[number]:
+                self._wanted[number] = wanted
+                source.want(wanted)
+
+    # --- what sources tell -------------------------------------------------------------------------------------------
+
+    def describe(self, source: int, about: About, scene: Mapping[str, Any]) -> None:
+        told = self._told[source]
+        told.generation += 1
+        told.shown = None
+        told.links = len(scene["links"])
+        told.numbers = max((run["index"] + run["count"] for run in scene["fields"]), default=0)
+        told.scene = encode_json({"type": "scene", "source": source, "generation": told.generation, **scene})
+        told.kept.pop("overlay", None)
+        changed, told.about = about != told.about, about
+        for reader in self.readers.values():
+            if changed:
+                reader.put_first("sources", self._welcome(reader, "sources"))
+            reader.put_first(("scene", source), told.scene)
+            reader.follows[source].fields = ()  # they were places in another layout
+
+    def show(self, source: int, moment: Moment) -> None:
+        told = self._told[source]
+        assert len(moment.poses) == told.links, f"{len(moment.poses)} poses of a scene of {told.links} links"
+        told.shown = Shown(source, told.generation, moment)
+        now_s = self._clock()
+        for reader in self.readers.values():
+            reader.show(told.shown, now_s)
+        for onlooker in self._onlookers:
+            for message in onlooker.saw(source, moment):
+                self.tell(source, message)
+
+    def tell(self, source: int, message: Mapping[str, Any]) -> None:
+        told, kind = self._told[source], message["type"]
+        whole = {"source": source, **message}
+        if kind == "overlay":
+            whole["generation"] = told.generation
+        if kind == "marks":
+            told.marks += message["marks"]
+            del told.marks[:-MARKS_MAX]
+        text = b"" if kind == "readings" else encode_json(whole)
+        if kind in KEPT:
+            told.kept[kind] = text
+        if kind == "watched":
+            told.watched[message["link"][0], message["link"][1]] = text
+        if kind == "note":
+            told.warning = b"" if message["level"] == "info" else text
+        for reader in list(self.readers.values()):
+            try:
+                self._send(reader, source, kind, whole, text)
+            except TooSlow as slow:
+                self._cut_off(reader, str(slow))
+
+    def _send(self, reader: Reader, source: int, kind: str, message: Mapping[str, Any], text: bytes) -> None:
+        """Have one reader get a message, if it looks at that, and the further points of its curves. Raises TooSlow."""
+        follows = reader.follows[source]
+        if kind == "watched":
+            if follows.link == tuple(message["link"]):
+                reader.put_newest((kind, source), text)
+        elif kind == "overlay":
+            if follows.overlays:
+                reader.put_newest((kind, source), text)
+        elif kind in KEPT:
+            reader.put_newest((kind, source), text)
+        elif kind != "readings":
+            reader.put(text)
+        if kind in PLOTTED and follows.curves:
+            series = points_of(follows.curves, message)
+            if series:
+                reader.put(encode_json({"type": "plotted", "source": source, "series": series}))
+
+
+class SourceFeed:
+    """Where one source tells of its world: a `source.Feed`."""
+
+    def __init__(self, board: Board, source: int) -> None:
+        self._board, self._source = board, source
+
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
+        self._board.describe(self._source, about, scene)
+
+    def show(self, moment: Moment) -> None:
+        self._board.show(self._source, moment)
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        self._board.tell(self._source, message)

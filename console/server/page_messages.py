@@ -1,0 +1,100 @@
+"""What a page says to the console: JSON, checked whole, bounded.
+
+What is not one of these ends the connection with a reason. Neighbours: `board` (acts on them), `server` (reads them).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from foosim.console.shown.source import Curve
+from foosim.protocol.errors import Malformed
+
+MESSAGE_BYTES_MAX: Final = 64 * 1024
+CURVES_MAX: Final = 64
+"""What one page may plot in one source."""
+HZ_MAX: Final = 200.0
+
+Number = Annotated[int, Meta(ge=0, le=2**31)]
+Text = Annotated[str, Meta(max_length=64)]
+Place = Annotated[int, Meta(ge=0, le=255)]
+"""Of a source in the list of sources."""
+
+
+class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
+    """One message; its type is a word."""
+
+
+class Hello(_Message, frozen=True, tag="hello"):
+    """First: who this is."""
+
+    token: Annotated[str, Meta(max_length=128)]
+
+
+class Ask(_Message, frozen=True, tag="ask"):
+    """Something is to be done; the answer has the same id."""
+
+    id: Number
+    verb: Text
+    source: Place = 0
+    arguments: dict[str, Any] = {}
+
+
+class Show(_Message, frozen=True, tag="show"):
+    """What the page draws of a source, and how often at most."""
+
+    source: Place = 0
+    overlays: Annotated[list[Literal["contacts", "rays"]], Meta(max_length=8)] = []
+    hz: Annotated[float, Meta(ge=0, le=HZ_MAX)] = 50.0
+
+
+class Watch(_Message, frozen=True, tag="watch"):
+    """Of which link the last drops are to be explained; of none by null."""
+
+    source: Place = 0
+    link: tuple[Text, Text] | None = None
+
+
+class Series(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One curve: exactly one of a field, a link and its figure, a status value, a reading."""
+
+    id: Text
+    field: Number | None = None
+    link: tuple[Text, Text] | None = None
+    figure: Literal["", "offered", "delivered", "dropped", "loss", "delay_ms", "queue_ms"] = ""
+    status: Annotated[str, Meta(max_length=128)] = ""
+    reading: tuple[Text, Text] | None = None
+    index: Place = 0
+
+    def curve(self) -> Curve:
+        """Return it, or raise `Malformed`."""
+        said = [self.field is not None, self.link is not None, bool(self.status), self.reading is not None]
+        if sum(said) != 1 or (self.link is None) != (not self.figure):
+            raise Malformed(f"series {self.id}: give exactly one of field, link with figure, status, reading")
+        return Curve(self.id, self.field, self.link, self.figure, self.status, self.reading, self.index)
+
+
+class Plot(_Message, frozen=True, tag="plot"):
+    """All that the page plots of a source: numbers of the frame among it travel behind the poses, in this order."""
+
+    source: Place = 0
+    series: Annotated[list[Series], Meta(max_length=CURVES_MAX)] = []
+    generation: Number | None = None
+    """Of the scene whose fields are meant: of another one than the newest none are sent."""
+
+
+Message = Hello | Ask | Show | Watch | Plot
+_decoder: Final[msgspec.json.Decoder[Message]] = msgspec.json.Decoder(Message)
+
+
+def read_message(payload: str | bytes) -> Message:
+    """Return what a page says, or raise `Malformed`."""
+    if isinstance(payload, bytes):
+        raise Malformed("a binary message; a page says JSON")
+    try:
+        return _decoder.decode(payload)
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise Malformed(f"not a message of a page: {error}") from None

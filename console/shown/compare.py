@@ -1,0 +1,83 @@
+"""Two sources on one clock, and how far apart what is in both is: run and what-if, simulation and reality.
+
+A distance is that of two positions of the same name at the same simulated time. Where one of the two is not known (an
+entity that was not there, a gap, a jump) there is no distance, and a series has a hole.
+Pure: neighbours are `tracks` (what is known between samples), `poses_csv`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import dist
+from typing import Any, Final
+
+from foosim.console.shown.tracks import Pose
+
+POINTS: Final = 500
+"""Points of a series over the whole time that both sources have."""
+ENTITIES_TOLD: Final = 200
+
+Positions = Mapping[str, Pose]
+Where = Callable[[int], Positions]
+"""Gives what is known of a source at a time in ns, by entity."""
+
+
+@dataclass(frozen=True, slots=True)
+class Distance:
+    """How far apart an entity is in two sources, m."""
+
+    name: str
+    metres: float
+
+
+def distances(one: Positions, other: Positions) -> list[Distance]:
+    """Return the distance of each entity that both have, the largest first."""
+    found = [Distance(name, dist(pose[0], other[name][0])) for name, pose in one.items() if name in other]
+    return sorted(found, key=lambda distance: (-distance.metres, distance.name))
+
+
+class Comparison:
+    """The series of distances over the time that two sources share, made point by point as there is time for it."""
+
+    def __init__(self, one: Where, other: Where, tick_ns: int) -> None:
+        self._one, self._other = one, other
+        self._tick_ns = tick_ns
+        self._span = (0, -1)
+        self._most: dict[int, float | None] = {}
+        self._wanted: list[int] = []
+
+    def over(self, first: int, last: int) -> None:
+        """Take the ticks that both sources have; points that are known stay where the span has only grown."""
+        if (first, last) == self._span:
+            return
+        self._span = first, last
+        step = max(1, -(-(last - first) // POINTS))
+        self._wanted = [tick for tick in range(first, last + 1, step) if tick not in self._most]
+        keep = {*range(first, last + 1, step)}
+        self._most = {tick: metres for tick, metres in self._most.items() if tick in keep}
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all points are there."""
+        return not self._wanted
+
+    def work(self, points: int) -> None:
+        """Make so many further points."""
+        for tick in self._wanted[:points]:
+            found = distances(self._one(tick * self._tick_ns), self._other(tick * self._tick_ns))
+            self._most[tick] = found[0].metres if found else None
+        del self._wanted[:points]
+
+    def as_json(self, tick: int) -> dict[str, Any]:
+        """Return what is known: the distance of each entity at a tick, and the series of the largest, m."""
+        time_ns = tick * self._tick_ns
+        now = distances(self._one(time_ns), self._other(time_ns))[:ENTITIES_TOLD]
+        return {
+            "at": tick,
+            "entities": [{"name": found.name, "distance_m": round(found.metres, 6)} for found in now],
+            "series": [
+                [tick, None if metres is None else round(metres, 6)] for tick, metres in sorted(self._most.items())
+            ],
+            "complete": self.is_complete,
+        }

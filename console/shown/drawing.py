@@ -1,0 +1,43 @@
+"""The frames of one layout as what pages draw: scene, moments, overlays, links with their ends and walls.
+
+Every source whose world is a deployment's uses it. Neighbours: `scene_json`, `poses`, `overlays`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+from foosim.console.shown.overlays import Overlays
+from foosim.console.shown.poses import Poser
+from foosim.console.shown.scene_json import scene_content
+from foosim.console.shown.source import Moment
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout
+from foosim.protocol.scenes import build_scene
+
+
+class Drawing:
+    """One layout of one deployment's world."""
+
+    def __init__(self, deployment: Deployment, layout: Layout) -> None:
+        """`deployment` has the contents of the files that it names."""
+        self.deployment, self.layout = deployment, layout
+        self.scene = build_scene(deployment, layout)
+        self.poser = Poser(layout, self.scene)
+        self._overlays: Overlays | None = None
+
+    def content(self) -> dict[str, Any]:
+        """Return the scene as pages read it."""
+        return scene_content(self.deployment, self.layout, self.scene)
+
+    def moment(self, frame: Frame, jump: bool = False, paused: bool = False) -> Moment:
+        """Return what there is to see in a frame of this layout."""
+        return Moment(frame.tick, self.poser.poses(frame.values), frame.values, jump, paused)
+
+    def overlay(self, frame: Frame, wanted: Collection[str]) -> dict[str, Any]:
+        """Return the message with these overlays."""
+        if self._overlays is None:
+            self._overlays = Overlays(self.deployment, self.layout)
+        return self._overlays.content(frame, wanted)

@@ -1,0 +1,133 @@
+"""What a page looks at: a running system, a capture, a replay, recorded poses; all behind one interface.
+
+A `Source` runs inside the console's event loop and tells a `Feed` of its world: which scene it has, what there is to
+see at a moment, and messages in the form that pages read (docs/console.md lists them). It knows no browser; what all
+browsers together look at it is told by `want`. Whatever takes longer than a millisecond or waits goes into a thread of
+its own. Neighbours: `board` (the feed), `scene_json`, `poses`, `live.live_source`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.protocol.errors import Refused
+
+Kind = Literal["live", "capture", "replay", "poses"]
+Link = tuple[str, str]
+"""Names of sender and receiver."""
+Reading = tuple[str, str]
+"""Names of a robot and of its channel."""
+FIGURES: Final = ("offered", "delivered", "dropped", "loss", "delay_ms", "queue_ms")
+"""What can be plotted of a link."""
+OVERLAYS: Final = ("contacts", "rays")
+
+
+class NotAsked(Refused):
+    """A source has no such verb, or not for this browser; the text says which there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a page is told of a source before its scene."""
+
+    kind: Kind
+    name: str
+    """Of the run, or of the file."""
+    world: str
+    tick_ns: int
+    verbs: tuple[str, ...]
+    """What an operator may ask."""
+    span: tuple[int, int] | None = None
+    """First and last tick of what has an end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What there is to see at one tick."""
+
+    tick: float
+    poses: NDArray[np.float32]
+    """Of each link of the scene, in its order, shape (links, 7): x, y, z in m, quaternion x, y, z, w; world frame."""
+    values: NDArray[np.float64]
+    """The frame's numbers, which the scene's `fields` index; empty where there are none."""
+    jump: bool = False
+    """Not the moment behind the one before: paths are cut here."""
+    paused: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What all browsers together look at in one source."""
+
+    readers: int = 0
+    """How many browsers there are."""
+    hz: float = 0.0
+    """Moments a second; 0 when nobody draws them."""
+    overlays: frozenset[str] = frozenset()
+    links: tuple[Link, ...] = ()
+    """Whose last drops are explained."""
+    readings: tuple[Reading, ...] = ()
+    """Whose values are plotted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """What became of what was asked; `tick` is the one from which it holds."""
+
+    text: str
+    tick: int
+    accepted: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One plotted thing: a number of the frame, a figure of a link, a value of the status, a number of a reading."""
+
+    id: str
+    field: int | None = None
+    link: Link | None = None
+    figure: str = ""
+    status: str = ""
+    """A path into the status, its keys joined by dots."""
+    reading: Reading | None = None
+    index: int = 0
+    """Which of the reading's numbers."""
+
+
+class Feed(Protocol):
+    """Where a source tells of its world. Called in the event loop's thread."""
+
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
+        """Say the scene, as `scene_json.scene_content` makes it, and what is new about the source."""
+
+    def show(self, moment: Moment) -> None:
+        """Say what there is to see; `poses` has as many rows as the scene has links."""
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        """Say a message of one of the types `status`, `links`, `overlay`, `watched`, `readings`, `marks`, `compared`,
+        `note`; its number as a source is added to it."""
+
+
+class Source(Protocol):
+    """What a page looks at."""
+
+    @property
+    def about(self) -> About:
+        """What is known of it before it runs, and from then on."""
+
+    async def run(self, feed: Feed) -> None:
+        """Tell the feed of the world until it is cancelled, or has nothing more to tell."""
+
+    def want(self, wanted: Wanted) -> None:
+        """Take note of what the browsers look at. Called at each change, in the event loop's thread."""
+
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        """Have something done; `who` names the browser that asks. Raises Refused, whose text says why it is not."""
+
+    async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
+        """Return name, unit and points (tick, value) of a curve so far; no points where nothing is kept of it."""

@@ -1,0 +1,225 @@
+"""What happened in a run, as marks on its time line: what the world's rules did, what was asked for, who was lost.
+
+The rules leave their memory in frames, so their events are read from these, to the tick, also where only every tenth
+frame is there. Pure, and bounded whatever the length of the run. Neighbours: `capture_history` feeds it, `asked`
+(what people asked for, in words), `node.rules` (whose memory it reads).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from pydantic import ValidationError
+
+from foosim.console.shown.asked import edit_text, moves
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import Refused
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import WORLD, Entity
+from foosim.protocol.names import TEAMS
+from foosim.protocol.network import event_of
+from foosim.protocol.start import kickoff_ticks
+from foosim.vhub.rows import EditRow, EpochRow, RecoveryRow
+from foosim.vhub.settings_text import event_text
+
+MARKS_MAX: Final = 400
+"""Marks of one kind; those that come later are counted."""
+DROP_BINS: Final = 120
+"""Marks of drops: each is of a span of time."""
+FINE_BINS: Final = 8192
+"""Spans in which drops are counted; where they are not enough, they get twice as long."""
+FINE_NS: Final = 50_000_000
+CAUSES_SHOWN: Final = 3
+GOAL, KICKOFF, OUT, DEAD, QUARANTINE, DOWN, EMPTY = "goal", "kickoff", "out", "dead", "quarantine", "down", "empty"
+EPOCH, RECOVERY, MOVE, NETWORK, DROPS = "epoch", "recovery", "move", "network", "drops"
+
+FLAGS: Final = {"quarantined": (QUARANTINE, "is in quarantine"), "down": (DOWN, "is out of service")}
+"""Slots of an entity that are 1 while something holds: the kind of the mark, and what it says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something that happened at a tick."""
+
+    tick: int
+    kind: str
+    text: str
+
+
+class WorldEvents:
+    """Finds what the rules did between frames, taken in order. The first frame is what later ones are compared with."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._wait_ticks = 0 if deployment.is_hall else kickoff_ticks(deployment)
+        self._before: Frame | None = None
+
+    def take(self, frame: Frame) -> list[Mark]:
+        """Return what happened since the frame before; a frame that is not later begins anew."""
+        before, self._before = self._before, frame
+        if before is None or frame.tick <= before.tick:
+            return []
+        marks = self._of_flags(before, frame)
+        if WORLD in frame.layout and WORLD in before.layout:
+            marks += self._of_table(before, frame)
+        return sorted(marks, key=lambda mark: mark.tick)
+
+    def _of_table(self, before: Frame, frame: Frame) -> list[Mark]:
+        marks: list[Mark] = []
+        returned: list[tuple[int, Entity]] = []
+        for ball in frame.layout.balls:
+            if ball.name not in before.layout:
+                continue
+            wait = int(frame.at(ball.name, "wait_ticks"))
+            waited = int(before.at(ball.name, "wait_ticks"))
+            if wait > waited or (wait and not waited):
+                returned.append((frame.tick - (self._wait_ticks - wait), ball))
+            if waited and before.tick + waited <= frame.tick:
+                marks.append(Mark(before.tick + waited, KICKOFF, f"kick-off of {ball.name}"))
+        goals = self._goals(before, frame, [tick for tick, _ in returned])
+        scored = {mark.tick for mark in goals}
+        marks += goals
+        for tick, ball in returned:
+            if tick not in scored:
+                marks.append(self._back(before, tick, ball))
+        unseen = int(frame.at(WORLD, "kickoffs") - before.at(WORLD, "kickoffs"))
+        unseen -= sum(mark.kind == KICKOFF for mark in marks)
+        marks += [Mark(frame.tick, KICKOFF, "kick-off")] * max(0, unseen)
+        return marks
+
+    @staticmethod
+    def _goals(before: Frame, frame: Frame, returned: Sequence[int]) -> list[Mark]:
+        """Return the goals between two frames, each at the tick at which a ball came back, where that is known."""
+        assert frame.score is not None and before.score is not None
+        ticks = sorted(returned)
+        score, marks = list(before.score), []
+        for team, name in enumerate(TEAMS):
+            while score[team] < frame.score[team]:
+                score[team] += 1
+                tick = ticks.pop(0) if ticks else frame.tick
+                marks.append(Mark(tick, GOAL, f"goal of {name}, {score[0]} : {score[1]}"))
+        return marks
+
+    @staticmethod
+    def _back(before: Frame, tick: int, ball: Entity) -> Mark:
+        """Return why a ball came back to the spot without a goal."""
+        if before.at(ball.name, "still_ticks") > before.at(ball.name, "out_ticks"):
+            return Mark(tick, DEAD, f"{ball.name} lay still")
+        return Mark(tick, OUT, f"{ball.name} left the table")
+
+    @staticmethod
+    def _of_flags(before: Frame, frame: Frame) -> list[Mark]:
+        marks = []
+        for entity in frame.layout.entities:
+            known = before.layout[entity.name].offsets if entity.name in before.layout else {}
+            for slot, (kind, text) in FLAGS.items():
+                if slot in entity.offsets and slot in known:
+                    was, holds = before.at(entity.name, slot) != 0.0, frame.at(entity.name, slot) != 0.0
+                    if holds and not was:
+                        marks.append(Mark(frame.tick, kind, f"{entity.name} {text}"))
+                    elif was and not holds and kind == DOWN:
+                        marks.append(Mark(frame.tick, kind, f"{entity.name} is in service again"))
+            if "charge" in known and before.at(entity.name, "charge") > 0.0 >= frame.at(entity.name, "charge"):
+                marks.append(Mark(frame.tick, EMPTY, f"the battery of {entity.name} is empty"))
+        return marks
+
+
+class Timeline:
+    """Gathers the marks of a run; `news` gives those that came since."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._deployment = deployment
+        self._tick_ns = deployment.tick_ns
+        self._events = WorldEvents(deployment)
+        self._epoch: EpochRow | None = None
+        self._new: list[Mark] = []
+        self._kinds: Counter[str] = Counter()
+        self.left: Counter[str] = Counter()
+        """Marks by kind that there was no room for."""
+        self._fine_ns = max(FINE_NS, self._tick_ns)
+        self._drops: dict[int, Counter[str]] = {}
+        for event in deployment.network.events:
+            self._add(Mark(event.at_ns // self._tick_ns, NETWORK, event_text(event)))
+
+    def _add(self, mark: Mark) -> None:
+        self._kinds[mark.kind] += 1
+        if self._kinds[mark.kind] <= MARKS_MAX:
+            self._new.append(mark)
+        else:
+            self.left[mark.kind] += 1
+
+    def take_frame(self, frame: Frame) -> None:
+        """Take the next frame."""
+        for mark in self._events.take(frame):
+            self._add(mark)
+
+    def take_edits(self, tick: int, edits: Iterable[EditRow]) -> None:
+        """Take what was asked for in the tick that led to a frame."""
+        for edit in edits:
+            if edit.kind == "network":
+                self._add(Mark(tick, NETWORK, self._network_text(edit.event, tick)))
+            elif text := edit_text(edit):
+                self._add(Mark(tick - 1, edit.kind, text))
+
+    def _network_text(self, event: str, tick: int) -> str:
+        try:
+            return event_text(event_of(event, tick * self._tick_ns))
+        except (ValidationError, ValueError, TypeError, Refused):
+            return "an event of the network that cannot be read"
+
+    def take_epoch(self, epoch: EpochRow) -> None:
+        """Take the next epoch: who came or is gone, and which robots were moved."""
+        before, self._epoch = self._epoch, epoch
+        if before is None:
+            return
+        gone, come = sorted({*before.roster} - {*epoch.roster}), sorted({*epoch.roster} - {*before.roster})
+        moved = [*moves([before, epoch])]
+        for tick, text in moved:
+            self._add(Mark(tick, MOVE, text))
+        if gone or come or not moved:
+            parts = [f"without {', '.join(gone)}"] if gone else []
+            parts += [f"with {', '.join(come)}"] if come else []
+            self._add(Mark(epoch.tick, EPOCH, " ".join([f"epoch {epoch.epoch}", *parts])))
+
+    def take_recovery(self, row: RecoveryRow) -> None:
+        """Take a loss or return of a process."""
+        outage = f", {row.wall_outage_ns / 1e6:.0f} ms without a commit" if row.wall_outage_ns else ""
+        self._add(Mark(row.tick, RECOVERY, f"{row.what} {row.name}: {row.reason}{outage}"))
+
+    def take_drop(self, at_ns: int, cause: str) -> None:
+        """Count a packet that was dropped."""
+        self._drops.setdefault(at_ns // self._fine_ns, Counter())[cause] += 1
+        if len(self._drops) > FINE_BINS:
+            self._fine_ns *= 2
+            coarse: dict[int, Counter[str]] = {}
+            for number, causes in self._drops.items():
+                coarse.setdefault(number // 2, Counter()).update(causes)
+            self._drops = coarse
+
+    def news(self) -> list[Mark]:
+        """Return the marks since the last call, by tick; drops are summed up over spans, each at its first drop."""
+        marks = sorted([*self._new, *self._of_drops()], key=lambda mark: (mark.tick, mark.kind))
+        self._new, self._drops = [], {}
+        return marks
+
+    def _of_drops(self) -> list[Mark]:
+        if not self._drops:
+            return []
+        first, last = min(self._drops), max(self._drops)
+        together = -(-(last - first + 1) // DROP_BINS)
+        binned: dict[int, tuple[int, Counter[str]]] = {}
+        for number, causes in sorted(self._drops.items()):
+            binned.setdefault((number - first) // together, (number, Counter()))[1].update(causes)
+        return [
+            Mark(start * self._fine_ns // self._tick_ns, DROPS, drops_text(causes)) for start, causes in binned.values()
+        ]
+
+
+def drops_text(causes: Counter[str]) -> str:
+    """Return how many packets were dropped, and the most frequent causes."""
+    most = sorted(causes.items(), key=lambda item: (-item[1], item[0]))
+    shown = ", ".join(f"{cause} {count}" for cause, count in most[:CAUSES_SHOWN])
+    more = f", {len(most) - CAUSES_SHOWN} more causes" if len(most) > CAUSES_SHOWN else ""
+    return f"{causes.total()} dropped: {shown}{more}"

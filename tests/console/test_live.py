@@ -1,0 +1,67 @@
+"""The live source without a run: what it says of one that is not there, and what it lets nobody ask."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+
+from foosim.console.live import live_source
+from foosim.console.live.live_source import LiveSource
+from foosim.console.shown.source import About, Moment
+from foosim.protocol.errors import BadValue
+from foosim.supervisor.control import Control
+from foosim.supervisor.run_folder import NoRun
+
+
+class Heard:
+    """A feed that remembers notes."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
+        raise AssertionError("there is no world")
+
+    def show(self, moment: Moment) -> None:
+        raise AssertionError("there is no world")
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        assert message["type"] == "note"
+        self.notes.append(message["text"])
+
+
+def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_source, "AGAIN_S", 0.0)
+    heard, tried = Heard(), [0]
+
+    def connect(give_up: Callable[[], bool]) -> Control:
+        tried[0] += 1
+        raise NoRun("run mine is starting" if tried[0] < 3 else "run mine is over")
+
+    async def scene() -> None:
+        running = asyncio.create_task(LiveSource("mine", connect, None).run(heard))
+        while tried[0] < 6:
+            await asyncio.sleep(0)
+        running.cancel()
+        await asyncio.wait((running,))
+
+    asyncio.run(scene())
+    assert heard.notes == [
+        "mine is not there: run mine is starting; it is looked for",
+        "mine is not there: run mine is over; it is looked for",
+    ]
+
+
+@pytest.mark.parametrize("name", ["self", "timeout_s", "a b", ""])
+def test_an_argument_that_is_none_of_a_request_is_refused(name: str) -> None:
+    def connect(give_up: Callable[[], bool]) -> Control:
+        raise AssertionError("nobody is asked")
+
+    async def scene() -> None:
+        with pytest.raises(BadValue, match="no argument of a request"):
+            await LiveSource("mine", connect, connect).ask("add", {name: 1}, "browser 1")
+
+    asyncio.run(scene())
