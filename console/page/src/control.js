@@ -9,7 +9,7 @@ const SPEEDS = ["0.1x", "0.25x", "0.5x", "1x", "2x", "5x", "10x"];
 
 /** Signs for states, so that they are told apart without their colours. */
 const SIGNS = /** @type {Record<string, string>} */ ({
-  running: "▶", paused: "❚❚", starting: "…", recovering: "…", ended: "■", failed: "✕", playing: "▶",
+  running: "▶", paused: "❚❚", starting: "…", recovering: "…", ended: "■", "not connected": "✕", failed: "✕", playing: "▶",
 });
 
 export class Control {
@@ -42,6 +42,7 @@ export class Control {
     const source = this.store.main;
     if (!source) return "starting";
     const state = source.status?.state;
+    if (!this.desk.connection.connected) return "not connected";
     if (source.info.kind === "live") return state ?? "starting";
     return source.paused ? "paused" : "playing";
   }

@@ -107,13 +107,12 @@ export class Entities {
   }
 
   async askAdd() {
-    const addable = this.store.main?.scene?.addable ?? [];
-    const model = select(addable.map(({ model: name }) => [name, name]), addable[0]?.model ?? "");
+    const [addable] = this.store.main?.scene?.addable ?? [];
     const name = h("input", { placeholder: "chosen for you", maxlength: 64 });
-    const position = h("input", { value: (addable[0]?.position ?? [0, 0, 0]).join(" "), required: true });
-    const velocity = h("input", { value: (addable[0]?.velocity ?? [0, 0, 0]).join(" "), required: true });
-    const content = [field("Model", model), field("Name", name), field("Position (m)", position, "x y z in the world"), field("Velocity (m/s)", velocity)];
-    await dialog("Add an entity", content, {
+    const position = h("input", { value: (addable?.position ?? [0, 0, 0]).join(" "), required: true });
+    const velocity = h("input", { value: (addable?.velocity ?? [0, 0, 0]).join(" "), required: true });
+    const content = [field("Name", name), field("Position (m)", position, "x y z in the world"), field("Velocity (m/s)", velocity)];
+    await dialog(`Add a ${addable?.model}`, content, {
       action: "Add",
       send: () => {
         const at = vector(position.value, "Position");
