@@ -39,6 +39,7 @@ from foosim.protocol.messages import (
     Go,
     Heartbeat,
     Hello,
+    Inquiry,
     Join,
     Order,
     Part,
@@ -56,6 +57,7 @@ from foosim.protocol.messages import (
     Want,
 )
 from foosim.protocol.units import Pace
+from foosim.protocol.view_messages import Watched
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.plan import RunSettings
@@ -180,6 +182,7 @@ def lies_to_the_hub(system: System) -> list[Lie]:
         (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], [], b"")),
         (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], [], b"")),
         (channels.TEMPO, SUPERVISOR, Tempo("1e999x", False)),
+        (channels.WATCHED, SUPERVISOR, Watched([(NOBODY, "dragon")], [("red.goal", "dragon")])),
         (channels.BUILD, VHUB, Build(VHUB, "other", "first", "run", "t", "", "fast", [])),
         (channels.REFUSAL, VHUB, Refusal(VHUB, "other", "go away")),
         (channels.PIECE, VHUB, Piece(VHUB, "boot", bytes(32), 0, 3, b"lie")),
@@ -225,6 +228,8 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
         (channels.FAREWELL, "n1", Farewell("n2", b"{}")),
         (channels.REQUEST, NOBODY, Request("operator", "x", "down", b"{}")),
         *((channels.REQUEST, NOBODY, Request(NOBODY, verb, verb, encode_json(given))) for verb, given in asked),
+        (channels.INQUIRY, NOBODY, Inquiry("operator", "x", "status", b"{}")),
+        (channels.INQUIRY, NOBODY, Inquiry(NOBODY, "down", "down", b"{}")),
     ]
     if tick > 3:
         said += [(channels.DELIVERIES, VHUB, Deliveries(tick - 3, []))]
@@ -253,7 +258,8 @@ def test_lies_are_told_on_every_channel_that_somebody_reads(disturbed: Disturbed
     assert all(who in disturbed.hearers(channel, name) for who, channel, name, _ in told)
     of_runs = {channel for channel in CHANNELS if channel.plane is not Plane.REPLAY}
     untold = of_runs - {channel for _, channel, _, _ in told}
-    assert untold == {channels.ANSWER, channels.END, channels.CLIENT_REFUSAL}, "an end is an end"
+    people = {channels.ANSWER, channels.VIEW}  # read by them alone, who are no process of a run
+    assert untold == {*people, channels.END, channels.CLIENT_REFUSAL}, "an end is an end"
 
 
 @pytest.mark.parametrize("tick", [0, 1, 35, 60])
@@ -266,8 +272,9 @@ def test_messages_that_lie_change_nothing(disturbed: Disturbed, tick: int) -> No
     disturbed.assert_untouched(disturbed.go())
 
 
-SILENT: Final = {channels.WANT, channels.SAMPLES, channels.HEARTBEAT, channels.FAREWELL}
-"""Of these some are taken and lead to nothing: a want of what nobody has, samples of another frame."""
+SILENT: Final = {channels.WANT, channels.SAMPLES, channels.HEARTBEAT, channels.FAREWELL, channels.WATCHED}
+"""Of these some are taken and lead to nothing: a want of what nobody has, samples of another frame, a look at a link
+that nobody uses."""
 
 
 def test_each_lie_is_counted_or_answered_by_who_hears_it(disturbed: Disturbed) -> None:

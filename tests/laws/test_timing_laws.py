@@ -147,6 +147,7 @@ def talk(network: str, nodes: int = 2, is_disturbed: bool = True, *faults: Fault
     chosen = Settings(observer=seen.watch, on_closing=seen.closings.append)
 
     def prepare(system: System) -> None:
+        seen.systems.append(system)
         if is_disturbed:
             disturb(system)
         for tick, fault in faults:
