@@ -36,8 +36,9 @@ help:
 	@echo 'make bench   measure speed, latency and throughput of that (ARGS: options of the bench)'
 	@echo 'make clean   remove environments, caches and builds; captures stay'
 
+# A run in the background has no console of its own: foosim-console shows it.
 up: environment
-	@.venv/bin/foosim-supervisor up deploy/table.yaml --console $(ARGS)
+	@.venv/bin/foosim-supervisor up deploy/table.yaml $(if $(filter --detach,$(ARGS)),,--console) $(ARGS)
 
 play: environment
 	@$(PYTEST) -m campaign tests/rehearsal/test_a_minute_of_play.py tests/laws $(ARGS)
