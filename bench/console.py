@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 from bench.runs import ROOT, TABLE, watch
-from foosim.console.following import Following, World
+from foosim.console.following import Following
 from foosim.console.server import ConsoleServer, new_tokens
 from foosim.console.source import About, Answered, Curve, Feed, Wanted
 from foosim.protocol.codec import encode
@@ -112,11 +112,7 @@ class Fed:
     def _show(self, feed: Feed, payload: bytes) -> None:
         found = self._following.read(payload)
         assert found is not None, "it is of this layout"
-        world: World
-        world, frame = found
-        moment = self._following.show(world, frame, world.drawing.moment(frame))
-        if moment is not None:
-            feed.show(moment)
+        feed.show(self._following.show(*found))
 
     def want(self, wanted: Wanted) -> None:
         """Nothing: it comes at its rate."""

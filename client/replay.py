@@ -175,6 +175,11 @@ class Replay:
         assert self._deployment is not None, "it comes with the first answer"
         return self._deployment
 
+    def captured_link(self, link: str) -> str:
+        """Return the name that a link had in the captured run: bodies may be played under others."""
+        body, separator, part = link.partition("/")
+        return f"{self._old_names.get(body, body)}{separator}{part}"
+
     @property
     def dropped(self) -> int:
         """How many messages were lost because this side took them too late."""

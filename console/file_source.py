@@ -41,6 +41,7 @@ WINDOW_NS: Final = 5_000_000_000
 STATUS_S: Final = 0.25
 LINKS_S: Final = 0.5
 OVERLAY_NS: Final = 100_000_000
+EARLY_NS: Final = 500_000
 REFRESH_S: Final = 1.0
 MARKS_TOLD: Final = 500
 """Of one message."""
@@ -156,7 +157,9 @@ class FileSource:
         if later is not None:
             wall_ns = self.deck.wall_ns(later * self.recording.tick_ns - self.offset_ns)
         soonest_ns = max(due_ns + period_ns * 9 // 10, now_ns + 1_000_000)
-        return min(max(soonest_ns, now_ns + period_ns if wall_ns is None else wall_ns), now_ns + 10**9)
+        # A little behind its time: a timer that is early would find the frame before.
+        next_ns = now_ns + period_ns if wall_ns is None else wall_ns + EARLY_NS
+        return min(max(soonest_ns, next_ns), now_ns + 10**9)
 
     def _tell_moment(self, feed: Feed, look: Look, *, jump: bool) -> None:
         if look.world != self._world:

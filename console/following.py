@@ -1,6 +1,6 @@
 """What becomes of what arrives from a running system: frames as moments, statuses as messages, requests as marks.
 
-Pure; frames are read in a thread of their own, all else in the event loop's. Neighbours: `live` (moves the bytes),
+Pure. Neighbours: `live` (moves the bytes),
 `drawing` (one layout), `links`, `status_marks`.
 """
 
@@ -119,7 +119,7 @@ class Following:
     # --- frames ------------------------------------------------------------------------------------------------------
 
     def read(self, payload: bytes) -> tuple[World, Frame] | None:
-        """Return the frame of a commit; None, and the layout is stale, where it does not fit. Called in a thread."""
+        """Return the frame of a commit; None, and the layout is stale, where it does not fit."""
         world = self._world
         if world is None:
             return None
@@ -134,15 +134,13 @@ class Following:
             return None
         return world, frame
 
-    def show(self, world: World, frame: Frame, moment: Moment) -> Moment | None:
-        """Return the moment as it is to be shown; None for one of a world that is shown no longer."""
-        if self._world is None or self._world.drawing is not world.drawing:
-            return None
+    def show(self, world: World, frame: Frame) -> Moment:
+        """Return what there is to see in a frame that was read just now."""
         jump = self._frame is None or frame.tick < self._frame.tick
         self._frame = frame
         if self._watched is not None:
             self._watched.keep(frame)
-        return replace(moment, jump=jump) if jump else moment
+        return world.drawing.moment(frame, jump=jump)
 
     def overlay(self, wanted: Collection[str]) -> dict[str, Any] | None:
         """Return the message with the overlays of the newest frame."""

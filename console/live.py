@@ -18,10 +18,9 @@ from functools import partial
 from typing import Any, Final, TypeVar
 
 from foosim.console.following import Following, World
-from foosim.console.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.console.source import About, Answered, Curve, Feed, Wanted
 from foosim.protocol.errors import BadValue, Refused
-from foosim.protocol.frame import Frame
-from foosim.protocol.inbox import Inbox
+from foosim.protocol.inbox import Inbox, Item
 from foosim.supervisor.control import Control, NoAnswer, RequestRefused
 
 VERBS: Final = (
@@ -35,7 +34,7 @@ QUESTION_S: Final = 3.0
 AGAIN_S: Final = 0.5
 """How often it is."""
 FRAMES_MAX: Final = 8
-"""That wait for us: only the newest counts."""
+"""That may wait to be received."""
 HZ_MAX: Final = 100.0
 ASKS_AT_ONCE: Final = 4
 OVERLAY_S: Final = 0.1
@@ -142,20 +141,12 @@ class LiveSource:
     async def _follow(self, control: Control, feed: Feed) -> None:
         """Tell of a run as long as its supervisor answers. Raises Refused."""
         await self._describe(control, feed)
-        inbox = Inbox(FRAMES_MAX)
-        control.view(inbox)
-        ended = threading.Event()
-        loop = asyncio.get_running_loop()
-        frames = threading.Thread(
-            target=self._take_frames, args=(inbox, ended, loop, feed), name="console-frames", daemon=True
-        )
-        frames.start()
+        newest = _Newest(asyncio.get_running_loop(), partial(self._take_frame, feed))
+        control.view(newest)
         try:
             await self._poll(control, feed)
         finally:
-            ended.set()
-            inbox.wake()
-            await asyncio.to_thread(frames.join)
+            newest.end()
 
     async def _describe(self, control: Control, feed: Feed) -> None:
         """Learn which world it is, and tell its scene where that is new."""
@@ -213,31 +204,51 @@ class LiveSource:
                 feed.tell(_note("warning", str(refused)))
             await self._in_thread(partial(ask, hz=wanted["hz"]))
 
-    def _take_frames(self, inbox: Inbox, ended: threading.Event, loop: asyncio.AbstractEventLoop, feed: Feed) -> None:
-        """In a thread: wait for frames, and hand what they show to the event loop."""
-        while not ended.is_set():
-            items = inbox.take(1.0)
-            if not items or ended.is_set():
-                continue
-            found = self._following.read(items[-1][2])
-            if found is None:
-                loop.call_soon_threadsafe(self._changed.set)
-            else:
-                world, frame = found
-                loop.call_soon_threadsafe(self._show, feed, world, frame, world.drawing.moment(frame))
-
-    def _show(self, feed: Feed, world: World, frame: Frame, moment: Moment) -> None:
-        """Show a frame, if it is of the world that is shown still, and from time to time what lies over it."""
-        shown = self._following.show(world, frame, moment)
-        if shown is None:
+    def _take_frame(self, feed: Feed, payload: bytes) -> None:
+        """Show a commit, and from time to time what lies over it."""
+        wanted = self._wanted
+        if not wanted.readers:
+            return  # a lease is not over at once
+        found = self._following.read(payload)
+        if found is None:
+            self._changed.set()
             return
-        feed.show(shown)
+        world, frame = found
+        feed.show(self._following.show(world, frame))
         now_s = time.monotonic()
-        if self._wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
+        if wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
             self._overlay_s = now_s
-            overlay = self._following.overlay(self._wanted.overlays)
+            overlay = self._following.overlay(wanted.overlays)
             if overlay is not None:
                 feed.tell(overlay)
+
+
+class _Newest(Inbox):
+    """An inbox that has the event loop take the newest frame: what came before it is old by then."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, take: Callable[[bytes], None]) -> None:
+        super().__init__(FRAMES_MAX)
+        self._loop, self._take = loop, take
+        self._payload = b""
+        self._is_due = self._has_ended = False
+
+    def offer(self, item: Item) -> bool:
+        """Keep it. Called in the thread that receives, which does nothing else."""
+        self._payload = item[2]
+        if not self._is_due:
+            self._is_due = True
+            with suppress(RuntimeError):  # the loop is over
+                self._loop.call_soon_threadsafe(self._give)
+        return True
+
+    def end(self) -> None:
+        """Give nothing more."""
+        self._has_ended = True
+
+    def _give(self) -> None:
+        self._is_due = False  # before it is read: a newer one is given again
+        if not self._has_ended:
+            self._take(self._payload)
 
 
 def _note(level: str, text: str) -> dict[str, Any]:

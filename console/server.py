@@ -89,7 +89,8 @@ class ConsoleServer:
         self._connections: dict[str, ServerConnection] = {}
         """Of readers, by their name."""
         self._tasks: set[asyncio.Task[None]] = set()
-        self._connected = 0
+        self.connections = 0
+        """All that there are at this moment."""
         self._counted = 0
         self._is_local = True
         self._secured = False
@@ -145,12 +146,12 @@ class ConsoleServer:
         class Counted(ServerConnection):
             def connection_made(self, transport: asyncio.BaseTransport) -> None:
                 super().connection_made(transport)
-                console._connected += 1
-                if console._connected > CONNECTIONS_MAX:
+                console.connections += 1
+                if console.connections > CONNECTIONS_MAX:
                     self.transport.abort()
 
             def connection_lost(self, exc: Exception | None) -> None:
-                console._connected -= 1
+                console.connections -= 1
                 super().connection_lost(exc)
 
         return Counted

@@ -1,6 +1,6 @@
 """The command `foosim-replay view`: the console over a capture, beside or under another one or a table of poses.
 
-Neighbours: `foosim.console` (file_source, poses_source, serving), `between` (computes ticks that were not captured).
+Neighbours: `console` (`file_source`, `poses_source`, `played`, `serving`), `between` (computes ticks in between).
 """
 
 from __future__ import annotations
@@ -10,24 +10,34 @@ from typing import Annotated, Final
 
 import typer
 
+from foosim.client.replay import hear_replay
 from foosim.console.file_source import FileSource
+from foosim.console.played import PlayedSource
 from foosim.console.poses_source import PosesSource
 from foosim.console.serving import ServeOptions, serve_sources
 from foosim.console.source import Source
 from foosim.protocol.addresses import LOOPBACK
+from foosim.protocol.command import PkiOption
 from foosim.protocol.errors import BadValue, read_at
 from foosim.protocol.units import parse_ns
 from foosim.rehearsal.between import Between
 from foosim.rehearsal.capture_arguments import reading
 from foosim.vhub.capture_reader import read_about
 
+ADDRESSES: Final = ("tcp/", "tls/")
+"""How the address of a replay begins."""
 TABLE: Final = ".csv"
 """How the name of a table of poses ends; all else is a capture."""
 
 
 def view(  # a command's options
     file: Annotated[
-        Path, typer.Argument(metavar="CAPTURE", help="The capture, or a table of poses (.csv).", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="CAPTURE|CSV|ADDRESS",
+            help="A capture, a table of poses (.csv), or the tcp/HOST:PORT of a replay that is played.",
+            show_default=False,
+        ),
     ],
     second: Annotated[
         Path | None,
@@ -41,11 +51,13 @@ def view(  # a command's options
         Path | None, typer.Option(help="A PEM certificate for HTTPS, which another address than loopback takes.")
     ] = None,
     key: Annotated[Path | None, typer.Option(help="The key of that certificate, PEM.")] = None,
+    pki: PkiOption = None,
     open_browser: Annotated[bool, typer.Option("--open", help="Show the page in the browser of this machine.")] = False,
 ) -> None:
     """Serve a page that shows a capture: played, sought, stepped to the tick, with all that happened marked.
 
-    Prints an address; the token in it is the permission. A capture that is still being written, one without an end and
+    Prints an address; the token in it is the permission. A tick without a captured frame is computed again, and shown
+    when its digest is the captured one. A capture that is still being written, one without an end and
     one of several files are shown as well. With --second the distance between the two is plotted, entity by entity: two
     captures, a run and its what-if, a simulation and recorded poses. Ctrl-C ends it. Exit codes: 0 ended, 1 nobody can
     listen, 2 bad input, 3 refused.
@@ -54,13 +66,20 @@ def view(  # a command's options
         raise BadValue("--offset needs --second")
     offset_ns = 0 if offset is None else read_at("--offset", _signed_ns, offset)
     with reading():
-        sources = open_sources(file, second, offset_ns)
+        sources = open_sources(file, second, offset_ns, pki)
     options = ServeOptions(listen, certificate, key, open=open_browser)
     serve_sources(lambda: (sources, ()), options, lambda text: print(text, flush=True))
 
 
-def open_sources(file: Path, second: Path | None = None, offset_ns: int = 0) -> list[Source]:
-    """Return the source of a file, and the one that follows it. Raises CaptureError, BadPoses."""
+def open_sources(file: Path, second: Path | None = None, offset_ns: int = 0, pki: Path | None = None) -> list[Source]:
+    """Return the source of a file or a replay, and the one that follows it.
+
+    Raises CaptureError, BadPoses, BadValue, and what `hear_replay` raises.
+    """
+    if str(file).startswith(ADDRESSES):
+        if second is not None:
+            raise BadValue("--second goes with a file: a replay has its own clock", str(second))
+        return [PlayedSource(lambda streams: hear_replay(str(file), streams, pki=pki))]
     if _is_table(file):
         table = PosesSource(file)
         if second is None:

@@ -50,6 +50,7 @@ SHELLS = {
     "console/file_source.py",
     "console/live.py",
     "console/main.py",
+    "console/played.py",
     "console/poses_source.py",
     "console/recording.py",
     "console/server.py",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from foosim.console.asked import edit_text
 from foosim.console.capture_curves import curve_points, reading_points
 from foosim.console.capture_history import CaptureHistory
-from foosim.console.link_history import PACKET_MARKS
+from foosim.console.link_history import PACKET_MARKS, LinkHistory, PacketMark
 from foosim.console.recording import Recording
 from foosim.console.source import Curve
 from foosim.console.timeline import MARKS_MAX, Mark, Timeline, WorldEvents
@@ -171,6 +172,26 @@ def test_a_window_has_what_the_packets_say(history: CaptureHistory, at: int, win
     assert only == [link for key, link in told.items() if key[:2] == ("camera", "player-red")]
     totals = history.links.totals(at_ns)
     assert totals["offered"] == len(used) and totals["delivered"] + totals["dropped"] + totals["in_flight"] == len(used)
+
+
+def test_a_packet_is_dropped_when_it_is_sent_or_when_it_arrives_and_a_window_ends_with_its_last_moment() -> None:
+    links = LinkHistory(TICK_NS)
+
+    def add(sequence: int, sent: int, arrival: int, fate: Literal["delivered", "dropped", "in_flight"]) -> int:
+        due_ns = arrival * TICK_NS - 1 if arrival >= 0 else -1
+        cause = "snr" if fate == "dropped" else ""
+        return links.add(PacketMark("a", sequence, "b", sent * TICK_NS, due_ns, arrival, fate, cause, "r"), sequence)
+
+    assert add(1, 10, -1, "dropped") == 10 * TICK_NS
+    assert add(2, 10, 14, "dropped") == 14 * TICK_NS
+    assert add(3, 12, 13, "delivered") == add(4, 13, 20, "in_flight") == -1
+    figures = {
+        at: [(link["offered"], link["delivered"], link["dropped"]) for link in links.windows(at * TICK_NS, 2 * TICK_NS)]
+        for at in (9, 10, 12, 13, 14, 16)
+    }
+    assert figures == {9: [], 10: [(2, 0, 1)], 12: [(1, 0, 0)], 13: [(2, 1, 0)], 14: [(1, 1, 1)], 16: [(0, 0, 0)]}
+    assert links.last_drops("a", "b", 13 * TICK_NS) == [1] and links.last_drops("a", "b", 14 * TICK_NS) == [1, 2]
+    assert links.windows(13 * TICK_NS, 2 * TICK_NS)[0]["delay_ms"] == pytest.approx((TICK_NS - 1) / 1e6)
 
 
 def test_the_last_drops_of_a_link_are_explained_as_the_command_does(history: CaptureHistory) -> None:

@@ -29,7 +29,7 @@ def test_a_link_that_counts_anew_and_time_that_goes_back_begin_a_window() -> Non
     windows = Windows(5.0)
     windows.take(1.0, {KEY: count(10, 0)})
     assert windows.take(2.0, {KEY: count(3, 0)})[KEY] == count(3, 0)
-    assert windows.take(0.5, {KEY: count(4, 1, snr=1)})[KEY] == count(4, 1, snr=1)
+    assert windows.take(0.5, {KEY: count(12, 1, snr=1)})[KEY] == count(12, 1, snr=1)
 
 
 def status(ticks: int, *rows: list[Any]) -> dict[str, Any]:

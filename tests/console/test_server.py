@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from websockets.exceptions import ConnectionClosedError
 
+from foosim.console.server import CONNECTIONS_MAX
 from tests.console.memory import Console, MemorySource, console, table
 
 Part = Callable[[Console], Awaitable[None]]
@@ -212,6 +213,7 @@ def test_a_thousand_connections_leave_the_others_alone() -> None:
                     stage.source.show(len(opened))
                     stage.server.board.readers["browser 1"].follows[0].next_s = 0.0
                     assert (await good.moment())[0][5] <= len(opened)
+                    assert stage.server.connections <= CONNECTIONS_MAX + 50
             ended = 0
             for reader, _ in opened[300:310]:  # those that are too many are ended at once
                 with pytest.raises((asyncio.IncompleteReadError, ConnectionResetError)):

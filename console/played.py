@@ -1,0 +1,204 @@
+"""A replay that somebody plays on the replay plane (`foosim-replay play`) as a source of the page.
+
+Its connection belongs to a thread, which hears and asks; what it hears is told in the event loop. Poses come with names
+of links, so the scene is that of the captured deployment with what these names say was added.
+Neighbours: `client.replay` (the connection), `drawing`, `deck` (the same requests, of a file).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import queue
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from contextlib import suppress
+from typing import Any, Final
+
+import numpy as np
+
+from foosim.client.replay import Replay, ReplayedLine, ReplayedPoses, ReplayedRow, ReplayGone, ReplayTime
+from foosim.console.deck import Known, checked, needed
+from foosim.console.drawing import Drawing
+from foosim.console.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.layout import ADDABLE, build_layout
+
+ARGUMENTS: Final[Known] = {
+    "play": {},
+    "resume": {},
+    "pause": {},
+    "step": {"count": (int,)},
+    "seek": {"tick": (int,)},
+    "rate": {"pace": (str,)},
+}
+STREAMS: Final = ("poses", "clock", "log", "rows")
+HEAR_S: Final = 0.02
+"""How long the thread listens before it looks whether something is asked."""
+ROW_MARKS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
+    "/epochs": lambda row: f"epoch {row['epoch']}",
+    "/recoveries": lambda row: f"{row['what']} {row['name']}: {row['reason']}",
+}
+"""Rows that are marks, and what they say."""
+Ask = tuple[str, Mapping[str, Any], "Future[dict[str, Any]]"]
+
+
+class PlayedSource:
+    """One replay."""
+
+    def __init__(self, connect: Callable[[tuple[str, ...]], Replay]) -> None:
+        """`connect` makes a connection that hears some streams. Raises what it raises."""
+        self._replay: Final = connect(STREAMS)
+        status = self._replay.status()
+        self.tick_ns: Final = int(status["tick_ns"])
+        span = int(status["from_ns"]) // self.tick_ns, int(status["until_ns"]) // self.tick_ns
+        deployment = self._replay.deployment
+        self.about = About("replay", str(status["capture"]), deployment.world, self.tick_ns, tuple(ARGUMENTS), span)
+        self._status: dict[str, Any] = {key: value for key, value in status.items() if key != "deployment"}
+        self._drawing: Drawing | None = None
+        self._places: dict[str, int] = {}
+        self._jumps = 0
+        self._asked: queue.SimpleQueue[Ask] = queue.SimpleQueue()
+        self._ended = threading.Event()
+
+    def want(self, wanted: Wanted) -> None:
+        """A replay sends what it sends, however many look."""
+
+    async def run(self, feed: Feed) -> None:
+        loop = asyncio.get_running_loop()
+        heard = loop.create_future()
+
+        def tell(work: Callable[[], None]) -> None:
+            loop.call_soon_threadsafe(work)
+
+        def listen() -> None:
+            try:
+                self._listen(feed, tell)
+            except Refused as error:
+                text = str(error)
+                tell(lambda: feed.tell({"type": "note", "level": "warning", "text": text}))
+            finally:
+                self._ended.set()
+                self._refuse_all()
+                self._replay.close()
+                tell(lambda: None if heard.done() else heard.set_result(None))
+
+        thread = threading.Thread(target=listen, name="replay", daemon=True)
+        thread.start()
+        try:
+            await heard
+        finally:
+            self._ended.set()
+            await asyncio.to_thread(thread.join)
+
+    def _listen(self, feed: Feed, tell: Callable[[Callable[[], None]], None]) -> None:
+        """Hear and ask until the replay or this source ends. Raises Refused."""
+        while not self._ended.is_set():
+            for item in self._replay.take(HEAR_S):
+                tell(lambda item=item: self._tell(feed, item))  # type: ignore[misc]
+            while not self._asked.empty():
+                verb, arguments, answer = self._asked.get()
+                try:
+                    answer.set_result(self._replay.ask(verb, **arguments))
+                except Refused as error:
+                    answer.set_exception(error)
+            if self._replay.ended:
+                raise ReplayGone("the replay has ended")
+
+    # --- heard -------------------------------------------------------------------------------------------------------
+
+    def _tell(self, feed: Feed, item: Any) -> None:
+        if isinstance(item, ReplayedPoses):
+            self._show(feed, item)
+        elif isinstance(item, ReplayTime):
+            self._tell_status(feed, item)
+        elif isinstance(item, ReplayedLine) and item.level != "info":
+            self._mark(feed, item.time_ns, item.level, item.text)
+        elif isinstance(item, ReplayedRow) and item.topic in ROW_MARKS:
+            self._mark(feed, item.time_ns, item.topic.strip("/").removesuffix("s"), ROW_MARKS[item.topic](item.row))
+
+    def _mark(self, feed: Feed, time_ns: int, kind: str, text: str) -> None:
+        feed.tell({"type": "marks", "marks": [{"tick": time_ns // self.tick_ns, "kind": kind, "text": text}]})
+
+    def _show(self, feed: Feed, heard: ReplayedPoses) -> None:
+        named = {self._replay.captured_link(link): pose for link, pose in heard.poses.items()}
+        if self._drawing is None or named.keys() != self._places.keys():
+            self._turn_to(feed, named)
+        poses = np.zeros((len(self._places), 7), np.float32)
+        for link, place in self._places.items():
+            pose = named.get(link)
+            poses[place] = (0, 0, 0, 0, 0, 0, 1) if pose is None else (*pose.position, *pose.orientation)
+        clock = self._replay.clock
+        jumps = self._jumps if clock is None else clock.jumps
+        paused = clock is not None and clock.state == "paused"
+        assert self._drawing is not None
+        values = np.full(self._drawing.layout.size, np.nan)
+        feed.show(Moment(heard.time_ns / self.tick_ns, poses, values, jumps != self._jumps, paused))
+        self._jumps = jumps
+
+    def _turn_to(self, feed: Feed, links: Mapping[str, Any]) -> None:
+        """Take the scene of these links: what the deployment does not have was added."""
+        deployment = self._replay.deployment
+        base = build_layout(deployment)
+        added = sorted({link.partition("/")[0] for link in links} - {*base.names})
+        (model,) = ADDABLE
+        try:
+            layout = build_layout(deployment, [(name, model) for name in added])
+        except Malformed:  # a hall, to which nothing can be added: a name that is nobody's
+            layout = base
+        self._drawing = Drawing(deployment, layout)
+        names = [link.name for body in self._drawing.scene.bodies.values() for link in body.links]
+        self._places = {name: place for place, name in enumerate(names)}
+        feed.describe(self.about, self._drawing.content())
+
+    def _tell_status(self, feed: Feed, clock: ReplayTime) -> None:
+        tick = clock.time_ns // self.tick_ns
+        assert self.about.span is not None
+        first, last = self.about.span
+        feed.tell(
+            {
+                "type": "status",
+                "status": {
+                    "run": self._status.get("run", ""),
+                    "world": self.about.world,
+                    "seed": self._replay.deployment.seed,
+                    "ticks": tick,
+                    "first_tick": first,
+                    "last_tick": last,
+                    "tick_ns": self.tick_ns,
+                    "state": {"playing": "running"}.get(clock.state, clock.state),
+                    "pace": clock.rate,
+                },
+            }
+        )
+
+    # --- asked -------------------------------------------------------------------------------------------------------
+
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        checked(verb, arguments, ARGUMENTS)
+        if verb == "play":
+            verb = "resume"
+        content: dict[str, Any] = {}
+        if verb == "step":
+            content = {"count": arguments.get("count", 1)}
+        elif verb == "seek":
+            content = {"time_ns": needed(verb, arguments, "tick") * self.tick_ns}
+        elif verb == "rate":
+            content = {"pace": needed(verb, arguments, "pace")}
+        answer: Future[dict[str, Any]] = Future()
+        self._asked.put((verb, content, answer))
+        if self._ended.is_set():
+            self._refuse_all()
+        status = await asyncio.wrap_future(answer)
+        tick = int(status["time_ns"]) // self.tick_ns
+        return Answered(f"{status['state']} at tick {tick}, {status['rate']}", tick)
+
+    def _refuse_all(self) -> None:
+        """Answer what nobody will: the connection has ended."""
+        with suppress(queue.Empty):
+            while True:
+                _, _, answer = self._asked.get_nowait()
+                answer.set_exception(ReplayGone("the replay has ended"))
+
+    async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
+        return "", "", []

@@ -1,0 +1,99 @@
+"""The command `view`: which sources it opens, what it refuses; and a replay on its plane as a source of the page."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from foosim.client.replay import hear_replay
+from foosim.console.file_source import FileSource
+from foosim.console.played import PlayedSource
+from foosim.console.poses_source import PosesSource
+from foosim.console.source import Wanted
+from foosim.protocol.errors import BadValue, Refused
+from foosim.rehearsal.view_command import open_sources
+from tests.console.test_file_source import Heard, running
+from tests.replay.conftest import TICKS, replay
+from tests.replay.test_play import playing
+
+
+def test_the_command_opens_captures_and_tables_and_the_second_follows_the_first(run: Path, tmp_path: Path) -> None:
+    table = tmp_path / "poses.csv"
+    table.write_text("time,entity,x,y\n0,ball,0,0\n")
+    one, other = open_sources(run, run, -5_000_000)
+    assert isinstance(one, FileSource) and isinstance(other, FileSource)
+    assert one.is_master and not other.is_master and other.deck is one.deck and other.offset_ns == -5_000_000
+    _, real = open_sources(run, table)
+    assert isinstance(real, PosesSource) and real.about.world == "table"
+    (alone,) = open_sources(table)
+    assert isinstance(alone, PosesSource) and alone.is_master
+    with pytest.raises(BadValue, match="give the capture first"):
+        open_sources(table, run)
+    with pytest.raises(BadValue, match="has its own clock"):
+        open_sources(Path("tcp/127.0.0.1:1"), run)
+
+
+def test_what_cannot_be_shown_ends_the_command_as_bad_input(run: Path, tmp_path: Path, bad_files: list[Path]) -> None:
+    table = tmp_path / "poses.csv"
+    table.write_text("time,entity,x\n0,ball,0\n")
+    for arguments, said in (
+        ((bad_files[0],), "absent: cannot be read"),
+        ((bad_files[2],), "text: no MCAP file"),
+        ((run, "--second", bad_files[0]), "absent: cannot be read"),
+        ((run, "--second", table), "poses.csv:1: no column for y (y, y_m, y_cm, y_mm) among time, entity, x"),
+        ((run, "--offset", "1s"), "--offset needs --second"),
+        ((run, "--second", run, "--offset", "soon"), "--offset: "),
+    ):
+        done = replay("view", *arguments)
+        assert done.code == 2 and said in done.err, done
+    done = replay("view", run, "--listen", "0.0.0.0")
+    assert done.code == 3 and "--certificate" in done.err
+
+
+def test_a_replay_on_its_plane_is_seen_and_controlled(run: Path) -> None:
+    async def look(address: str) -> None:
+        source = PlayedSource(lambda streams: hear_replay(address, streams))
+        assert source.about.kind == "replay" and source.about.span == (0, TICKS)
+        source.want(Wanted(1, 50.0))
+        async with running(source) as heard:
+            answer = await source.ask("seek", {"tick": 50}, "me")
+            assert answer.tick == 50 and answer.text == "paused at tick 50, realtime"
+            await source.ask("step", {"count": 10}, "me")
+            await heard.until(lambda: heard.tick == 60)
+            before = {link["name"] for link in heard.scenes[-1]["links"]}
+            await source.ask("seek", {"tick": 200}, "me")
+            await source.ask("step", {"count": 10}, "me")
+            await heard.until(lambda: heard.tick == 210)
+            (added,) = {link["name"] for link in heard.scenes[-1]["links"]} - before
+            assert any(link["name"] == added and link["shapes"] for link in heard.scenes[-1]["links"])
+            assert any(moment.jump for moment in heard.moments) and heard.moments[-1].paused
+            assert (heard.moments[-1].poses[:, :3] != 0).any()
+            await heard.until(lambda: heard.of("status")[-1]["status"]["ticks"] == 210)
+            assert heard.of("status")[-1]["status"]["state"] == "paused"
+            with pytest.raises(Refused, match="not a time that is played, 0 s to 600 ms"):
+                await source.ask("seek", {"tick": TICKS + 1}, "me")
+            with pytest.raises(Refused, match="no request of a recording"):
+                await source.ask("loop", {"on": True}, "me")
+
+    with playing(run, paused=True) as played:
+        asyncio.run(look(played.address))
+
+
+def test_a_replay_that_ends_is_told(run: Path) -> None:
+    async def look(address: str) -> Heard:
+        source = PlayedSource(lambda streams: hear_replay(address, streams))
+        async with running(source) as heard:
+            await source.ask("rate", {"pace": "fast"}, "me")
+            await source.ask("play", {}, "me")
+            await heard.until(lambda: bool(heard.of("note")))
+            with pytest.raises(Refused, match="has ended"):
+                await source.ask("pause", {}, "me")
+            return heard
+
+    with playing(run, paused=True) as played:
+        heard = asyncio.run(look(played.address))
+    assert heard.of("note")[0]["text"] == "the replay has ended"
+    kinds = {mark["kind"] for message in heard.of("marks") for mark in message["marks"]}
+    assert "epoch" in kinds and heard.moments[-1].tick == TICKS
