@@ -34,7 +34,7 @@ from foosim.rehearsal.system import Settings
 from foosim.rehearsal.whatif import what_if
 from foosim.vhub.capture_reader import open_capture
 
-PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES: Final = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
 LEAST: Final = 0.3
 """Per cent of a run: a module that has less in each of them is not shown."""
 WARM_TICKS: Final = 50

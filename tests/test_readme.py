@@ -30,7 +30,7 @@ from foosim.vhub.capture_reader import open_capture
 
 ROOT: Final = Path(__file__).parents[1]
 PAGES: Final = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES: Final = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
 OTHER_OPTIONS: Final = {"--help", "--version", "--strict", "--hypothesis-profile", "--only", "--slow-start", "--load"}
 """Options that belong to no command of ours, or to all."""
 

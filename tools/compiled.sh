@@ -5,13 +5,13 @@ set -eu
 cd "$(dirname "$0")/.."
 unset PYTHONPATH PYTHONHOME
 python=$PWD/.venv/bin/python
-folders="client node protocol rehearsal supervisor vhub"
+folders="client console node protocol rehearsal supervisor vhub"
 files="setup.py pyproject.toml README.md LICENSE"
 
 key() {
     pwd
     # shellcheck disable=SC2086  # several words are meant
-    find $folders $files -type f ! -name '*.pyc' | LC_ALL=C sort | xargs cksum
+    find $folders $files -type f ! -name '*.pyc' ! -path '*/node_modules/*' | LC_ALL=C sort | xargs cksum
 }
 
 if [ -x .venv-compiled/bin/python ] && [ "$(key)" = "$(cat .venv-compiled/key 2>/dev/null)" ]; then

@@ -9,7 +9,7 @@ import ast
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
 NOW = "wall.now_"
 DECIDING = (ast.Compare, ast.BinOp, ast.IfExp, ast.If, ast.While, ast.Subscript)
 """Where a wall time would be compared, reckoned with, or looked at."""

@@ -21,7 +21,7 @@ from foosim.supervisor.plan import RunSettings
 from foosim.vhub.core import HubCore
 
 ROOT: Final = Path(__file__).parents[2]
-PACKAGES: Final = ("client", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES: Final = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
 READS: Final[Mapping[str, Sequence[tuple[Channel, bool]]]] = {
     "node": channels.NODE_READS,
     "vhub": channels.VHUB_READS,
