@@ -1,7 +1,7 @@
 #!/bin/sh
 # Work on the console's page, out of sight of other tools: sources and libraries lie in .page, which is not checked in.
 #     tools/page.sh build FOLDER   make what is served
-#     tools/page.sh check          eslint and the type checker
+#     tools/page.sh check          eslint, the type checker, tests of what needs no browser
 # The libraries are those of package-lock.json, installed once.
 set -eu
 cd "$(dirname "$0")/.."
@@ -14,7 +14,7 @@ if ! cmp -s console/page/package-lock.json "$place/installed.json" || [ ! -d "$p
     npm --prefix "$place" ci --ignore-scripts --no-audit --no-fund --loglevel=error >&2
     cp console/page/package-lock.json "$place/installed.json"
 fi
-rm -rf "$place/src"
+rm -rf "$place/src" "$place/test"
 cp -R console/page/. "$place/"
 case "${1:-}" in
 build)
@@ -26,6 +26,7 @@ check)
     cd "$place"
     node_modules/.bin/eslint src build.mjs
     node_modules/.bin/tsc
+    node --test --test-reporter=dot test/*.test.mjs
     ;;
 *)
     echo "tools/page.sh build FOLDER, or tools/page.sh check" >&2

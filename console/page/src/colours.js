@@ -58,10 +58,22 @@ export function lossGradient() {
 /** Colour and sign of each kind of mark: nobody has to tell them by colour alone. */
 export const MARKS = /** @type {Record<string, {colour: string, sign: string, text: string}>} */ ({
   goal: { colour: "#e69f00", sign: "★", text: "goals" },
+  kickoff: { colour: "#56b4e9", sign: "○", text: "kick-offs" },
+  out: { colour: "#56b4e9", sign: "◇", text: "out" },
+  dead: { colour: "#56b4e9", sign: "–", text: "lay still" },
   event: { colour: "#56b4e9", sign: "◆", text: "events" },
+  down: { colour: "#d55e00", sign: "▼", text: "out of service" },
+  empty: { colour: "#d55e00", sign: "▽", text: "empty batteries" },
+  quarantine: { colour: "#cc79a7", sign: "□", text: "quarantine" },
   recovery: { colour: "#cc79a7", sign: "▲", text: "recoveries" },
+  epoch: { colour: "#cc79a7", sign: "△", text: "epochs" },
   drops: { colour: "#d55e00", sign: "✕", text: "drops" },
   request: { colour: "#009e73", sign: "●", text: "requests" },
+  network: { colour: "#009e73", sign: "◉", text: "network" },
+  add: { colour: "#009e73", sign: "+", text: "additions" },
+  remove: { colour: "#009e73", sign: "−", text: "removals" },
+  push: { colour: "#009e73", sign: "➤", text: "pushes" },
+  move: { colour: "#009e73", sign: "⇄", text: "moves" },
 });
 
 /** @param {string} kind */

@@ -70,7 +70,8 @@ export class Entities {
       const { count, drive, least, charge } = status.rovers;
       facts.push(["Rovers", `${count}, ${drive} drive; ${least} has ${Math.round(charge * 100)} % of its charge`]);
     }
-    if (status?.epoch !== undefined) facts.push(["Epoch", `${status.epoch}; ${counted(status.handovers, "hand-over")}, ${counted(status.moves, "move")}`]);
+    if (status?.epoch !== undefined) facts.push(["Epoch", String(status.epoch)]);
+    if (status?.handovers !== undefined) facts.push(["So far", `${counted(status.handovers, "hand-over")}, ${counted(status.moves ?? 0, "move")}`]);
     if (status?.recording?.state) facts.push(["Capture", [status.recording.state, status.recording.problem].filter(Boolean).join(": ")]);
     if (status?.waiting_for) facts.push(["Waits for", status.waiting_for]);
     if (status?.reason) facts.push(["Ended", status.reason]);

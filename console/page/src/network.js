@@ -97,7 +97,9 @@ export class Network {
       const [first, second] = [by(a), by(b)];
       return first < second ? -order : first > second ? order : keyOf(a) < keyOf(b) ? -1 : 1;
     });
-    this.heads.forEach((head, index) => head.setAttribute("aria-sort", index !== column ? "none" : down ? "descending" : "ascending"));
+    // Names go up at first, figures down.
+    const rises = COLUMNS[column].name === "From" || COLUMNS[column].name === "To" ? !down : down;
+    this.heads.forEach((head, index) => head.setAttribute("aria-sort", index !== column ? "none" : rises ? "ascending" : "descending"));
     keyed(this.body, found.slice(0, ROWS_MAX), keyOf, (link) => this._row(link), (row, link) => this._update(row, link));
     const hidden = found.length - ROWS_MAX;
     setText(this.more, hidden > 0 ? `and ${counted(hidden, "more link")}: find the ones you want above` : source.links.length ? "" : "No link was used yet.");
@@ -119,7 +121,8 @@ export class Network {
   /** @param {HTMLElement} row @param {LinkWindow} link */
   _update(row, link) {
     COLUMNS.forEach((column, index) => setText(row.children[index], column.text(link)));
-    row.title = `${link.from} to ${link.to}${link.rule ? `, rule ${link.rule}` : ""}${link.radio ? ", by radio" : ""}${link.walls.length ? `, through ${counted(link.walls.length, "wall")}` : ""}`;
+    const causes = causesText(link.causes);
+    row.title = `${link.from} to ${link.to}${causes ? `; dropped: ${causes}` : ""}${link.rule ? `, rule ${link.rule}` : ""}${link.radio ? ", by radio" : ""}${link.walls.length ? `, through ${counted(link.walls.length, "wall")}` : ""}`;
     /** @type {HTMLElement} */ (row.children[2]).style.setProperty("--loss", link.loss === null ? "transparent" : css(lossColour(link.loss)));
     row.setAttribute("aria-selected", String(this.store.link?.[0] === link.from && this.store.link[1] === link.to));
   }

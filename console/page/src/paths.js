@@ -9,6 +9,11 @@ const BODIES_MAX = 256;
 /** A body that was faster than this (m/s) did not go: it was put there. */
 const SPEED_MAX = 16;
 const STEP_M = 0.004;
+/** A page that is behind gets poses that lie apart: what may be a way, and what a jump, is told by no more than this. */
+const GAP_S = 0.04;
+
+/** What puts a body elsewhere. */
+const CUTS = new Set(["goal", "kickoff", "out", "dead"]);
 
 class Path {
   /** @param {number} link @param {string} colour */
@@ -36,7 +41,7 @@ class Path {
       return;
     }
     const way = Math.hypot(x - last.x, y - last.y, z - last.z);
-    const way_max = STEP_M + SPEED_MAX * (tick - last.tick) * tick_s;
+    const way_max = STEP_M + SPEED_MAX * Math.min(GAP_S, (tick - last.tick) * tick_s);
     if (way < STEP_M) {
       last.tick = tick;
       return;
@@ -58,7 +63,7 @@ export class Paths {
     this.group.visible = false;
     /** @type {Path[]} */
     this.paths = [];
-    this.cut = false;
+    this.tick = -1;
   }
 
   /** Begin anew with the bodies of a scene. @param {SceneMessage} scene */
@@ -72,15 +77,16 @@ export class Paths {
     });
   }
 
-  /** @param {Poses} poses @param {number} tick_s */
-  add(poses, tick_s) {
-    for (const path of this.paths) path.add(poses.links, poses.tick, tick_s, poses.jump || this.cut);
-    this.cut = false;
-  }
-
-  /** The next poses follow no earlier ones: something was put elsewhere. */
-  cutHere() {
-    this.cut = true;
+  /**
+   * Go on to further poses. Where time jumped, or something was put elsewhere in between, no line joins them.
+   * @param {Poses} poses
+   * @param {number} tick_s
+   * @param {Mark[]} marks
+   */
+  add(poses, tick_s, marks) {
+    const cut = poses.jump || marks.some(({ tick, kind }) => tick > this.tick && tick <= poses.tick && CUTS.has(kind));
+    for (const path of this.paths) path.add(poses.links, poses.tick, tick_s, cut);
+    this.tick = poses.tick;
   }
 
   clear() {

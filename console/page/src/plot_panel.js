@@ -230,12 +230,13 @@ export class PlotPanel {
     if (this.end_s === null) this.back.value = String(newest_s);
     this.live.setAttribute("aria-pressed", String(this.end_s === null));
     setText(this.at, this.end_s === null ? "" : `to ${time(end_s)}`);
+    const first_s = Math.max(end_s - this.span_s, Math.min(oldest_s, end_s - 1));
     for (const { lines, chart } of this.cards) {
       const series = lines.map(({ name, unit, ring }) => ({
         name, unit,
-        points: /** @type {[number, number | null][]} */ (ring.window((end_s - this.span_s) / tick_s, end_s / tick_s, COLUMNS).map(([tick, value]) => [tick * tick_s, value])),
+        points: /** @type {[number, number | null][]} */ (ring.window(first_s / tick_s, end_s / tick_s, COLUMNS).map(([tick, value]) => [tick * tick_s, value])),
       }));
-      chart.update(series, [end_s - this.span_s, end_s]);
+      chart.update(series, [first_s, end_s]);
     }
   }
 }

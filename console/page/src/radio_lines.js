@@ -44,6 +44,18 @@ function signs(count, map, size) {
   return points;
 }
 
+/**
+ * Where an end of a link is: at its link of the scene, or where the deployment has who has no body.
+ * @param {import("./world.js").World} world
+ * @param {number | null} link
+ * @param {Vec3 | null | undefined} at
+ * @param {Vector3} into
+ */
+function endOf(world, link, at, into) {
+  if (link !== null) return world.placeOfLink(link, into);
+  return at ? into.set(...at) : null;
+}
+
 export class RadioLines {
   constructor() {
     this.group = new Group();
@@ -72,9 +84,9 @@ export class RadioLines {
     const walls = [];
     for (const link of world.source.links) {
       if (positions.length >= LINES_MAX * 6) break;
-      if (!link.radio || link.from_link === null || link.to_link === null) continue;
-      const from = world.placeOfLink(link.from_link, this.from);
-      const to = world.placeOfLink(link.to_link, this.to);
+      if (!link.radio) continue;
+      const from = endOf(world, link.from_link, link.from_at, this.from);
+      const to = endOf(world, link.to_link, link.to_at, this.to);
       if (!from || !to) continue;
       const share = chosen && link.from === chosen[0] && link.to === chosen[1] ? 1 : 0.5;
       const end = to.lerp(from, 1 - share);
@@ -119,8 +131,8 @@ export class RadioLines {
   _placeOf(world, drop) {
     const link = world.source.links.find((one) => one.from === drop.from && one.to === drop.to);
     if (!link) return null;
-    const from = link.from_link === null ? null : world.placeOfLink(link.from_link, new Vector3());
-    const to = link.to_link === null ? null : world.placeOfLink(link.to_link, new Vector3());
+    const from = endOf(world, link.from_link, link.from_at, new Vector3());
+    const to = endOf(world, link.to_link, link.to_at, new Vector3());
     if (drop.where === "way") {
       if (link.walls.length) return new Vector3(...link.walls[0]);
       return from && to ? from.lerp(to, 0.5) : (from ?? to);

@@ -82,9 +82,19 @@ export class Store {
     this._listeners.get(name)?.add(listener);
   }
 
-  /** @param {string} name @param {any} [payload] */
+  /**
+   * Tell all that listen; one that fails is reported, and the others are told all the same.
+   * @param {string} name
+   * @param {any} [payload]
+   */
   emit(name, payload) {
-    for (const listener of this._listeners.get(name) ?? []) listener(payload);
+    for (const listener of this._listeners.get(name) ?? []) {
+      try {
+        listener(payload);
+      } catch (error) {
+        window.reportError(error);
+      }
+    }
   }
 
   /** @param {string} body */
@@ -129,7 +139,8 @@ export class Store {
         this.note(message.level, message.text);
         return;
       case "answer":
-        this.note(message.accepted ? "answer" : "error", message.text || `${message.verb}: done`, message.who, message.tick);
+        // The slider shows what became of a request for another moment of a recording.
+        this.note(!message.accepted ? "error" : this.main?.info.kind === "live" ? "answer" : "info", message.text || `${message.verb}: done`, message.who, message.tick);
         return;
       case "compared":
         this.compared = message;

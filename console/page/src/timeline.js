@@ -72,7 +72,7 @@ export class Timeline {
   _mark(mark, source) {
     const { colour, sign } = markStyle(mark.kind);
     const text = `${time(source.seconds(mark.tick))}, tick ${mark.tick}: ${mark.text}`;
-    return button(sign, () => this._went(mark, text), { class: "mark", style: `color:${colour}`, title: text, "aria-label": text, tabindex: -1 });
+    return button(sign, () => this._went(mark, text), { class: `mark ${mark.kind === "drops" ? "many" : ""}`, style: `color:${colour}`, title: text, "aria-label": text, tabindex: -1 });
   }
 
   /** @param {Mark} mark @param {string} text */

@@ -72,6 +72,8 @@ interface LinkWindow {
   causes: Record<string, number>;
   from_link: number | null;
   to_link: number | null;
+  from_at?: Vec3 | null;
+  to_at?: Vec3 | null;
   walls: Vec3[];
 }
 

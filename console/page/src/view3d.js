@@ -8,6 +8,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Labels } from "./labels.js";
 import { Overlays } from "./overlays.js";
 import { RadioLines } from "./radio_lines.js";
+import { h } from "./ui.js";
 import { World } from "./world.js";
 
 const CLICK_PX = 5;
@@ -51,6 +52,8 @@ export class View3D {
     this.canvas.setAttribute("aria-label", "The world in three dimensions. Arrow keys turn the view, plus and minus zoom.");
     place.append(this.canvas);
     this.labels = new Labels(place);
+    this.halves = h("div", { id: "halves", hidden: true });
+    place.append(this.halves);
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(45, 1, 0.01, 500);
     this.camera.up.set(0, 0, 1);
@@ -90,10 +93,7 @@ export class View3D {
     store.on("scene", (source) => this._build(source));
     store.on("poses", (source) => {
       const world = this.worlds.get(source.info.id);
-      if (world) world.paths.add(source.poses, source.info.tick_ns / 1e9);
-    });
-    store.on("marks", (source) => {
-      if (source.marks.at(-1)?.kind === "goal") this.worlds.get(source.info.id)?.paths.cutHere();
+      if (world) world.paths.add(source.poses, source.info.tick_ns / 1e9, source.marks);
     });
     store.on("drops", ({ source, drops }) => {
       const world = this.worlds.get(source.info.id);
@@ -147,12 +147,23 @@ export class View3D {
       this.scene.add(world.group);
       world.build();
     }
+    this._name_halves();
     this.touch();
+  }
+
+  /** Say which world is which, where there are two. */
+  _name_halves() {
+    const { two } = this.options;
+    this.halves.hidden = this.worlds.size < 2 || two === "single";
+    this.halves.className = two;
+    const names = [...this.worlds.values()].map(({ source }) => source.info.name);
+    this.halves.replaceChildren(...names.map((name, index) => h("span", {}, h("b", {}, index > 0 && two === "ghost" ? `ghost: ${name}` : name))));
   }
 
   /** How a second source is shown has changed. */
   rearrange() {
     this._match();
+    this.home();
   }
 
   /** @param {import("./store.js").Source} source */

@@ -1,0 +1,121 @@
+// The parts of the page that need no browser: `node --test test`.
+
+import assert from "node:assert/strict";
+import test from "node:test";
+import { choiceOf, choicesOf } from "../src/choices.js";
+import { lossColour } from "../src/colours.js";
+import { tokenOf } from "../src/connection.js";
+import { settingsOf } from "../src/disturb.js";
+import { scaleLength } from "../src/map.js";
+import { fromAbove } from "../src/map_data.js";
+import { decodePoses } from "../src/messages.js";
+import { Ring } from "../src/ring.js";
+import { Source, Store } from "../src/store.js";
+import { number, numberPaths, time, valueAt } from "../src/text.js";
+
+const INFO = { id: 0, kind: "live", name: "run", world: "table", tick_ns: 2e6, verbs: ["pause"], span: null };
+
+function posesMessage({ generation = 1, tick = 5, links = 1, values = [] } = {}) {
+  const view = new DataView(new ArrayBuffer(24 + 28 * links + 4 * values.length));
+  view.setUint8(0, 1);
+  view.setUint8(2, 3);
+  view.setUint32(4, generation, true);
+  view.setFloat64(8, tick, true);
+  view.setUint32(16, links, true);
+  view.setUint32(20, values.length, true);
+  for (let index = 0; index < 7 * links; index += 1) view.setFloat32(24 + 4 * index, index, true);
+  values.forEach((value, index) => view.setFloat32(24 + 28 * links + 4 * index, value, true));
+  return view.buffer;
+}
+
+test("poses are decoded, and refused where their length is not what they say", () => {
+  const poses = decodePoses(posesMessage({ links: 2, values: [1.5, -2] }));
+  assert.deepEqual([poses.source, poses.jump, poses.paused, poses.generation, poses.tick], [0, true, true, 1, 5]);
+  assert.deepEqual([...poses.links.slice(0, 3), ...poses.values], [0, 1, 2, 1.5, -2]);
+  assert.throws(() => decodePoses(posesMessage().slice(0, 40)), /take 52/);
+  assert.throws(() => decodePoses(new ArrayBuffer(3)), /3 bytes/);
+});
+
+test("poses of another scene than the page has are dropped", () => {
+  const store = new Store();
+  store.take({ type: "welcome", role: "viewer", version: "1", sources: [INFO] });
+  store.take({ type: "scene", source: 0, generation: 2, links: [], bodies: [] });
+  store.takePoses(decodePoses(posesMessage({ generation: 1 })));
+  assert.equal(store.main.poses, null);
+  store.takePoses(decodePoses(posesMessage({ generation: 2 })));
+  assert.equal(store.main.tick, 5);
+});
+
+test("one listener that fails is reported, and the others are told", () => {
+  const reported = [];
+  globalThis.window = { reportError: (error) => reported.push(error.message) };
+  const store = new Store();
+  const told = [];
+  store.on("status", () => { throw new Error("broken"); });
+  store.on("status", (value) => told.push(value));
+  store.emit("status", 7);
+  delete globalThis.window;
+  assert.deepEqual([reported, told], [["broken"], [7]]);
+});
+
+test("a ring keeps its order, forgets what is later than a jump back, and is bounded", () => {
+  const ring = new Ring(100);
+  for (let tick = 0; tick < 1000; tick += 1) ring.push(tick, tick % 50);
+  assert.ok(ring.ticks.length <= 125);
+  assert.equal(ring.ticks.at(-1), 999);
+  ring.push(950, 1);
+  assert.equal(ring.ticks.at(-1), 950);
+  ring.merge([[10, 4], [940, 9]]);
+  assert.deepEqual(ring.ticks, [...ring.ticks].sort((a, b) => a - b));
+  assert.equal(ring.values[ring.ticks.indexOf(940)], 9);
+});
+
+test("what is drawn of many points keeps the least and the greatest", () => {
+  const ring = new Ring(10_000);
+  for (let tick = 0; tick < 10_000; tick += 1) ring.push(tick, tick === 4321 ? 100 : tick === 7777 ? -100 : 0);
+  const values = ring.window(0, 10_000, 50).map(([, value]) => value);
+  assert.ok(values.length <= 100);
+  assert.deepEqual([Math.max(...values), Math.min(...values)], [100, -100]);
+});
+
+test("numbers of a field whose units differ have names of their own", () => {
+  const source = new Source(INFO);
+  const run = { entity: "red.goal", field: "joint_positions" };
+  source.scene = { fields: [{ ...run, unit: "m", index: 4, count: 1 }, { ...run, unit: "rad", index: 5, count: 1 }], sensors: [{ robot: "camera", channel: "ball", unit: "m" }] };
+  source.status = { lag_ms: { p99: 1 }, nodes: { "a.b": { solved_ticks: 3 } } };
+  const choices = choicesOf(source);
+  assert.deepEqual(choices.get("red.goal joint_positions[1]"), { name: "red.goal joint_positions[1]", unit: "rad", request: { field: 5 } });
+  assert.deepEqual(choiceOf(choices, "reading camera/ball[2]").request, { reading: ["camera", "ball"], index: 2 });
+  assert.deepEqual(choiceOf(choices, "link a → b: delay").request, { link: ["a", "b"], figure: "delay_ms" });
+  assert.equal(choiceOf(choices, "nothing"), null);
+});
+
+test("values of a status are found by their path, also under names with dots", () => {
+  const status = { lag_ms: { p99: 1.5 }, nodes: { "a.b": { solved_ticks: 3 } }, state: "running" };
+  assert.deepEqual(numberPaths(status).map((path) => [path, valueAt(status, path)]), [["lag_ms.p99", 1.5], ["nodes.a.b.solved_ticks", 3]]);
+  assert.equal(valueAt(status, "lag_ms.p50"), null);
+});
+
+test("settings are read as they are written", () => {
+  assert.deepEqual(JSON.parse(JSON.stringify(settingsOf("loss: 5 %\nburst.loss = 1 %\nburst.mean_bad: 40 ms\ncopies: 2"))), {
+    loss: "5 %", burst: { loss: "1 %", mean_bad: "40 ms" }, copies: 2,
+  });
+  assert.match(settingsOf("loss"), /key: value/);
+  assert.match(settingsOf(""), /At least one/);
+});
+
+test("tokens, times, numbers, scales", () => {
+  assert.deepEqual([tokenOf("#view=a-b_c"), tokenOf("#operate=x"), tokenOf("")], ["a-b_c", "x", ""]);
+  assert.deepEqual([time(12.3456), time(123.45), time(3723.45)], ["12.346 s", "2:03.450", "1:02:03.450"]);
+  assert.deepEqual([number(0), number(1.23456), number(1234.5), number(null)], ["0", "1.235", "1235", "–"]);
+  assert.deepEqual([scaleLength(1.4), scaleLength(40)], [0.2, 5]);
+  assert.deepEqual([lossColour(0), lossColour(2)], [[0, 0.447, 0.698], [0.835, 0.369, 0]]);
+});
+
+test("a box that is turned is seen from above as it lies", () => {
+  const box = { kind: "box", half: [2, 1, 1], position: [0, 0, 0], orientation: [0, 0, Math.SQRT1_2, Math.SQRT1_2], colour: [1, 0, 0, 1], name: "" };
+  const { at, points } = fromAbove(box, [3, 4, 0], [0, 0, 0, 1]);
+  assert.deepEqual(at, [3, 4]);
+  assert.equal(Math.round(Math.max(...points.map(([x]) => x))), 1);
+  assert.equal(Math.round(Math.max(...points.map(([, y]) => y))), 2);
+});
