@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from functools import cache
+from threading import Lock
 from typing import Any, TypeVar
 
 import msgspec
@@ -23,6 +24,8 @@ T = TypeVar("T")
 
 _encoder = msgspec.msgpack.Encoder()
 _anything = msgspec.msgpack.Decoder()
+_making = Lock()
+"""msgspec reads a type's annotations when its first decoder is made; two threads that do so at once crash (0.22)."""
 
 
 def encode(message: msgspec.Struct | list[Any]) -> bytes:
@@ -45,7 +48,8 @@ def decode_json(payload: bytes) -> Any:
 
 @cache
 def _decoder(kind: Hashable) -> msgspec.msgpack.Decoder[Any]:
-    return msgspec.msgpack.Decoder(kind)
+    with _making:
+        return msgspec.msgpack.Decoder(kind)
 
 
 def decode(kind: type[T], payload: bytes, bytes_max: int = limits.MESSAGE_BYTES_MAX) -> T:
