@@ -94,6 +94,7 @@ class PlayedSource:
     def _listen(self, feed: Feed, tell: Callable[[Callable[[], None]], None]) -> None:
         """Hear and ask until the replay or this source ends. Raises Refused."""
         while not self._ended.is_set():
+            ended = self._replay.ended  # what was heard while something was asked waits for the next `take`
             for item in self._replay.take(HEAR_S):
                 tell(lambda item=item: self._tell(feed, item))  # type: ignore[misc]
             while not self._asked.empty():
@@ -102,7 +103,7 @@ class PlayedSource:
                     answer.set_result(self._replay.ask(verb, **arguments))
                 except Refused as error:
                     answer.set_exception(error)
-            if self._replay.ended:
+            if ended:
                 raise ReplayGone("the replay has ended")
 
     # --- heard -------------------------------------------------------------------------------------------------------

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from foosim.client.replay import hear_replay
+from foosim.client.replay import Replay, hear_replay
 from foosim.console.recorded.capture_source import FileSource
 from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.replay_source import PlayedSource
@@ -82,8 +84,21 @@ def test_a_replay_on_its_plane_is_seen_and_controlled(run: Path) -> None:
 
 
 def test_a_replay_that_ends_is_told(run: Path) -> None:
+    def connect_to(address: str, streams: Sequence[str]) -> Replay:
+        """Connect so that everything up to the end is heard while `resume` is asked."""
+        connection = hear_replay(address, streams)
+
+        def ask(verb: str, **arguments: Any) -> dict[str, Any]:
+            status = Replay.ask(connection, verb, **arguments)
+            while verb == "resume" and not connection.ended:
+                connection._read(None)
+            return status
+
+        connection.ask = ask  # type: ignore[method-assign]
+        return connection
+
     async def look(address: str) -> Heard:
-        source = PlayedSource(lambda streams: hear_replay(address, streams))
+        source = PlayedSource(lambda streams: connect_to(address, streams))
         async with running(source) as heard:
             await source.ask("rate", {"pace": "fast"}, "me")
             await source.ask("play", {}, "me")
