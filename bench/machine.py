@@ -23,7 +23,7 @@ PAGE_BYTES: Final = os.sysconf("SC_PAGE_SIZE")
 class Machine:
     """What was measured on, and whether the hot path is compiled.
 
-    `load` is the average over the last minute, before the bench began.
+    `load` is the average over the last minute, before the bench began; `bare_tick_us` is b, the unit of figures.
     """
 
     cores: int
@@ -32,6 +32,7 @@ class Machine:
     is_compiled: bool
     system: str
     load: float
+    bare_tick_us: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,8 @@ class Use:
     rss_mb: float
 
 
-def this_machine() -> Machine:
-    """Return what there is to know of this machine."""
+def this_machine(bare_tick_us: float) -> Machine:
+    """Return what there is to know of this machine, of which b was measured."""
     return Machine(
         len(os.sched_getaffinity(0)),
         _cpu_model(),
@@ -51,6 +52,7 @@ def this_machine() -> Machine:
         is_compiled(),
         platform.platform(),
         os.getloadavg()[0],
+        round(bare_tick_us, 1),
     )
 
 
