@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any, Final
 
 from bench import (
-    bare_tick,
     barrier,
     certificates,
     console,
@@ -140,7 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if unknown:
         parser.error(f"no bench {', '.join(unknown)}; there are {', '.join(names)}")
     people = sys.stderr if chosen.json else sys.stdout
-    here = machine.this_machine(bare_tick.bare_tick_us())
+    here = machine.this_machine()
     how = "compiled" if here.is_compiled else "interpreted"
     print(
         f"{here.cores} cores, {here.cpu}, Python {here.python}, {how}, load {here.load:.2f} before the bench, "

@@ -7,14 +7,15 @@ to hour, so figures are compared as multiples of it.
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from statistics import median
 from typing import Final
 
-from bench.runs import TABLE
 from foosim.node.engines.bullet import BulletEngine
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.start import initial_frame
 
+TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 BLOCKS: Final = 20
 TICKS_OF_A_BLOCK: Final = 50
 

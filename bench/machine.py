@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from bench.bare_tick import bare_tick_us
 from foosim.protocol.fingerprint import is_compiled
 
 PROC: Final = Path("/proc")
@@ -43,8 +44,8 @@ class Use:
     rss_mb: float
 
 
-def this_machine(bare_tick_us: float) -> Machine:
-    """Return what there is to know of this machine, of which b was measured."""
+def this_machine() -> Machine:
+    """Return what there is to know of this machine; b is measured."""
     return Machine(
         len(os.sched_getaffinity(0)),
         _cpu_model(),
@@ -52,7 +53,7 @@ def this_machine(bare_tick_us: float) -> Machine:
         is_compiled(),
         platform.platform(),
         os.getloadavg()[0],
-        round(bare_tick_us, 1),
+        round(bare_tick_us(), 1),
     )
 
 
