@@ -29,18 +29,8 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.journal import Journal
 from foosim.protocol.loop import collect_seldom
-from foosim.protocol.messages import (
-    Build,
-    ClientHello,
-    Commit,
-    Epoch,
-    Join,
-    RobotPacket,
-    Samples,
-    Sent,
-    Subscription,
-    Up,
-)
+from foosim.protocol.messages import Build, ClientHello, Commit, Epoch, Join, Samples, Sent, Subscription, Up
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore

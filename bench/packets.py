@@ -33,13 +33,13 @@ from foosim.protocol.messages import (
     End,
     Epoch,
     Join,
-    RobotPacket,
     Samples,
     Sent,
     Subscription,
     Tempo,
     Up,
 )
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import initial_numbers
 from foosim.rehearsal.hub_journal import HubJournal
 from foosim.vhub.core import HubCore

@@ -14,8 +14,9 @@ from foosim.client.beacons import FLEET, TELEMETRY, Entry, Telemetry, decode_tel
 from foosim.client.packets import Outgoing
 from foosim.client.player import Samples, Turn
 from foosim.client.roadmap import roadmap_of
-from foosim.protocol.deployment import Deployment, RoverRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue
+from foosim.protocol.rovers import RoverRobot
 
 FLEET_S: Final = 1.0
 FORGOTTEN_S: Final = 60.0

@@ -34,10 +34,11 @@ from foosim.client.payloads import Battery, Drive, Pose, Ranges, WheelTravel
 from foosim.client.player import Samples, Turn
 from foosim.client.roadmap import roadmap_of
 from foosim.client.steering import Estimate, Steering, wrapped
-from foosim.protocol.deployment import Deployment, RoverRobot, StationRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.protocol.errors import BadValue
 from foosim.protocol.obstacles import obstacles_of
+from foosim.protocol.rovers import RoverRobot, StationRobot
 
 ARRIVED_M: Final = 0.35
 """So near to a spot it counts as visited."""

@@ -15,10 +15,12 @@ from math import isfinite
 from typing import Any, Final, NamedTuple
 
 from foosim.client.errors import UnknownName
-from foosim.protocol.deployment import Deployment, Robot, RodRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Malformed
 from foosim.protocol.names import CHANNEL_DRIVE, CHANNEL_ECHO, CHANNEL_NAMES_RESERVED, CHANNEL_POSITION
+from foosim.protocol.rod import RodRobot
 from foosim.protocol.rovers import RAYS_MAX
+from foosim.protocol.world_spec import Robot
 
 ANGLE_RAD_MAX: Final = 1000.0
 """The greatest angle that a rod's actuator takes."""

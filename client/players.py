@@ -17,10 +17,12 @@ from foosim.client.errors import UnknownName
 from foosim.client.payloads import BallPosition, Command, RodPosition
 from foosim.client.player import Commands, Samples
 from foosim.client.tracking import Ball, BallTrack, moved
-from foosim.protocol.deployment import BallSensor, Deployment, RodRobot, RodSensor
+from foosim.protocol.camera import BallSensor
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.errors import BadValue
 from foosim.protocol.names import TEAMS
+from foosim.protocol.rod import RodRobot, RodSensor
 
 LATENCY_S: Final = 0.003
 """From a decision to what the rod does about it: the command's link and the next tick."""

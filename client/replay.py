@@ -27,11 +27,12 @@ from foosim.client.payloads import Value, channel_kind, decode_payload
 from foosim.protocol import channels, limits
 from foosim.protocol.certificates import operator_credentials
 from foosim.protocol.channels import ALIVE, PLAYED, REPLAY, Plane
-from foosim.protocol.codec import decode_json, encode, encode_json
+from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import BadValue, Malformed, Refused, show
 from foosim.protocol.inbox import Inbox
+from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.messages import Answer, Request
 from foosim.protocol.names import nearest_name
 from foosim.protocol.replay_messages import (

@@ -22,16 +22,16 @@ from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.asset_messages import Piece
 from foosim.protocol.assign import Assignment, Share, reach_of
-from foosim.protocol.barrier import BadParts, Barrier, Slots
+from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import encode, encode_json
+from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, basis_of, frame_from_bytes
+from foosim.protocol.frame import Frame, frame_from_bytes
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.layout import Entity, Layout, build_layout
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
-    AddedEntity,
     Build,
     Commit,
     Deliveries,
@@ -39,7 +39,6 @@ from foosim.protocol.messages import (
     Epoch,
     Heartbeat,
     Order,
-    Outbox,
     Part,
     Prepare,
     Recall,
@@ -48,7 +47,8 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
-from foosim.protocol.start import initial_frame
+from foosim.protocol.robot_packets import Outbox
+from foosim.protocol.start import AddedEntity, initial_frame
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from foosim.node.actuators.drive import DriveActuator
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.world_spec import WorldSpec
 
 ROUNDING: Final = 1.000001
 """A way is no longer than its speed allows, but for rounding."""
@@ -19,12 +19,12 @@ ROUNDING: Final = 1.000001
 class HallWorld:
     """The hall of one deployment, with the rovers of one layout."""
 
-    def __init__(self, deployment: Deployment, layout: Layout) -> None:
-        hall = deployment.hall
-        self.actuators = {entity.index: DriveActuator(deployment, entity) for entity in layout.rovers}
+    def __init__(self, spec: WorldSpec, layout: Layout) -> None:
+        hall = spec.hall
+        self.actuators = {entity.index: DriveActuator(spec, entity) for entity in layout.rovers}
         self._layout = layout
         self._x_max, self._y_max = hall.length / 2 - hall.rover.radius, hall.width / 2 - hall.rover.radius
-        self._reach_m = hall.rover.drive.speed * deployment.tick_ns / 1e9 * ROUNDING
+        self._reach_m = hall.rover.drive.speed * spec.tick_ns / 1e9 * ROUNDING
 
     def apply_rules(self, numbers: list[float], layout: Layout) -> None:
         """A hall has no rules."""

@@ -6,11 +6,11 @@ Neighbours: `core` computes when it has both.
 
 from __future__ import annotations
 
-from foosim.node.edits import check_edits
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import encode
+from foosim.protocol.edits import Edit, check_edits
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import Commit, Deliveries, Edit, Epoch, Order
+from foosim.protocol.messages import Commit, Deliveries, Epoch, Order
 
 
 class Inputs:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.protocol.layout import WORLD, Entity, Layout
 from foosim.protocol.start import kickoff_spot, kickoff_ticks, place_ball
+from foosim.protocol.world_spec import WorldSpec
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class TableRules:
     key: bytes
 
     @classmethod
-    def of(cls, deployment: Deployment) -> TableRules:
-        table = deployment.table
-        tick_ns = deployment.tick_ns
+    def of(cls, spec: WorldSpec) -> TableRules:
+        table = spec.table
+        tick_ns = spec.tick_ns
         return cls(
             goal_x_m=table.field.length / 2 + table.ball.radius,
             goal_y_m=table.goal.width / 2,
@@ -45,9 +45,9 @@ class TableRules:
             dead_speed=table.rules.dead_ball_speed,
             dead_ticks=max(1, table.rules.dead_ball_after_ns // tick_ns),
             out_ticks=max(1, table.rules.off_table_after_ns // tick_ns),
-            wait_ticks=kickoff_ticks(deployment),
-            spot=kickoff_spot(deployment),
-            key=draw_key(deployment.seed, "kickoff"),
+            wait_ticks=kickoff_ticks(spec),
+            spot=kickoff_spot(spec),
+            key=draw_key(spec.seed, "kickoff"),
         )
 
     def apply(self, numbers: list[float], layout: Layout) -> None:

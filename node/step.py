@@ -12,17 +12,17 @@ from math import isfinite
 
 import msgspec
 
-from foosim.node.edits import edit
 from foosim.node.engines.interface import Engine
 from foosim.node.sensors import Sensor, make_sensor, sample_all
 from foosim.node.world import world_of
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment import Sensor as SensorSpec
+from foosim.protocol.edits import Edit, edit
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Entity, Layout
-from foosim.protocol.messages import Delivered, Edit, OutboxPacket, RobotPacket
+from foosim.protocol.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.protocol.sampling import Sampling
+from foosim.protocol.world_spec import Sensor as SensorSpec
 
 ECHO = "echo"
 

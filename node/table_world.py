@@ -10,8 +10,9 @@ from typing import Final
 
 from foosim.node.actuators.position import PositionActuator
 from foosim.node.rules import TableRules
-from foosim.protocol.deployment import Deployment, RodRobot
 from foosim.protocol.layout import BALL, Entity, Layout
+from foosim.protocol.rod import RodRobot
+from foosim.protocol.world_spec import WorldSpec
 
 ROD_SPEED_FACTOR: Final = 1.5
 """A rod's declared speed limit is this many times its drive's: a ball may push it faster than its motor does."""
@@ -23,11 +24,11 @@ STOP_DEPTH_M: Final = 0.01
 class TableWorld:
     """The table of one deployment, with the rods and balls of one layout."""
 
-    def __init__(self, deployment: Deployment, layout: Layout) -> None:
-        self.actuators = {entity.index: PositionActuator(deployment, entity) for entity in layout.rods}
-        self.rules = TableRules.of(deployment)
+    def __init__(self, spec: WorldSpec, layout: Layout) -> None:
+        self.actuators = {entity.index: PositionActuator(spec, entity) for entity in layout.rods}
+        self.rules = TableRules.of(spec)
         self._layout = layout
-        table = deployment.table
+        table = spec.table
         self._slide_speed_max = table.drive.slide.speed * ROD_SPEED_FACTOR
         self._spin_speed_max = table.drive.spin.speed * ROD_SPEED_FACTOR
         self._ball_speed_max = table.ball.speed_limit
@@ -35,16 +36,16 @@ class TableWorld:
         self._x_max = table.field.length / 2 + margin
         self._y_max = table.field.width / 2 + margin
         self._z_min, self._z_max = -margin, table.walls.height + margin
-        tick_s = deployment.tick_ns / 1e9
+        tick_s = spec.tick_ns / 1e9
         self._slide_reach_m, self._spin_reach_rad = self._slide_speed_max * tick_s, self._spin_speed_max * tick_s
         self._rods: dict[int, tuple[int, int, float]] = {}
         for entity in layout.rods:
-            spec = deployment.robots[entity.name]
-            assert isinstance(spec, RodRobot)
+            rod = spec.robots[entity.name]
+            assert isinstance(rod, RodRobot)
             self._rods[entity.index] = (
                 entity.offsets["joint_positions"],
                 entity.offsets["joint_velocities"],
-                table.lines[spec.line].half_stroke + STOP_DEPTH_M,
+                table.lines[rod.line].half_stroke + STOP_DEPTH_M,
             )
         self._ball_reach_m = self._ball_speed_max * tick_s
 

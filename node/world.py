@@ -11,8 +11,8 @@ from typing import Protocol
 from foosim.node.actuators import Actuator
 from foosim.node.hall_world import HallWorld
 from foosim.node.table_world import TableWorld
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.world_spec import WorldSpec
 
 
 class World(Protocol):
@@ -32,6 +32,6 @@ class World(Protocol):
         """Set a world at rest in motion, for the fixed small run that tells engines apart."""
 
 
-def world_of(deployment: Deployment, layout: Layout) -> World:
+def world_of(spec: WorldSpec, layout: Layout) -> World:
     """Return the deployment's kind of world."""
-    return HallWorld(deployment, layout) if deployment.is_hall else TableWorld(deployment, layout)
+    return HallWorld(spec, layout) if spec.is_hall else TableWorld(spec, layout)

@@ -14,8 +14,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
 
-from foosim.protocol.deployment import Deployment, RodRobot
 from foosim.protocol.layout import Layout
+from foosim.protocol.rod import RodRobot
+from foosim.protocol.world_spec import WorldSpec
 
 MARGIN_M = 0.001
 """Added to every bounding volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
@@ -53,27 +54,27 @@ class Share:
     solved: tuple[int, ...]
 
 
-def line_x_m(deployment: Deployment, robot: RodRobot) -> float:
+def line_x_m(spec: WorldSpec, robot: RodRobot) -> float:
     """Return the x of a rod's axis in the world frame: red's own goal is at negative x, blue's lines are mirrored."""
-    x = deployment.table.lines[robot.line].x
+    x = spec.table.lines[robot.line].x
     return x if robot.team == "red" else -x
 
 
-def reach_of(deployment: Deployment, layout: Layout) -> Reach:
+def reach_of(spec: WorldSpec, layout: Layout) -> Reach:
     """Return the bounding volumes of a layout's bodies."""
-    if deployment.is_hall:
+    if spec.is_hall:
         alone = tuple((entity.index, entity.name) for entity in layout.rovers)
         return Reach(0.0, (), (), 0.0, 0.0, 0.0, (), alone)
-    table = deployment.table
+    table = spec.table
     rod = table.rod
     half = rod.foot.length / 2
     corner = sqrt(rod.foot_radius * rod.foot_radius + half * half)
-    tick_s = deployment.tick_ns / 1e9
+    tick_s = spec.tick_ns / 1e9
     rods = []
     for entity in layout.rods:
-        robot = deployment.robots[entity.name]
+        robot = spec.robots[entity.name]
         assert isinstance(robot, RodRobot)
-        rods.append((entity.index, entity.name, line_x_m(deployment, robot)))
+        rods.append((entity.index, entity.name, line_x_m(spec, robot)))
     rods.sort(key=lambda rod: (rod[2], rod[1]))
     return Reach(
         ball_m=table.ball.radius + table.ball.speed_limit * tick_s + MARGIN_M,

@@ -7,7 +7,9 @@ Neighbours: `assign` decides who writes what, `frame` is the result.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable, Mapping, Sequence
+from hashlib import blake2b
 from math import isfinite
 from typing import Any, Final, TypeAlias
 
@@ -15,14 +17,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.protocol import limits
-from foosim.protocol.codec import decode_any
+from foosim.protocol.codec import decode_any, encode
+from foosim.protocol.edits import Edit
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
-from foosim.protocol.messages import OutboxPacket, Part
+from foosim.protocol.messages import Part
+from foosim.protocol.robot_packets import OutboxPacket
 
 Indices: TypeAlias = NDArray[np.intp]
 _OUTBOX: Final[Any] = list[OutboxPacket]
+_TICK = struct.Struct("<Q")
+_NO_EDITS: Final = encode([])
+
+
+def edits_content(edits: Sequence[Edit]) -> bytes:
+    """Return the content of an order without its epoch."""
+    return encode(list(edits)) if edits else _NO_EDITS
+
+
+def basis_of(digest: bytes, edits: Sequence[Edit], deliveries: bytes) -> bytes:
+    """Return the BLAKE2b of what tick k is computed from: D(k), the content of order k, the deliveries' bytes."""
+    hasher = blake2b(digest, digest_size=32)
+    content = edits_content(edits)
+    hasher.update(_TICK.pack(len(content)) + content)
+    hasher.update(deliveries)
+    return hasher.digest()
 
 
 class BadParts(Malformed):

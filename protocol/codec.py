@@ -18,8 +18,6 @@ from foosim.protocol import limits
 from foosim.protocol.errors import Malformed
 from foosim.protocol.message_types import VERSION_SUFFIX
 
-_json_encoder = msgspec.json.Encoder()
-
 T = TypeVar("T")
 
 _encoder = msgspec.msgpack.Encoder()
@@ -31,19 +29,6 @@ _making = Lock()
 def encode(message: msgspec.Struct | list[Any]) -> bytes:
     """Return the MessagePack bytes of a message (or of a list of items)."""
     return _encoder.encode(message)
-
-
-def encode_json(content: Any) -> bytes:
-    """Return JSON bytes, for what people and scripts read."""
-    return _json_encoder.encode(content)
-
-
-def decode_json(payload: bytes) -> Any:
-    """Return the content of JSON bytes, or raise `Malformed`."""
-    try:
-        return msgspec.json.decode(payload)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise Malformed(f"no JSON: {error}") from None
 
 
 @cache

@@ -9,97 +9,30 @@ whose names end in `_ns` (see units.py). The table's parameters are in table.py,
 import json
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
-from fractions import Fraction
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, JsonValue, PrivateAttr, StringConstraints
+from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
 
 from foosim.protocol import limits, names, units
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.errors import BadValue
-from foosim.protocol.hall import Hall
-from foosim.protocol.hosts import Host, Listen, Name, Placed
-from foosim.protocol.mesh import Mesh
-from foosim.protocol.names import LineName, Team
-from foosim.protocol.network import LinkRule, Network, Selector
-from foosim.protocol.rovers import Offset, RoverRobot, RoverSensor, StationRobot
-from foosim.protocol.scene import Shape
+from foosim.protocol.hosts import Host, Listen, Placed
+from foosim.protocol.network import Network, Selector
 from foosim.protocol.scenery import (
-    SCENERY_MAX,
-    AssetFolder,
-    Contents,
-    Scenery,
     mesh_files,
-    open_meshes,
     read_contents,
-    scenery_shape,
 )
-from foosim.protocol.table import Part, Table
+from foosim.protocol.spec_base import Name, Offset, Rate, RobotName, SpecBase, default
 from foosim.protocol.traces import check_files, network_files
-from foosim.protocol.units import Pace, PaceField, Quantity, custom_error, parse_pace, period_ticks
+from foosim.protocol.units import PaceField, Quantity, custom_error
+from foosim.protocol.world_spec import WorldSpec
 
-__all__ = [
-    "AccessSpec", "BallSensor", "CameraRobot", "Capture", "ClientSpec", "Deadlines", "Deployment", "LinkRule",
-    "Network", "NodeSpec", "Pace", "Player", "Robot", "RobotName", "RodRobot", "RodSensor", "RoverRobot", "Sensor",
-    "StationRobot", "deployment_schema", "deployment_schema_text", "parse_pace", "period_ticks",
-]  # fmt: skip
-
-RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 OperatorName = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.OPERATOR_LENGTH_MAX)]
 ClassPath = Annotated[str, StringConstraints(pattern=names.CLASS_PATTERN, max_length=200)]
 
-Rate = Annotated[Fraction, Quantity(units.RATE, "1 mHz", "10 kHz")]
-LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
-AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
 Size = Annotated[int, Quantity(units.SIZE, "64 KiB", "1000 TiB")]
 Span = Annotated[int, Quantity(units.TIME, "10 ms", "10000 h")]
 Deadline = Annotated[int, Quantity(units.TIME, "1 ms", "24 h")]
-
-
-def _default(text: str, alias: str | None = None) -> Any:
-    """A field with a default that is written, checked and documented as in a file."""
-    return Field(default=text, alias=alias, validate_default=True)
-
-
-class RodSensor(Part):
-    """Reads a rod's slide (m) and angle (rad), with Gaussian noise on each: 2 float64."""
-
-    kind: Literal["encoder"]
-    rate_hz: Rate = Field(alias="rate")
-    offset_ns: Offset = _default("0 s", "offset")
-    position_noise: LengthNoise
-    angle_noise: AngleNoise
-
-
-class BallSensor(Part):
-    """Reads the ball's position x, y, z (m), with Gaussian noise on x and y and none on z: 3 float64."""
-
-    kind: Literal["ball"]
-    rate_hz: Rate = Field(alias="rate")
-    offset_ns: Offset = _default("0 s", "offset")
-    noise: LengthNoise
-
-
-Sensor = RodSensor | BallSensor | RoverSensor
-
-
-class RodRobot(Part):
-    """A motorised rod with its figures. Its actuator channel is `position`: slide (m) and angle (rad), 2 float64."""
-
-    model: Literal["rod"]
-    team: Team
-    line: LineName
-    sensors: dict[Name, RodSensor] = Field(max_length=16)
-
-
-class CameraRobot(Part):
-    """A robot without a body that sees the ball."""
-
-    model: Literal["camera"]
-    sensors: dict[Name, BallSensor] = Field(max_length=16)
-
-
-Robot = Annotated[RodRobot | CameraRobot | RoverRobot | StationRobot, Field(discriminator="model")]
 
 
 class NodeSpec(Placed):
@@ -121,7 +54,7 @@ class Player(Placed):
 
     class_: ClassPath = Field(alias="class")
     rate_hz: Rate = Field(alias="rate")
-    offset_ns: Offset = _default("0 s", "offset")
+    offset_ns: Offset = default("0 s", "offset")
     lockstep: bool = True
     act: Literal["period", "arrival"] = "period"
     arrivals: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
@@ -139,7 +72,7 @@ class VHubSpec(Placed):
     """The process that judges every packet and writes the capture: where it runs."""
 
 
-class ClientSpec(Part):
+class ClientSpec(SpecBase):
     """An endpoint that is started by hand, on board of a robot or anywhere.
 
     One in lockstep is waited for before tick 0 and has a rate.
@@ -148,18 +81,18 @@ class ClientSpec(Part):
     on: RobotName | None = None
     lockstep: bool = False
     rate_hz: Rate | None = Field(default=None, alias="rate")
-    offset_ns: Offset = _default("0 s", "offset")
+    offset_ns: Offset = default("0 s", "offset")
 
 
-class Capture(Part):
+class Capture(SpecBase):
     """How much of a run the capture keeps beside its packets, orders and digests."""
 
-    frames_every: Annotated[int, Quantity(units.TICKS, "1 tick", "1000000 ticks")] = _default("10 ticks")
-    poses_hz: Rate = _default("50 Hz", "poses")
-    flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = _default("100 ms", "flush")
+    frames_every: Annotated[int, Quantity(units.TICKS, "1 tick", "1000000 ticks")] = default("10 ticks")
+    poses_hz: Rate = default("50 Hz", "poses")
+    flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = default("100 ms", "flush")
     on_full: Literal["stop_world", "continue_unlogged"] = "stop_world"
     """What follows when the disk has less than the reserve left, or the capture has reached `max_bytes`."""
-    reserve_bytes: Size = _default("64 MiB", "reserve")
+    reserve_bytes: Size = default("64 MiB", "reserve")
     """Kept free on the disks of capture and journals, so that what has to be written in the end still fits."""
     bytes_max: Size | None = Field(default=None, alias="max_bytes")
     split_bytes: Size | None = Field(default=None, alias="split_size")
@@ -176,29 +109,28 @@ class Capture(Part):
         return self.split_bytes is not None or self.split_ns is not None
 
 
-class AccessSpec(Part):
-    """Who may control the run, who may look at it, and how clients prove who they are: where the run has certificates.
-    """
+class AccessSpec(SpecBase):
+    """Who may control the run, who may look at it, and how clients prove who they are: where the run has certificates."""
 
     operators: list[OperatorName] = Field(default=["admin"], max_length=limits.OPERATORS_MAX)
     viewers: list[OperatorName] = Field(default=[], max_length=limits.OPERATORS_MAX)
     radio: Literal["certificate", "password"] = "certificate"
 
 
-class Deadlines(Part):
+class Deadlines(SpecBase):
     """How long the run waits for whom, in wall time."""
 
-    heartbeat_ns: Deadline = _default("1 s", "heartbeat")
-    tick_named_ns: Deadline = _default("500 ms", "tick_named")
-    tick_lost_ns: Deadline = _default("1 s", "tick_lost")
-    lockstep_fast_ns: Deadline = _default("10 s", "lockstep_fast")
-    lockstep_realtime_ns: Deadline = _default("2 s", "lockstep_realtime")
-    start_ns: Deadline = _default("60 s", "start")
-    orphan_ns: Deadline = _default("30 s", "orphan")
+    heartbeat_ns: Deadline = default("1 s", "heartbeat")
+    tick_named_ns: Deadline = default("500 ms", "tick_named")
+    tick_lost_ns: Deadline = default("1 s", "tick_lost")
+    lockstep_fast_ns: Deadline = default("10 s", "lockstep_fast")
+    lockstep_realtime_ns: Deadline = default("2 s", "lockstep_realtime")
+    start_ns: Deadline = default("60 s", "start")
+    orphan_ns: Deadline = default("30 s", "orphan")
     """Nodes and vHub end when their supervisor has been gone for so long."""
-    vhub_back_ns: Deadline = _default("30 s", "vhub_back")
-    client_back_ns: Deadline = _default("2 s", "client_back")
-    close_ns: Deadline = _default("30 s", "close")
+    vhub_back_ns: Deadline = default("30 s", "vhub_back")
+    client_back_ns: Deadline = default("2 s", "client_back")
+    close_ns: Deadline = default("30 s", "close")
 
 
 def _int_only(value: object) -> object:
@@ -208,26 +140,16 @@ def _int_only(value: object) -> object:
     return value
 
 
-class Deployment(Part):
+class Deployment(WorldSpec):
     """A whole run: the world, who computes it, who plays in it, what lies between, and how it is recorded.
 
     The world is a football table or a hall with mobile robots: one of `table` and `hall` is given.
     """
 
     format: Annotated[Literal[1], BeforeValidator(_int_only, json_schema_input_type=Literal[1])]
-    world: Name
-    seed: Annotated[int, Field(ge=0, le=limits.COUNTER_MAX)]
-    tick_ns: Annotated[int, Quantity(units.TIME, "0.1 ms", "100 ms")] = Field(alias="tick")
-    substeps: Annotated[int, Field(ge=1, le=64)]
-    engine: Literal["bullet", "pure"]
     pace: PaceField
     mixed_cpu: bool = False
     on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
-    table_: Table | None = Field(default=None, alias="table")
-    hall_: Hall | None = Field(default=None, alias="hall")
-    assets: AssetFolder = "."
-    scenery: dict[Name, Scenery] = Field(default={}, max_length=SCENERY_MAX)
-    robots: dict[RobotName, Robot] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     listen: Listen = LOOPBACK
     hosts: dict[Name, Host] = Field(default={}, max_length=limits.NODES_MAX)
     nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)
@@ -238,57 +160,16 @@ class Deployment(Part):
     capture: Capture = Field(default_factory=Capture)
     access: AccessSpec = Field(default_factory=AccessSpec)
     deadlines: Deadlines = Field(default_factory=Deadlines)
-    _contents: Contents = PrivateAttr(default_factory=Contents)
 
-    @property
-    def is_hall(self) -> bool:
-        """Whether the world is a hall with mobile robots; else it is a football table."""
-        return self.hall_ is not None
-
-    @property
-    def table(self) -> Table:
-        """The football table of a world that is one."""
-        assert self.table_ is not None, "this world has no table"
-        return self.table_
-
-    @property
-    def hall(self) -> Hall:
-        """The hall of a world that is one."""
-        assert self.hall_ is not None, "this world is no hall"
-        return self.hall_
-
-    def with_assets(self, files: Mapping[str, bytes]) -> "Deployment":
-        """The same with the contents of the files that its scenery names; raises AssetError."""
-        deployment = self.model_copy()
-        deployment._contents = read_contents(self.scenery, files, network_files(self.network))
+    def with_assets(self, files: Mapping[str, bytes]) -> Self:
+        """The same with the contents of the files that scenery and network name; raises AssetError."""
+        deployment = self.with_contents(read_contents(self.scenery, files, network_files(self.network)))
         check_files(self.network, files)
         return deployment
 
     def files(self) -> dict[str, str | None]:
         """The files that it names, by path, each with the digest that is written beside it."""
         return mesh_files(self.scenery) | network_files(self.network)
-
-    @property
-    def asset_files(self) -> Mapping[str, bytes]:
-        """The contents of the files that it was given, by path."""
-        return self._contents.files
-
-    def file_with(self, digest: str) -> bytes | None:
-        """The content of the file with this digest (hex), of those that it was given."""
-        return self._contents.by_digest.get(digest)
-
-    def mesh_of(self, thing: str) -> Mesh | None:
-        """The triangles of a thing of the scenery that is a mesh, None as long as its file was not given."""
-        return self._contents.meshes.get(thing)
-
-    def scenery_shapes(self) -> list[Shape]:
-        """The scenery beside table or hall, in name order; files that its meshes are in were given."""
-        meshes = self._contents.meshes
-        return [scenery_shape(name, thing, meshes.get(name)) for name, thing in sorted(self.scenery.items())]
-
-    def open_meshes(self) -> list[str]:
-        """The things of the scenery that are walls without a thickness; files that its meshes are in were given."""
-        return open_meshes(self.scenery, self._contents.meshes)
 
     def endpoints(self) -> list[str]:
         """The names that packets go from and to, sorted: robots, players and clients."""
@@ -338,14 +219,6 @@ class Deployment(Part):
         """The node of each robot at the start, in the robots' name order."""
         owner = {robot: node for node, spec in self.nodes.items() for robot in spec.robots}
         return dict(sorted(owner.items()))
-
-    def ticks(self, rate_hz: Fraction) -> int:
-        """The period of a rate in ticks of this deployment."""
-        return period_ticks(rate_hz, self.tick_ns)
-
-    def turns(self, timed: Sensor | Player) -> tuple[int, int]:
-        """Period and offset, in ticks, of a sensor or of a player in lockstep: its ticks are offset + n periods."""
-        return self.ticks(timed.rate_hz), timed.offset_ns // self.tick_ns
 
 
 def deployment_schema() -> dict[str, Any]:

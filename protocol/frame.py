@@ -16,16 +16,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.protocol import codec, messages
 from foosim.protocol.errors import Malformed
-from foosim.protocol.layout import ADDABLE, BALL, ROBOTS, WORLD, Entity, Layout
+from foosim.protocol.layout import WORLD, Entity, Layout
+from foosim.protocol.robot_packets import Outbox
 
 assert sys.byteorder == "little", "numbers travel as raw little-endian float64"
 
 CHAIN_START: Final = bytes(32)
 _TICK = struct.Struct("<Q")
 _OUTBOX = struct.Struct("<QI")
-_NO_EDITS: Final = codec.encode([])
 
 
 class Frame:
@@ -76,8 +75,8 @@ class Frame:
         return hasher.digest()
 
     @property
-    def outbox_items(self) -> list[messages.Outbox]:
-        return [messages.Outbox(index, packets) for index, packets in self.outboxes.items()]
+    def outbox_items(self) -> list[Outbox]:
+        return [Outbox(index, packets) for index, packets in self.outboxes.items()]
 
     @property
     def score(self) -> tuple[int, int] | None:
@@ -88,7 +87,7 @@ class Frame:
         return int(red), int(blue)
 
 
-def frame_from_bytes(tick: int, layout: Layout, values: bytes, outboxes: Sequence[messages.Outbox]) -> Frame:
+def frame_from_bytes(tick: int, layout: Layout, values: bytes, outboxes: Sequence[Outbox]) -> Frame:
     """Return the frame that a message carries, or raise `Malformed` when its size is not the layout's."""
     if len(values) != 8 * layout.size:
         raise Malformed(f"{len(values)} bytes of values, the layout has {8 * layout.size}")
@@ -98,63 +97,6 @@ def frame_from_bytes(tick: int, layout: Layout, values: bytes, outboxes: Sequenc
     return Frame(tick, layout, np.frombuffer(values), {outbox.index: outbox.packets for outbox in outboxes})
 
 
-def edits_content(edits: Sequence[messages.Edit]) -> bytes:
-    """Return the content of an order without its epoch."""
-    return codec.encode(list(edits)) if edits else _NO_EDITS
-
-
-def basis_of(digest: bytes, edits: Sequence[messages.Edit], deliveries: bytes) -> bytes:
-    """Return the BLAKE2b of what tick k is computed from: D(k), the content of order k, the deliveries' bytes."""
-    hasher = blake2b(digest, digest_size=32)
-    content = edits_content(edits)
-    hasher.update(_TICK.pack(len(content)) + content)
-    hasher.update(deliveries)
-    return hasher.digest()
-
-
 def chain_next(chain: bytes, digest: bytes) -> bytes:
     """Return the chain over one more frame: BLAKE2b(chain + frame digest)."""
     return blake2b(chain + digest, digest_size=32).digest()
-
-
-def fitting_edits(layout: Layout, edits: Sequence[messages.Edit]) -> list[messages.Edit]:
-    """Return the edits that do something to a world with this layout, in their order.
-
-    An addition of a name that is taken or to a world without a table, the removal of what was not added, a push of what
-    is no free body and a freeze of what is no robot change nothing, and what happens to the network is the vHub's: a
-    function of the order alone, the same for all who read it.
-    """
-    models = dict(layout.models)
-    addable = ADDABLE if WORLD in layout else frozenset[str]()
-    fitting: list[messages.Edit] = []
-    for edit in edits:
-        if isinstance(edit, messages.Disrupt):
-            continue
-        if isinstance(edit, messages.Add):
-            if edit.name in models or edit.model not in addable:
-                continue
-            models[edit.name] = edit.model
-        elif isinstance(edit, messages.Remove):
-            if edit.name == BALL or models.get(edit.name) not in ADDABLE:
-                continue
-            del models[edit.name]
-        elif isinstance(edit, messages.Freeze | messages.Thaw):
-            if models.get(edit.name) not in ROBOTS:
-                continue
-        elif models.get(edit.name) not in ADDABLE:
-            continue
-        fitting.append(edit)
-    return fitting
-
-
-def layout_after(layout: Layout, edits: Sequence[messages.Edit]) -> Layout:
-    """Return the layout of frame k+1 when order k carries `edits`."""
-    if not edits:
-        return layout
-    models = dict(layout.models)
-    for edit in fitting_edits(layout, edits):
-        if isinstance(edit, messages.Add):
-            models[edit.name] = edit.model
-        elif isinstance(edit, messages.Remove):
-            del models[edit.name]
-    return layout if models == layout.models else Layout(models, layout.sensors)

@@ -8,7 +8,7 @@ Neighbours: deployment.py, which holds one `Hall`; `hall_scene`, which builds th
 from typing import Annotated
 
 from foosim.protocol import units
-from foosim.protocol.table import Length, Part
+from foosim.protocol.spec_base import Length, SpecBase
 from foosim.protocol.units import Quantity
 
 Side = Annotated[float, Quantity(units.LENGTH, "1 m", "1000 m")]
@@ -21,14 +21,14 @@ Drag = Annotated[float, Quantity(units.FORCE, "0 N", "10 kN")]
 Voltage = Annotated[float, Quantity(units.VOLTAGE, "0 V", "1 kV")]
 
 
-class HallWalls(Part):
+class HallWalls(SpecBase):
     """The walls around the hall: height above the floor, thickness outwards."""
 
     height: Length
     thickness: Length
 
 
-class RoverDrive(Part):
+class RoverDrive(SpecBase):
     """Two driven wheels, `track` apart: greatest speed and acceleration of their rims.
 
     A wheel rolls less far than it turns, each by a share of its own between none and `slip`.
@@ -40,7 +40,7 @@ class RoverDrive(Part):
     slip: Slip
 
 
-class RoverBattery(Part):
+class RoverBattery(SpecBase):
     """What a rover lives on: `idle` power always, and `drag` times the way of its wheels; the voltage falls evenly."""
 
     capacity: Capacity
@@ -50,7 +50,7 @@ class RoverBattery(Part):
     empty: Voltage
 
 
-class Rover(Part):
+class Rover(SpecBase):
     """A round rover on two wheels; its antenna stands on its middle, `antenna_height` above the floor."""
 
     radius: Length
@@ -60,7 +60,7 @@ class Rover(Part):
     battery: RoverBattery
 
 
-class Station(Part):
+class Station(SpecBase):
     """A base station: round, with an antenna; it charges every rover whose middle is within `charge_radius`."""
 
     radius: Length
@@ -70,7 +70,7 @@ class Station(Part):
     charge_power: Load
 
 
-class Hall(Part):
+class Hall(SpecBase):
     """The whole hall: its bounds, which are walls, and what its rovers and base stations are like."""
 
     length: Side

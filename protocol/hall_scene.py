@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from foosim.protocol.deployment import Deployment, RoverRobot, StationRobot
 from foosim.protocol.hall import Hall, Rover, Station
 from foosim.protocol.layout import Layout
 from foosim.protocol.radio_materials import CONCRETE, METAL, PLASTIC
+from foosim.protocol.rovers import RoverRobot, StationRobot
 from foosim.protocol.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Scene, Shape, Vector
+from foosim.protocol.world_spec import WorldSpec
 
 GREY: Final[Colour] = (0.62, 0.62, 0.60, 1.0)
 PALE: Final[Colour] = (0.80, 0.80, 0.78, 1.0)
@@ -22,17 +23,17 @@ FLOOR_THICKNESS_M: Final = 0.2
 MAST_RADIUS_M: Final = 0.01
 
 
-def hall_scene(deployment: Deployment, layout: Layout) -> Scene:
+def hall_scene(spec: WorldSpec, layout: Layout) -> Scene:
     """Return the scene of a layout's robots in the deployment's hall."""
-    hall = deployment.hall
+    hall = spec.hall
     bodies = {}
     for entity in layout.entities:
-        robot = deployment.robots[entity.name]
+        robot = spec.robots[entity.name]
         if isinstance(robot, RoverRobot):
             bodies[entity.name] = _rover_body(hall.rover, entity.name)
         elif isinstance(robot, StationRobot):
             bodies[entity.name] = _station_body(hall.station, entity.name, robot)
-    return Scene(bodies, (*hall_scenery(hall), *deployment.scenery_shapes()))
+    return Scene(bodies, (*hall_scenery(hall), *spec.scenery_shapes()))
 
 
 def hall_scenery(hall: Hall) -> tuple[Shape, ...]:

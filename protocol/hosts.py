@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import AfterValidator, Field, StringConstraints
 
-from foosim.protocol import limits, names
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.errors import BadValue
-from foosim.protocol.table import Part
+from foosim.protocol.spec_base import Name, SpecBase
 from foosim.protocol.units import custom_error
 
 if TYPE_CHECKING:
@@ -27,7 +26,6 @@ FOLDER_PATTERN: Final = r"^/[^\x00-\x1f\x7f]*$"
 OPTION_PATTERN: Final = r"^[^\x00-\x1f\x7f]+$"
 SSH_OPTIONS_MAX: Final = 32
 
-Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 Folder = Annotated[str, StringConstraints(pattern=FOLDER_PATTERN, max_length=400)]
 SshOption = Annotated[str, StringConstraints(pattern=OPTION_PATTERN, max_length=400)]
 
@@ -44,7 +42,7 @@ Listen = Annotated[str, StringConstraints(max_length=300), AfterValidator(_check
 """Where the supervisor listens: HOST[:PORT]."""
 
 
-class Host(Part):
+class Host(SpecBase):
     """A machine: where others reach it, how ssh does (by default at that address), its labels, where foosim is on it.
 
     `commands` is the folder that has foosim's commands; by default they are found on the PATH of a login by ssh. `pki`
@@ -64,7 +62,7 @@ class Host(Part):
         return self.ssh or self.address.strip("[]")
 
 
-class Placed(Part):
+class Placed(SpecBase):
     """What runs on a host: on the one named, or on one that has the label; by default on the supervisor's machine."""
 
     host: Name | None = None

@@ -6,7 +6,7 @@ Neighbours: `messages` has what they share, `supervisor.branches` decides, `vhub
 from __future__ import annotations
 
 from foosim.protocol.message_types import Counter, Digest, Message, Name, Numbers
-from foosim.protocol.messages import Added
+from foosim.protocol.start import Added
 
 
 class Standing(Message, frozen=True):

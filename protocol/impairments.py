@@ -9,9 +9,8 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, JsonValue
 
 from foosim.protocol import units
-from foosim.protocol.hosts import Name
 from foosim.protocol.scenery import AssetPath, Digest
-from foosim.protocol.table import Part
+from foosim.protocol.spec_base import Name, SpecBase, default
 from foosim.protocol.units import Quantity
 
 Delay = Annotated[int, Quantity(units.TIME, "0 s", "60 s")]
@@ -24,11 +23,6 @@ Bytes = Annotated[int, Quantity(units.SIZE, "0 B", "1 GiB")]
 ErrorRate = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
 
 
-def default(text: str, alias: str | None = None) -> Any:
-    """A field with a default that is written, checked and documented as in a file."""
-    return Field(default=text, alias=alias, validate_default=True)
-
-
 # --- jitter: what is added to the constant delay, never negative ------------------------------------------------------
 
 
@@ -36,7 +30,7 @@ def _mean_is_sd(data: dict[str, Any]) -> int:
     return int(data["sd_ns"])
 
 
-class GammaJitter(Part):
+class GammaJitter(SpecBase):
     """Gamma distributed: skewed to the right, from 0."""
 
     shape: Literal["gamma"]
@@ -44,14 +38,14 @@ class GammaJitter(Part):
     mean_ns: Spread = Field(alias="mean", default_factory=_mean_is_sd)
 
 
-class UniformJitter(Part):
+class UniformJitter(SpecBase):
     """Anything from 0 to `width`, equally likely."""
 
     shape: Literal["uniform"]
     width_ns: Spread = Field(alias="width")
 
 
-class LognormalJitter(Part):
+class LognormalJitter(SpecBase):
     """The exponential of a normal number: a heavier tail than gamma."""
 
     shape: Literal["lognormal"]
@@ -59,7 +53,7 @@ class LognormalJitter(Part):
     mean_ns: Spread = Field(alias="mean", default_factory=_mean_is_sd)
 
 
-class ShiftedExponentialJitter(Part):
+class ShiftedExponentialJitter(SpecBase):
     """The greater of `min` and an exponential number with the mean `mean` (TigerBeetle's packet simulator)."""
 
     shape: Literal["shifted_exp"]
@@ -70,7 +64,7 @@ class ShiftedExponentialJitter(Part):
 PARETO_MAX: Final = "10 s"
 
 
-class ParetoJitter(Part):
+class ParetoJitter(SpecBase):
     """A Lomax (Pareto II) distribution from 0, cut at `max`, with the mean `mean`: `alpha` above 1 is its tail."""
 
     shape: Literal["pareto"]
@@ -79,7 +73,7 @@ class ParetoJitter(Part):
     max_ns: Spread = default(PARETO_MAX, "max")
 
 
-class Component(Part):
+class Component(SpecBase):
     """One part of a mixture: uniform between `from` and `to`, chosen with the probability `share`."""
 
     share: Probability
@@ -87,14 +81,14 @@ class Component(Part):
     to_ns: Delay = Field(alias="to")
 
 
-class MixtureJitter(Part):
+class MixtureJitter(SpecBase):
     """Uniform parts with shares that add up to 100 %, as a usual delay and a rare long one."""
 
     shape: Literal["mixture"]
     parts: list[Component] = Field(min_length=1, max_length=16)
 
 
-class TableJitter(Part):
+class TableJitter(SpecBase):
     """Quantiles from a file in netem's form: whitespace separated integers, 8192 a standard deviation; below 0 is 0."""
 
     shape: Literal["table"]
@@ -119,7 +113,7 @@ Jitter = Annotated[
 # --- loss in bursts ---------------------------------------------------------------------------------------------------
 
 
-class ParetoDwell(Part):
+class ParetoDwell(SpecBase):
     """Heavy-tailed lengths of bad times: Pareto with the tail `alpha`, cut at `max`, with the mean of `mean_bad`."""
 
     alpha: Annotated[float, Field(ge=1.01, le=10.0)]
@@ -129,7 +123,7 @@ class ParetoDwell(Part):
 BURST_MAX: Final = 1e6
 
 
-class Burst(Part):
+class Burst(SpecBase):
     """Gilbert-Elliott by what it does: `loss` is the mean loss, `mean_bad` the mean length of a bad time.
 
     `mean_bad` is a time: all flows on a link see the same outages, whatever their rate. `mean_burst` instead counts
@@ -144,7 +138,7 @@ class Burst(Part):
     dwell: ParetoDwell | None = None
 
 
-class GilbertElliott(Part):
+class GilbertElliott(SpecBase):
     """Gilbert-Elliott packet by packet: good to bad with `p`, back with `r`; delivered with `k` in good, `h` in bad."""
 
     p: Share
@@ -153,7 +147,7 @@ class GilbertElliott(Part):
     k: Probability = default("100 %")
 
 
-class Markov4(Part):
+class Markov4(SpecBase):
     """Four states packet by packet (Salsano et al.): 1 good, 3 bad, 4 a loss within good, 2 a delivery within bad."""
 
     p13: Probability
@@ -163,7 +157,7 @@ class Markov4(Part):
     p14: Probability = default("0 %")
 
 
-class Outages(Part):
+class Outages(SpecBase):
     """The link is cut for times that come and go by themselves, as a mobile network's: exponential on and off."""
 
     mean_on_ns: Dwell = Field(alias="mean_on")
@@ -173,7 +167,7 @@ class Outages(Part):
 # --- rate, queue, errors, copies --------------------------------------------------------------------------------------
 
 
-class Queue(Part):
+class Queue(SpecBase):
     """What waits before it is sent: at most so many packets and bytes, for at most so long; `codel` drops early."""
 
     packets: Annotated[int, Field(ge=1, le=1_000_000)] = 1000
@@ -184,21 +178,21 @@ class Queue(Part):
     codel_interval_ns: Spread = default("100 ms", "codel_interval")
 
 
-class Corrupt(Part):
+class Corrupt(SpecBase):
     """Bit errors: a packet with one is lost (`crc_fail`), or delivered with its bits flipped when `deliver` is set."""
 
     bit_error_rate: ErrorRate
     deliver: bool = False
 
 
-class Reorder(Part):
+class Reorder(SpecBase):
     """Some packets come later by `extra`: those behind them overtake."""
 
     probability: Probability
     extra_ns: Spread = Field(alias="extra")
 
 
-class Trace(Part):
+class Trace(SpecBase):
     """The link's capacity from a file in mahimahi's form: each line a time in ms at which 1500 bytes can leave."""
 
     file: AssetPath
@@ -206,7 +200,7 @@ class Trace(Part):
     digest: Digest | None = None
 
 
-class Impairments(Part):
+class Impairments(SpecBase):
     """What a link does beside radio and geometry."""
 
     delay_ns: Delay = default("0 s", "delay")
@@ -234,7 +228,7 @@ class Impairments(Part):
     """Whether packets may pass at all; else they are `filtered`."""
 
 
-class OwnModel(Part):
+class OwnModel(SpecBase):
     """A link model of one's own, which a package gives that is installed where the vHub runs, and its parameters."""
 
     name: Name

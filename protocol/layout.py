@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from hashlib import blake2b
 from typing import Final
 
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import AddedEntity
+from foosim.protocol.world_spec import WorldSpec
 
 WORLD: Final = "world"
 """Name of a table's entity that has no body: score and the rules' memory."""
@@ -143,23 +142,17 @@ class Layout:
         return self._digest
 
 
-def build_layout(deployment: Deployment, added: Iterable[tuple[str, str]] = ()) -> Layout:
+def build_layout(spec: WorldSpec, added: Iterable[tuple[str, str]] = ()) -> Layout:
     """Return the layout of a deployment's world with `added` (name, model) entities, or raise `Malformed`."""
-    models = {} if deployment.is_hall else {BALL: "ball", WORLD: "world"}
+    models = {} if spec.is_hall else {BALL: "ball", WORLD: "world"}
     sensors: dict[str, Sequence[str]] = {}
-    for name, robot in deployment.robots.items():
+    for name, robot in spec.robots.items():
         models[name] = robot.model
         sensors[name] = tuple(robot.sensors)
     for name, model in added:
-        if deployment.is_hall:
+        if spec.is_hall:
             raise Malformed(f"{model} {name} cannot be added: nothing can be to a hall")
         if model not in ADDABLE or name in models:
             raise Malformed(f"{model} {name} cannot be added: {' or '.join(sorted(ADDABLE))} with a free name can be")
         models[name] = model
     return Layout(models, sensors)
-
-
-def added_entities(deployment: Deployment, layout: Layout) -> list[AddedEntity]:
-    """Return the entities of a layout beside the deployment's."""
-    base = build_layout(deployment)
-    return [AddedEntity(entity.name, entity.model) for entity in layout.entities if entity.name not in base]

@@ -14,54 +14,10 @@ from typing import Annotated, Final
 from msgspec import Meta, field
 
 from foosim.protocol import limits
-from foosim.protocol.message_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text, Vector
-
-# --- what changes the world: the edits of an order -------------------------------------------------------------------
-
-
-class Add(Message, frozen=True):
-    """Add entity `name` of `model` at `position` (m, world frame) with `velocity` (m/s)."""
-
-    name: Name
-    model: Name
-    position: Vector
-    velocity: Vector
-
-
-class Remove(Message, frozen=True):
-    """Remove an entity that was added."""
-
-    name: Name
-
-
-class Push(Message, frozen=True):
-    """Give a free body an `impulse` (N s, world frame) at its centre of mass."""
-
-    name: Name
-    impulse: Vector
-
-
-class Freeze(Message, frozen=True):
-    """Take a robot out of service: it holds still, senses nothing, and no packet reaches it (`down` in the frame)."""
-
-    name: Name
-
-
-class Thaw(Message, frozen=True):
-    """Put a robot that was frozen back into service."""
-
-    name: Name
-
-
-class Disrupt(Message, frozen=True):
-    """Do to the network what `event` (JSON as in a deployment, without a time) says: order k's, from frame k+1 on."""
-
-    event: Annotated[str, Meta(max_length=limits.EVENT_BYTES_MAX)]
-
-
-Edit = Add | Remove | Push | Freeze | Thaw | Disrupt
-Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
-
+from foosim.protocol.edits import Edits
+from foosim.protocol.message_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text
+from foosim.protocol.robot_packets import Delivered, Outboxes, RobotPacket
+from foosim.protocol.start import Added, Origin
 
 # --- simulation plane: the tick --------------------------------------------------------------------------------------
 
@@ -73,18 +29,6 @@ class Order(Message, frozen=True):
     tick: Counter
     edits: Edits
     following: Annotated[int, Meta(ge=0, le=limits.KEPT_TICKS)] = 0
-
-
-class Delivered(Item, frozen=True):
-    """One packet that reaches a robot."""
-
-    due_ns: Counter
-    source: Name
-    sequence: Counter
-    copy: Counter
-    destination: Name
-    channel: Name
-    payload: Payload
 
 
 class Deliveries(Message, frozen=True):
@@ -104,16 +48,6 @@ class Deliveries(Message, frozen=True):
         return self.tick + self.following
 
 
-class RobotPacket(Item, frozen=True):
-    """One packet that a robot sends. `destination` is empty when it goes to all who subscribe to the channel."""
-
-    robot: Name
-    index: Annotated[int, Meta(ge=0, lt=limits.ROBOT_PACKETS_PER_TICK_MAX)]
-    destination: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
-    channel: Name
-    payload: Payload
-
-
 class Samples(Message, frozen=True):
     """What the robots of `node` send at `tick`, from the frame with digest `digest`; `robots` are those it covers."""
 
@@ -122,24 +56,6 @@ class Samples(Message, frozen=True):
     node: Name
     robots: Names
     packets: Annotated[list[RobotPacket], Meta(max_length=limits.PACKETS_PER_MESSAGE_MAX)]
-
-
-class OutboxPacket(Item, frozen=True):
-    """One packet that waits in a robot's outbox for the next tick."""
-
-    destination: Name
-    channel: Name
-    payload: Payload
-
-
-class Outbox(Item, frozen=True):
-    """The bytes in the outbox of the entity at `index` of the layout; entities with an empty one are left out."""
-
-    index: Counter
-    packets: Annotated[bytes, Meta(min_length=1, max_length=limits.OUTBOX_BYTES_MAX)]
-
-
-Outboxes = Annotated[list[Outbox], Meta(max_length=limits.ENTITIES_MAX)]
 
 
 class Part(Message, frozen=True):
@@ -231,30 +147,10 @@ class Hello(Message, frozen=True, tag="hello"):
     fingerprint: Digest
 
 
-class AddedEntity(Item, frozen=True):
-    """An entity that is in the layout beside those of the deployment."""
-
-    name: Name
-    model: Name
-
-
-Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
-
-
 class Recall(Message, frozen=True):
     """The supervisor, started as `boot`, does not know a process that takes part: who knows another one says hello."""
 
     boot: Name
-
-
-class Origin(Item, frozen=True):
-    """Where a run begins that does not begin anew: at frame `tick` of `source`, with that frame's digest and the chain
-    over all frames up to it."""
-
-    tick: Counter
-    source: Text
-    digest: Digest
-    chain: Digest
 
 
 class Build(Message, frozen=True):

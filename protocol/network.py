@@ -16,10 +16,9 @@ from pydantic import BeforeValidator, Field, PlainValidator, StringConstraints
 
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
-from foosim.protocol.hosts import Name
-from foosim.protocol.impairments import Delay, Impairments, LinkSettings, default
+from foosim.protocol.impairments import Delay, Impairments, LinkSettings
 from foosim.protocol.radios import PresetName, Radio, Site
-from foosim.protocol.table import Part
+from foosim.protocol.spec_base import Name, SpecBase, default
 from foosim.protocol.units import Quantity, custom_error
 
 LINK_RULES_MAX: Final = 512
@@ -107,7 +106,7 @@ def _groups(value: object) -> object:
     return value
 
 
-class Clog(Part):
+class Clog(SpecBase):
     """What goes from one to the other waits until the clog is over."""
 
     from_: Selectors = Field(alias="from")
@@ -120,7 +119,7 @@ class Change(Impairments):
     link: Name
 
 
-class Chaos(Part):
+class Chaos(SpecBase):
     """Random delays, loss, copies, clogs and partitions on all links between the selected endpoints, drawn by seed.
 
     The ranges are those of TigerBeetle's simulator (src/vopr.zig).
@@ -130,7 +129,7 @@ class Chaos(Part):
     among: Selectors = default("*")
 
 
-class Event(Part):
+class Event(SpecBase):
     """Something that happens to the network `at` a simulated time: exactly one of the actions is written.
 
     Partitions and clogs last `for` a time or `until` one, else to the next heal; chaos needs an end. With `symmetric`
@@ -156,7 +155,7 @@ def event_of(text: str, at_ns: int) -> Event:
 ACTIONS: Final = ("partition", "clog", "set", "chaos", "heal")
 
 
-class Defaults(Part):
+class Defaults(SpecBase):
     """What holds where nothing else is written."""
 
     preset: PresetName = "perfect"
@@ -168,7 +167,7 @@ class Defaults(Part):
     Without it all that is sent at one tick is sent at the same instant, and contends."""
 
 
-class Network(Part):
+class Network(SpecBase):
     """Radios and their carriers, the rules of links, and events; a pair without rule and radio is a default link."""
 
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None

@@ -14,10 +14,10 @@ from typing import Final
 from pydantic import ValidationError
 
 from foosim.protocol import limits, units
-from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Refused, describe
 from foosim.protocol.impairments import Trace
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.network import Event, Network
 from foosim.protocol.network_references import event_findings
 from foosim.protocol.radio_references import set_findings

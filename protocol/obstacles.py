@@ -11,11 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from foosim.protocol.deployment import Deployment, StationRobot
 from foosim.protocol.hall import Hall
 from foosim.protocol.hall_scene import hall_scenery
+from foosim.protocol.rovers import StationRobot
 from foosim.protocol.scene import Box, Cylinder, Shape, rotate, shape_box
 from foosim.protocol.scenery import scenery_shape
+from foosim.protocol.world_spec import WorldSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,22 +59,22 @@ class Circle:
 Obstacle = Rectangle | Circle
 
 
-def obstacles_of(deployment: Deployment) -> tuple[Obstacle, ...]:
+def obstacles_of(spec: WorldSpec) -> tuple[Obstacle, ...]:
     """Return what stands in the way of the deployment's rovers: walls, stations, scenery."""
-    return tuple(thing for _, thing in named_obstacles(deployment))
+    return tuple(thing for _, thing in named_obstacles(spec))
 
 
-def named_obstacles(deployment: Deployment) -> Iterator[tuple[str, Obstacle]]:
+def named_obstacles(spec: WorldSpec) -> Iterator[tuple[str, Obstacle]]:
     """Yield what stands in the way, with what it is called; a mesh counts where its file was given."""
-    hall = deployment.hall
+    hall = spec.hall
     for shape in hall_scenery(hall):
         if is_in_the_way(shape, hall):
             yield "a wall of the hall", obstacle(shape)
-    for name, robot in sorted(deployment.robots.items()):
+    for name, robot in sorted(spec.robots.items()):
         if isinstance(robot, StationRobot):
             yield f"the station {name}", Circle(robot.x, robot.y, hall.station.radius)
-    for name, thing in sorted(deployment.scenery.items()):
-        mesh = deployment.mesh_of(name)
+    for name, thing in sorted(spec.scenery.items()):
+        mesh = spec.mesh_of(name)
         if thing.shape == "mesh" and mesh is None:
             continue
         shape = scenery_shape(name, thing, mesh)

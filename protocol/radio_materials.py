@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field
 from foosim.protocol import units
 from foosim.protocol.errors import BadValue
 from foosim.protocol.names import nearest_name
-from foosim.protocol.table import Length, Part
+from foosim.protocol.spec_base import Length, SpecBase
 from foosim.protocol.units import Quantity, custom_error
 
 MaterialName = Literal["concrete", "brick", "plasterboard", "wood", "glass", "chipboard", "metal"]
@@ -34,7 +34,7 @@ NONE: Final = "none"
 Loss = Annotated[float, Quantity(units.LEVEL, "0 dB", "200 dB")]
 
 
-class RadioMaterial(Part):
+class RadioMaterial(SpecBase):
     """A material (`is`), with the `thickness` of a shell where it is one, or a fixed `loss` for each crossing."""
 
     is_: MaterialName | None = Field(default=None, alias="is")

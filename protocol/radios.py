@@ -9,10 +9,9 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, model_validator
 
 from foosim.protocol import units
-from foosim.protocol.hosts import Name
-from foosim.protocol.impairments import LinkSettings, default
+from foosim.protocol.impairments import LinkSettings
 from foosim.protocol.presets import PRESETS, preset_settings
-from foosim.protocol.table import Part
+from foosim.protocol.spec_base import Name, SpecBase, default
 from foosim.protocol.units import Quantity
 
 Frequency = Annotated[float, Quantity(units.FREQUENCY, "1 kHz", "100 GHz")]
@@ -37,14 +36,14 @@ Environment = Literal[
 ]  # fmt: skip
 
 
-class Antenna(Part):
+class Antenna(SpecBase):
     """Where the antenna is: x, y, z beside that of its body, in the body's frame; and its gain in every direction."""
 
     gain_dbi: Gain = default("0 dBi", "gain")
     mount: Place = Field(default=["0 m", "0 m", "0 m"], validate_default=True)
 
 
-class PathLoss(Part):
+class PathLoss(SpecBase):
     """How a signal weakens with distance: an environment with its figures, and what bodies in between do.
 
     With `strict_los` a body in the way cuts the link (`blocked`), as for light. `range` is a hard radius.
@@ -59,7 +58,7 @@ class PathLoss(Part):
     range_m: Distance | None = Field(default=None, alias="range")
 
 
-class Shadowing(Part):
+class Shadowing(SpecBase):
     """Slow changes of the loss from place to place; by default those of the environment."""
 
     on: bool = True
@@ -67,7 +66,7 @@ class Shadowing(Part):
     correlation_m: Distance | None = Field(default=None, alias="correlation")
 
 
-class Fading(Part):
+class Fading(SpecBase):
     """Fast changes of the loss, the same within a block of `coherence`."""
 
     kind: Literal["rayleigh", "rician", "nakagami"]

@@ -10,18 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Delivered
 from foosim.protocol.names import CHANNEL_ECHO
+from foosim.protocol.robot_packets import Delivered
+from foosim.protocol.world_spec import WorldSpec
 
 
 class Sampling:
     """The ticks of all sensors of a deployment."""
 
-    def __init__(self, deployment: Deployment) -> None:
-        sensors = [sensor for robot in deployment.robots.values() for sensor in robot.sensors.values()]
-        self._turns = tuple(sorted({deployment.turns(sensor) for sensor in sensors}))
+    def __init__(self, spec: WorldSpec) -> None:
+        sensors = [sensor for robot in spec.robots.values() for sensor in robot.sensors.values()]
+        self._turns = tuple(sorted({spec.turns(sensor) for sensor in sensors}))
         """Period and offset, in ticks."""
 
     def is_due(self, tick: int) -> bool:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -20,7 +20,7 @@ from foosim.protocol.errors import BadValue
 from foosim.protocol.mesh import MESH_READERS, AssetError, Mesh, check_digest, digest_of, is_closed, read_mesh
 from foosim.protocol.radio_materials import UNKNOWN, Radio
 from foosim.protocol.scene import Box, Colour, Cylinder, Quaternion, Shape, Vector, multiply, turn
-from foosim.protocol.table import Part
+from foosim.protocol.spec_base import SpecBase, default
 from foosim.protocol.units import Quantity, custom_error
 
 PATH_LENGTH_MAX: Final = 200
@@ -84,12 +84,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 SurfaceName = Literal["floor", "walls", "goal", "ramps"]
 
 
-def _default(text: str) -> Any:
-    """A field with a default that is written, checked and documented as in a file."""
-    return Field(default=text, validate_default=True)
-
-
-class Material(Part):
+class Material(SpecBase):
     """How a thing looks, as shares of red, green and blue."""
 
     red: Share = 0.6
@@ -101,18 +96,18 @@ class Material(Part):
         return self.red, self.green, self.blue, 1.0
 
 
-class Placed(Part):
+class Placed(SpecBase):
     """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw).
 
     `surface` is what it is to a table's ball, `radio` what waves that cross it lose: 5 dB if it is not said.
     """
 
-    x: Position = _default("0 m")
-    y: Position = _default("0 m")
-    z: Position = _default("0 m")
-    roll: Turn = _default("0 deg")
-    pitch: Turn = _default("0 deg")
-    yaw: Turn = _default("0 deg")
+    x: Position = default("0 m")
+    y: Position = default("0 m")
+    z: Position = default("0 m")
+    roll: Turn = default("0 deg")
+    pitch: Turn = default("0 deg")
+    yaw: Turn = default("0 deg")
     surface: SurfaceName = "walls"
     material: Material = Field(default_factory=Material)
     radio: Radio | None = None

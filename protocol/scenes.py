@@ -5,13 +5,13 @@ Neighbours: `table_scene` and `hall_scene`, one of which makes it; `scene` (what
 
 from __future__ import annotations
 
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.hall_scene import hall_scene
 from foosim.protocol.layout import Layout
 from foosim.protocol.scene import Scene
 from foosim.protocol.table_scene import table_scene
+from foosim.protocol.world_spec import WorldSpec
 
 
-def build_scene(deployment: Deployment, layout: Layout) -> Scene:
+def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
     """Return the scene of a layout's bodies in the deployment's world."""
-    return hall_scene(deployment, layout) if deployment.is_hall else table_scene(deployment, layout)
+    return hall_scene(spec, layout) if spec.is_hall else table_scene(spec, layout)

@@ -8,17 +8,41 @@ rules of the table (`node.rules`) take it from there.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Annotated
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
-from foosim.protocol.deployment import Deployment, RoverRobot
+from foosim.protocol import limits
 from foosim.protocol.errors import BadValue, Malformed
 from foosim.protocol.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.protocol.layout import Entity, Layout, build_layout
-from foosim.protocol.message_types import Numbers
-from foosim.protocol.messages import Added, AddedEntity, Origin, Outboxes
+from foosim.protocol.message_types import Counter, Digest, Item, Name, Numbers, Text
+from foosim.protocol.robot_packets import Outboxes
+from foosim.protocol.rovers import RoverRobot
 from foosim.protocol.scene import turn
+from foosim.protocol.world_spec import WorldSpec
+
+
+class AddedEntity(Item, frozen=True):
+    """An entity that is in the layout beside those of the deployment."""
+
+    name: Name
+    model: Name
+
+
+Added = Annotated[list[AddedEntity], Meta(max_length=limits.ENTITIES_MAX)]
+
+
+class Origin(Item, frozen=True):
+    """Where a run begins that does not begin anew: at frame `tick` of `source`, with that frame's digest and the chain
+    over all frames up to it."""
+
+    tick: Counter
+    source: Text
+    digest: Digest
+    chain: Digest
 
 
 def place_ball(
@@ -37,45 +61,45 @@ def place_ball(
     numbers[entity.offsets["contacts"] + 2] = -1.0
 
 
-def place_rover(numbers: list[float], entity: Entity, deployment: Deployment) -> None:
+def place_rover(numbers: list[float], entity: Entity, spec: WorldSpec) -> None:
     """Set a rover to where it starts, standing still, charged as its deployment says."""
-    robot = deployment.robots[entity.name]
+    robot = spec.robots[entity.name]
     assert isinstance(robot, RoverRobot)
     numbers[entity.start : entity.split] = [0.0] * (entity.split - entity.start)
     start, turned = entity.offsets["position"], entity.offsets["orientation"]
     numbers[start : start + 2] = robot.x, robot.y
     numbers[turned : turned + 4] = turn((0.0, 0.0, 1.0), robot.heading)
     numbers[entity.offsets["heading"]] = robot.heading
-    numbers[entity.offsets["charge"]] = robot.charge * deployment.hall.rover.battery.capacity
+    numbers[entity.offsets["charge"]] = robot.charge * spec.hall.rover.battery.capacity
 
 
-def kickoff_ticks(deployment: Deployment) -> int:
+def kickoff_ticks(spec: WorldSpec) -> int:
     """Return how many ticks a ball rests at the kick-off spot."""
-    return max(1, deployment.table.rules.kickoff_delay_ns // deployment.tick_ns)
+    return max(1, spec.table.rules.kickoff_delay_ns // spec.tick_ns)
 
 
-def kickoff_spot(deployment: Deployment) -> tuple[float, float, float]:
-    return 0.0, 0.0, deployment.table.ball.radius
+def kickoff_spot(spec: WorldSpec) -> tuple[float, float, float]:
+    return 0.0, 0.0, spec.table.ball.radius
 
 
-def initial_numbers(deployment: Deployment, layout: Layout) -> list[float]:
+def initial_numbers(spec: WorldSpec, layout: Layout) -> list[float]:
     """Return the numbers of a world at rest: rods centred, figures down, the ball at the kick-off spot; or rovers
     where the deployment says."""
     numbers = [0.0] * layout.size
     for entity in layout.rovers:
-        place_rover(numbers, entity, deployment)
+        place_rover(numbers, entity, spec)
     for entity in layout.rods:
         numbers[entity.offsets["contacts"] + 2] = -1.0
     for entity in layout.balls:
-        place_ball(numbers, entity, kickoff_spot(deployment))
-        numbers[entity.offsets["wait_ticks"]] = float(kickoff_ticks(deployment))
+        place_ball(numbers, entity, kickoff_spot(spec))
+        numbers[entity.offsets["wait_ticks"]] = float(kickoff_ticks(spec))
     return numbers
 
 
-def initial_frame(deployment: Deployment) -> Frame:
+def initial_frame(spec: WorldSpec) -> Frame:
     """Return frame 0."""
-    layout = build_layout(deployment)
-    return Frame(0, layout, np.array(initial_numbers(deployment, layout)))
+    layout = build_layout(spec)
+    return Frame(0, layout, np.array(initial_numbers(spec, layout)))
 
 
 class Start(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -97,15 +121,15 @@ def start_with(frame: Frame, source: str, chain: bytes, added: Iterable[AddedEnt
     return Start(origin, frame.values.tobytes(), frame.outbox_items, list(added))
 
 
-def first_frame(deployment: Deployment, start: Start | None) -> Frame:
+def first_frame(spec: WorldSpec, start: Start | None) -> Frame:
     """Return the frame that a run begins with.
 
     Raises BadValue for a start whose frame does not fit the deployment.
     """
     if start is None:
-        return initial_frame(deployment)
+        return initial_frame(spec)
     try:
-        layout = build_layout(deployment, [(entity.name, entity.model) for entity in start.added])
+        layout = build_layout(spec, [(entity.name, entity.model) for entity in start.added])
         frame = frame_from_bytes(start.origin.tick, layout, start.values, start.outboxes)
     except Malformed as error:
         raise BadValue(f"the frame to begin with does not fit the deployment: {error}", start.origin.source) from None
@@ -114,9 +138,9 @@ def first_frame(deployment: Deployment, start: Start | None) -> Frame:
     return frame
 
 
-def added_to(deployment: Deployment, layout: Layout) -> list[AddedEntity]:
+def added_to(spec: WorldSpec, layout: Layout) -> list[AddedEntity]:
     """Return the entities of a layout beside the deployment's."""
-    base = build_layout(deployment)
+    base = build_layout(spec)
     return [AddedEntity(entity.name, entity.model) for entity in layout.entities if entity.name not in base]
 
 

@@ -7,58 +7,50 @@ Neighbours: deployment.py, which holds one `Table`; the engines and `scene`, whi
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from foosim.protocol import units
 from foosim.protocol.names import LineName
+from foosim.protocol.spec_base import (
+    Coefficient,
+    Force,
+    Gain,
+    Gravity,
+    Length,
+    LengthOrNone,
+    Mass,
+    Position,
+    Restitution,
+    RuleTime,
+    SpecBase,
+    Speed,
+    Spin,
+    Torque,
+)
 from foosim.protocol.units import Quantity
 
-Gravity = Annotated[float, Quantity(units.ACCELERATION, "0 m/s2", "100 m/s2")]
-Length = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "10 m")]
-LengthOrNone = Annotated[float, Quantity(units.LENGTH, "0 m", "10 m")]
-Position = Annotated[float, Quantity(units.LENGTH, "-10 m", "10 m")]
-Mass = Annotated[float, Quantity(units.MASS, "1 mg", "100 kg")]
-Speed = Annotated[float, Quantity(units.SPEED, "0 m/s", "100 m/s")]
-Spin = Annotated[float, Quantity(units.SPIN, "0 rad/s", "1000 rad/s")]
-Force = Annotated[float, Quantity(units.FORCE, "0 N", "10 kN")]
-Torque = Annotated[float, Quantity(units.TORQUE, "0 N m", "1000 N m")]
-Gain = Annotated[float, Field(ge=0, le=10_000)]
-Coefficient = Annotated[float, Field(ge=0, le=10)]
-Restitution = Annotated[float, Field(ge=0, le=1)]
-RuleTime = Annotated[int, Quantity(units.TIME, "0 s", "1 h")]
 
-
-class Part(BaseModel):
-    """Base of all models of the deployment: unknown keys are refused, types are not guessed, values do not change.
-
-    A model's validator is built when it is first used: each process would otherwise build some eighty that are parts of
-    the deployment's, when it starts.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
-
-
-class Playfield(Part):
+class Playfield(SpecBase):
     """The playing field between the walls: length along x, width along y."""
 
     length: Length
     width: Length
 
 
-class Floor(Part):
+class Floor(SpecBase):
     """The floor under the field; its upper face is z = 0."""
 
     thickness: Length
 
 
-class Walls(Part):
+class Walls(SpecBase):
     """The walls around the field: height above the floor, thickness outwards."""
 
     height: Length
     thickness: Length
 
 
-class Goal(Part):
+class Goal(SpecBase):
     """Either goal: an opening in the middle of an end wall, with a pocket behind it."""
 
     width: Length
@@ -66,14 +58,14 @@ class Goal(Part):
     depth: Length
 
 
-class Ramps(Part):
+class Ramps(SpecBase):
     """The four corner ramps: right triangles in plan, both legs `leg` long, rising to `height` in the corner."""
 
     height: LengthOrNone
     leg: LengthOrNone
 
 
-class Surface(Part):
+class Surface(SpecBase):
     """What the ball feels of a surface: values of the pair, rolling friction as a length."""
 
     restitution: Restitution
@@ -81,14 +73,14 @@ class Surface(Part):
     rolling_friction: LengthOrNone
 
 
-class BallSurface(Part):
+class BallSurface(SpecBase):
     """What a ball feels of another ball. Not 0: engines take a pair's values as products of both sides'."""
 
     restitution: Annotated[float, Field(ge=0.01, le=1)]
     friction: Annotated[float, Field(ge=0.01, le=10)]
 
 
-class Surfaces(Part):
+class Surfaces(SpecBase):
     """The ball against each kind of body, and against another ball."""
 
     floor: Surface
@@ -100,7 +92,7 @@ class Surfaces(Part):
     balls: BallSurface
 
 
-class Ball(Part):
+class Ball(SpecBase):
     """A solid sphere. Its speed limit, a promise of the model, bounds how far it can get in a tick."""
 
     radius: Length
@@ -108,7 +100,7 @@ class Ball(Part):
     speed_limit: Annotated[float, Quantity(units.SPEED, "1 m/s", "100 m/s")]
 
 
-class Box(Part):
+class Box(SpecBase):
     """A box: length along x, width along y, height along z, of a figure that hangs straight down."""
 
     length: Length
@@ -116,7 +108,7 @@ class Box(Part):
     height: Length
 
 
-class Rod(Part):
+class Rod(SpecBase):
     """A rod with its figures. The spin inertia is computed from these parts."""
 
     radius: Length
@@ -132,7 +124,7 @@ class Rod(Part):
     body: Box
 
 
-class Line(Part):
+class Line(SpecBase):
     """One of a team's four lines: where its rod stands for red (blue's is mirrored) and what is on it."""
 
     x: Position
@@ -141,7 +133,7 @@ class Line(Part):
     half_stroke: Length
 
 
-class SlideAxis(Part):
+class SlideAxis(SpecBase):
     """A rod's motor along y: wanted speed = gain (1/s) x error, within +-speed, at no more than the force."""
 
     speed: Speed
@@ -149,7 +141,7 @@ class SlideAxis(Part):
     gain: Gain
 
 
-class SpinAxis(Part):
+class SpinAxis(SpecBase):
     """A rod's motor around y: wanted speed = gain (1/s) x error, within +-speed, at no more than the torque."""
 
     speed: Spin
@@ -157,14 +149,14 @@ class SpinAxis(Part):
     gain: Gain
 
 
-class Drive(Part):
+class Drive(SpecBase):
     """The position drive that every rod has."""
 
     slide: SlideAxis
     spin: SpinAxis
 
 
-class Rules(Part):
+class Rules(SpecBase):
     """When the ball is kicked off, when it counts as dead, and where the world ends."""
 
     kickoff_speed: Speed
@@ -175,7 +167,7 @@ class Rules(Part):
     out_margin: Length
 
 
-class Table(Part):
+class Table(SpecBase):
     """The whole table: what is built, what it is made of, what drives it, which rules hold."""
 
     gravity: Gravity

@@ -17,9 +17,10 @@ from typing import Final
 import numpy as np
 
 from foosim.protocol.assign import line_x_m
-from foosim.protocol.deployment import Deployment, RodRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.references import Finding
+from foosim.protocol.rod import RodRobot
 from foosim.protocol.scene import Box, Cylinder, Quaternion, Shape, Vector, rotate, shape_box
 from foosim.protocol.scenery import scenery_shape
 from foosim.protocol.table_scene import ALONG_Y, figure_ys

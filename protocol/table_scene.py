@@ -11,10 +11,11 @@ from typing import Final
 
 from foosim.protocol import radio_materials
 from foosim.protocol.assign import line_x_m
-from foosim.protocol.deployment import Deployment, RodRobot
 from foosim.protocol.layout import Layout
+from foosim.protocol.rod import RodRobot
 from foosim.protocol.scene import Body, Box, Colour, Cylinder, Link, Quaternion, Scene, Shape, Sphere, Vector
 from foosim.protocol.table import Line, Table
+from foosim.protocol.world_spec import WorldSpec
 
 GREEN: Final[Colour] = (0.16, 0.45, 0.24, 1.0)
 DARK_GREEN: Final[Colour] = (0.13, 0.38, 0.20, 1.0)
@@ -43,18 +44,18 @@ _TO_CORNER: Final[dict[tuple[float, float], tuple[float, float]]] = {
 """Sine and cosine of half the angle from +x to each corner (45, 135, 225 - 360 and 315 - 360 degrees)."""
 
 
-def table_scene(deployment: Deployment, layout: Layout) -> Scene:
+def table_scene(spec: WorldSpec, layout: Layout) -> Scene:
     """Return the scene of a layout's bodies on the deployment's table."""
-    table = deployment.table
+    table = spec.table
     bodies = {}
     for entity in layout.entities:
         if entity.model == "ball":
             bodies[entity.name] = ball_body(table, entity.name)
         elif entity.model == "rod":
-            robot = deployment.robots[entity.name]
+            robot = spec.robots[entity.name]
             assert isinstance(robot, RodRobot)
-            bodies[entity.name] = _rod_body(table, entity.name, robot, line_x_m(deployment, robot))
-    return Scene(bodies, (*table_scenery(table), *deployment.scenery_shapes()))
+            bodies[entity.name] = _rod_body(table, entity.name, robot, line_x_m(spec, robot))
+    return Scene(bodies, (*table_scenery(table), *spec.scenery_shapes()))
 
 
 def ball_body(table: Table, name: str) -> Body:

@@ -11,9 +11,9 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.errors import BadValue, show
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.names import nearest_name
 from foosim.rehearsal.capture_arguments import Capture, Json, reading, time_of
 from foosim.rehearsal.diff import Diff, Difference, diff_captures

@@ -14,22 +14,12 @@ from typing import Final
 from msgspec.structs import replace
 
 from foosim.protocol import channels, limits
+from foosim.protocol.barrier import basis_of, edits_content
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import CHAIN_START, basis_of, chain_next, edits_content
-from foosim.protocol.messages import (
-    Answer,
-    Commit,
-    Deliveries,
-    Done,
-    Down,
-    Edit,
-    Epoch,
-    Go,
-    Order,
-    Part,
-    Recovered,
-)
+from foosim.protocol.edits import Edit
+from foosim.protocol.frame import CHAIN_START, chain_next
+from foosim.protocol.messages import Answer, Commit, Deliveries, Done, Down, Epoch, Go, Order, Part, Recovered
 from foosim.protocol.start import initial_frame
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.packet_laws import PacketLaws, hold

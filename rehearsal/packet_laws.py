@@ -15,7 +15,8 @@ from foosim.client.core import ClientCore
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Commit, Delivered, Deliveries, Done, Down, Go, RobotPacket, Samples, Sent
+from foosim.protocol.messages import Commit, Deliveries, Done, Down, Go, Samples, Sent
+from foosim.protocol.robot_packets import Delivered, RobotPacket
 from foosim.protocol.sampling import Sampling
 from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.replica import Replica

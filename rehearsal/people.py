@@ -10,7 +10,8 @@ from typing import Any, Final
 
 from foosim.protocol import channels
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.rehearsal.bus import Bus
 

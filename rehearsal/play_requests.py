@@ -10,8 +10,8 @@ from collections import OrderedDict
 from collections.abc import Mapping
 from typing import Any, Final
 
-from foosim.protocol.codec import decode_json, encode_json
 from foosim.protocol.errors import BadValue, Malformed, Refused, show
+from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.messages import Answer, Request
 from foosim.protocol.names import nearest_name
 from foosim.protocol.units import PACE_FACTOR_MAX, PACE_FACTOR_MIN, Pace, parse_pace

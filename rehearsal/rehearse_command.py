@@ -14,10 +14,10 @@ import typer
 
 from foosim.protocol import limits
 from foosim.protocol.addresses import LOOPBACK
-from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
+from foosim.protocol.json_text import encode_json
 from foosim.rehearsal.faults import TICKS
 from foosim.rehearsal.interrupts import Interrupts
 from foosim.rehearsal.onlooker import LINE_S

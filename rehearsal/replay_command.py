@@ -15,10 +15,10 @@ import msgspec
 import typer
 
 from foosim.protocol import limits
-from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue, Failed
 from foosim.protocol.journal import JournalError
+from foosim.protocol.json_text import encode_json
 from foosim.rehearsal import capture_commands, play_command, report_command, view_command, whatif_command
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.verify import Verified, verify_capture

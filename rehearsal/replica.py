@@ -15,23 +15,14 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.edits import Edit, layout_after
 from foosim.protocol.fetching import piece_of
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.frame import Frame, layout_after
+from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import (
-    AddedEntity,
-    Build,
-    Commit,
-    Delivered,
-    Deliveries,
-    Edit,
-    Epoch,
-    Order,
-    Prepare,
-    RobotPacket,
-)
-from foosim.protocol.start import Start, first_frame
+from foosim.protocol.messages import Build, Commit, Deliveries, Epoch, Order, Prepare
+from foosim.protocol.robot_packets import Delivered, RobotPacket
+from foosim.protocol.start import AddedEntity, Start, first_frame
 from foosim.rehearsal.bus import Bus
 
 SOURCE = "capture"

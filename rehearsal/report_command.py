@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from foosim.protocol.codec import encode_json
+from foosim.protocol.json_text import encode_json
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.new_file import check_name, new_file
 from foosim.rehearsal.report import gather

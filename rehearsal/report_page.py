@@ -15,7 +15,7 @@ from html import escape
 from typing import Any, Final
 
 from foosim.console.server.page_files import page_files
-from foosim.protocol.codec import encode_json
+from foosim.protocol.json_text import encode_json
 from foosim.rehearsal.report import ChannelReport, LinkReport, Report
 from foosim.rehearsal.report_drawings import drawings, has_map
 

@@ -18,9 +18,9 @@ from msgspec import inspect
 
 from foosim.client.errors import UnknownName
 from foosim.client.payloads import COMMAND_KINDS, channel_kind, decode_payload, value_fields
-from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Malformed, show
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.names import nearest_name
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import PACKETS, ROW_TYPES, PacketRow, Row

@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from foosim.protocol.assets import read_files
-from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text, with_network
 from foosim.protocol.errors import BadValue
+from foosim.protocol.json_text import encode_json
 from foosim.rehearsal.capture_arguments import Capture, Json, reading
 from foosim.rehearsal.new_file import check_name, new_file
 from foosim.rehearsal.whatif import CHANGED_KEPT, LinkChange, PacketChange, WhatIf, what_if

@@ -16,7 +16,8 @@ from itertools import accumulate
 from typing import Final, Literal
 
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import RobotPacket, Sent
+from foosim.protocol.messages import Sent
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick

@@ -13,10 +13,10 @@ from typing import Annotated, Any
 import typer
 
 from foosim.protocol.channels import VHUB
-from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue, Refused, read_at
 from foosim.protocol.hosts import places
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer
 from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import has_launcher

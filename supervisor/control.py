@@ -20,12 +20,13 @@ from foosim.protocol import channels
 from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.certificates import Credentials, operator_credentials, viewer_credentials
 from foosim.protocol.channels import Channel, Plane
-from foosim.protocol.codec import decode, decode_json, encode, encode_json
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.command import PKI_VARIABLE
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Failed, Malformed, Refused
 from foosim.protocol.fetching import Fetching
 from foosim.protocol.inbox import Inbox
+from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.loop import Wire
 from foosim.protocol.message_types import Vector
 from foosim.protocol.messages import Answer, Inquiry, Request

@@ -14,19 +14,18 @@ from mypy_extensions import mypyc_attr
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.asset_messages import Fetch
-from foosim.protocol.barrier import BadParts, Barrier, Slots
+from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.closed import closed
 from foosim.protocol.codec import encode
+from foosim.protocol.edits import Edit, layout_after
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, basis_of, chain_next, layout_after
+from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.hub_messages import Standing
-from foosim.protocol.layout import Layout, added_entities
+from foosim.protocol.layout import Layout
 from foosim.protocol.messages import (
-    AddedEntity,
     Commit,
     Deliveries,
-    Edit,
     End,
     Epoch,
     Farewell,
@@ -43,7 +42,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
-from foosim.protocol.start import first_chain, first_frame
+from foosim.protocol.start import AddedEntity, added_to, first_chain, first_frame
 from foosim.supervisor.absence import Absence
 from foosim.supervisor.account import Account, Recovered
 from foosim.supervisor.arrivals import Arrivals
@@ -278,7 +277,7 @@ class SupervisorCore:
 
     def added_to(self, layout: Layout) -> list[AddedEntity]:
         """Return the entities of a layout beside the deployment's."""
-        return added_entities(self.deployment, layout)
+        return added_to(self.deployment, layout)
 
     @property
     def missing_nodes(self) -> list[str]:

@@ -13,9 +13,9 @@ from typing import Annotated
 import typer
 
 from foosim.protocol.addresses import check_listen
-from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, PkiOption, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.protocol.json_text import encode_json
 from foosim.supervisor.doctor import HERE, Case, Finding, is_well
 from foosim.supervisor.doctor_hosts import examine_all
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from foosim.protocol.actions import Journal
 from foosim.protocol.codec import encode
 from foosim.protocol.frame import Frame
-from foosim.protocol.layout import added_entities
+from foosim.protocol.start import added_to
 from foosim.protocol.units import parse_pace
 from foosim.supervisor.records import Control, HeadRecord, History
 
@@ -32,7 +32,7 @@ def head_of(core: SupervisorCore) -> bytes:
     orders = {tick: core.orders[tick] for tick in range(core.frame.tick, core.released)}
     head = HeadRecord(
         core.run_record,
-        added_entities(core.deployment, core.frame.layout),
+        added_to(core.deployment, core.frame.layout),
         core.epoch_payload,
         list(core.commits.values()),
         core.chain,

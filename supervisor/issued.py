@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from foosim.protocol import limits
-from foosim.protocol.messages import Edit
+from foosim.protocol.edits import Edit
 
 
 class Issued:

@@ -13,11 +13,11 @@ import typer
 
 from foosim.protocol import wall
 from foosim.protocol.certificates import CA_KEY_FILE, identities_in
-from foosim.protocol.codec import encode_json
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue
 from foosim.protocol.identity import FORMS, identities_of
+from foosim.protocol.json_text import encode_json
 from foosim.supervisor import pki
 from foosim.supervisor.pki import LEAF_DAYS, LEAF_DAYS_MAX, Shown
 from foosim.supervisor.pki_hosts import files_for, send_files

@@ -21,8 +21,7 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment, read_de
 from foosim.protocol.errors import BadValue, Refused, read_at
 from foosim.protocol.hall_start import start_findings
 from foosim.protocol.hosts import places
-from foosim.protocol.messages import Origin
-from foosim.protocol.start import Start
+from foosim.protocol.start import Origin, Start
 from foosim.protocol.table_clearance import clearance_findings
 from foosim.protocol.units import Pace, parse_ns, parse_pace
 from foosim.supervisor.resumable import check_resumable

@@ -18,12 +18,13 @@ from foosim.protocol import limits
 from foosim.protocol.barrier import Barrier
 from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.edits import Edit, layout_after
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.protocol.lags import Lags
 from foosim.protocol.layout import BALL, Layout, build_layout
-from foosim.protocol.messages import AddedEntity, Answer, Commit, Edit, End, Epoch
-from foosim.protocol.start import Start, first_chain, first_frame
+from foosim.protocol.messages import Answer, Commit, End, Epoch
+from foosim.protocol.start import AddedEntity, Start, first_chain, first_frame
 from foosim.supervisor.account import Account, Recovered, close_outages
 from foosim.supervisor.issued import Issued
 

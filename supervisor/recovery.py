@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol.actions import Journal
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import Edit, Freeze, Thaw
+from foosim.protocol.edits import Edit, Freeze, Thaw
 from foosim.supervisor.absence import SAID_NS
 from foosim.supervisor.account import Recovered, close_outages
 from foosim.supervisor.records import RecoveredRecord

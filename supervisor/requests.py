@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish
-from foosim.protocol.codec import decode_json, encode, encode_json
+from foosim.protocol.codec import encode
+from foosim.protocol.edits import Add, Disrupt, Edit, Push, Remove, layout_after
 from foosim.protocol.errors import Malformed, Refused, show
-from foosim.protocol.frame import layout_after
+from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.layout import BALL, Layout
-from foosim.protocol.messages import Add, Answer, Disrupt, Edit, Inquiry, Push, Remove, Request
+from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.protocol.names import NAME_RULE, is_name
 from foosim.protocol.network import EVENTS_MAX, event_of
 from foosim.protocol.network_request import event_text, told

@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish
-from foosim.protocol.codec import encode, encode_json
+from foosim.protocol.codec import encode
+from foosim.protocol.edits import Add, Edit, Remove
 from foosim.protocol.errors import Refused, show
-from foosim.protocol.messages import Add, Answer, Edit, Heartbeat, Remove, Request
+from foosim.protocol.json_text import encode_json
+from foosim.protocol.messages import Answer, Heartbeat, Request
 from foosim.protocol.view_messages import Watched
 from foosim.supervisor.choices import chosen
 

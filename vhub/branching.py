@@ -16,8 +16,8 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue, Malformed, Refused
 from foosim.protocol.frame import Frame, chain_next, frame_from_bytes
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import AddedEntity, Outbox
-from foosim.protocol.start import Start, start_with
+from foosim.protocol.robot_packets import Outbox
+from foosim.protocol.start import AddedEntity, Start, start_with
 from foosim.protocol.units import format_ns, parse_ns
 from foosim.vhub.capture_reader import FRAME_MARKS, Scan, chain_at_start, deployment_of, layout_of
 from foosim.vhub.rows import FRAME, LAYOUT, TICK, CaptureError, FrameRow, LayoutRow, TickRow

@@ -20,11 +20,12 @@ from typing import Final
 
 import msgspec
 
-from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Room, megabytes, room_on_disk
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import End, Epoch, Origin
+from foosim.protocol.json_text import encode_json
+from foosim.protocol.messages import End, Epoch
+from foosim.protocol.start import Origin
 from foosim.vhub.capture_left import Journalled, Left, Progress, look, run_of
 from foosim.vhub.capture_parts import (
     END_METADATA,

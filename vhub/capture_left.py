@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
-from foosim.protocol.codec import decode_json
 from foosim.protocol.errors import Malformed
+from foosim.protocol.json_text import decode_json
 from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT
 from foosim.vhub.mcap_scan import NOTHING, UNSYNCED_BYTES, Scanned, Void, scan
 from foosim.vhub.packet import IN_FLIGHT

@@ -20,18 +20,19 @@ import numpy as np
 from mcap import records
 from numpy.typing import NDArray
 
-from foosim.protocol.codec import decode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.edits import Edit
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame
+from foosim.protocol.json_text import decode_json
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.message_types import Counter
-from foosim.protocol.messages import Delivered, Edit, Origin
 from foosim.protocol.names import nearest_name
+from foosim.protocol.robot_packets import Delivered
 from foosim.protocol.scene import Body
 from foosim.protocol.scenes import build_scene
-from foosim.protocol.start import first_chain
+from foosim.protocol.start import Origin, first_chain
 from foosim.vhub.capture_columns import AllFrames, Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
 from foosim.vhub.capture_file import (
     ASSETS,

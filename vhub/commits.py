@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.edits import layout_after
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, chain_next, frame_from_bytes, layout_after
-from foosim.protocol.layout import Layout, added_entities
-from foosim.protocol.messages import AddedEntity, Commit
+from foosim.protocol.frame import Frame, chain_next, frame_from_bytes
+from foosim.protocol.layout import Layout
+from foosim.protocol.messages import Commit
+from foosim.protocol.start import AddedEntity, added_to
 
 Committed = tuple[bytes, Commit, Frame]
 """A commit as it came, read, and its frame."""
@@ -67,7 +69,7 @@ class Commits:
         """Return the newest commit (empty before the first), the chain up to it, and its layout's added entities."""
         assert self.layout is not None
         last = self._frames.get(self.next_tick - 1)
-        chain, added = self._chains[self.next_tick - 1], added_entities(deployment, self.layout)
+        chain, added = self._chains[self.next_tick - 1], added_to(deployment, self.layout)
         return b"" if last is None else last[0], chain, added
 
     def forget(self, tick: int) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from foosim.protocol.codec import encode
-from foosim.protocol.layout import added_entities
+from foosim.protocol.start import added_to
 from foosim.vhub.records import HeadRecord
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def head_of(core: HubCore) -> bytes:
     commit, _, frame = core.commits.get(core.state.closed) or (b"", None, None)
     layout = core.commits.layout if frame is None else frame.layout
     assert layout is not None
-    added = [(entity.name, entity.model) for entity in added_entities(core.state.deployment, layout)]
+    added = [(entity.name, entity.model) for entity in added_to(core.state.deployment, layout)]
     chain = core.commits.chain_at(core.state.closed)
     where = commit, core.epoch_payload, core.capture_file, chain, core.footing.machine, core.door.absences.record()
     return encode(HeadRecord(core.member.build.run, core.state.snapshot(), added, *where))

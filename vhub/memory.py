@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import msgspec
 
-from foosim.protocol.messages import Delivered
+from foosim.protocol.robot_packets import Delivered
 
 
 class LinkState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):

@@ -16,10 +16,12 @@ import msgspec
 
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.edits import Edit, layout_after
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes, layout_after
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Build, Commit, Delivered, Edit, Epoch, Recovered, RobotPacket, Samples, Sent
+from foosim.protocol.messages import Build, Commit, Epoch, Recovered, Samples, Sent
+from foosim.protocol.robot_packets import Delivered, RobotPacket
 from foosim.protocol.sampling import Sampling
 from foosim.protocol.start import first_chain
 from foosim.vhub.memory import Age, Joining

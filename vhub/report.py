@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
-from foosim.protocol.codec import encode_json
+from foosim.protocol.json_text import encode_json
 from foosim.vhub.ages import quantile
 from foosim.vhub.fabric import LinkKey, name_of
 from foosim.vhub.state import HubState

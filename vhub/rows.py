@@ -16,9 +16,10 @@ import msgspec
 from msgspec import Meta
 
 from foosim.protocol import limits
+from foosim.protocol.edits import Add, Disrupt, Edit, Freeze, Push, Remove, Thaw
 from foosim.protocol.errors import Refused
 from foosim.protocol.message_types import Counter
-from foosim.protocol.messages import Add, Delivered, Disrupt, Edit, Freeze, Push, Remove, Thaw
+from foosim.protocol.robot_packets import Delivered
 
 FORMAT: Final = 2
 """Version of the rows and of the capture's metadata; a reader refuses another one."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from foosim.protocol.codec import encode_json
 from foosim.protocol.impairments import Impairments, LinkSettings
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.network import Event, LinkRule
 from foosim.protocol.radios import Radio
-from foosim.protocol.table import Part
+from foosim.protocol.spec_base import SpecBase
 from foosim.protocol.units import format_ns
 
 _UNITS: Final = (
@@ -33,7 +33,7 @@ _SHARES: Final = frozenset({"loss", "duplicate", "bad_loss", "share", "probabili
 _SHARES_OF_CHAINS: Final = frozenset({"p13", "p31", "p32", "p23", "p14", "bit_error_rate"})
 
 
-def settings_text(settings: Part) -> str:
+def settings_text(settings: SpecBase) -> str:
     """Return what is written of settings, all else being defaults: `delay 1 ms, loss 0.5 %`."""
     return ", ".join(_entries(settings.model_dump(exclude_unset=True)))
 

@@ -16,9 +16,11 @@ import msgspec
 from foosim.protocol import limits
 from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.edits import Disrupt, Edit
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Delivered, Deliveries, Disrupt, Edit, Epoch, RobotPacket, Sent
+from foosim.protocol.messages import Deliveries, Epoch, Sent
+from foosim.protocol.robot_packets import Delivered, RobotPacket
 from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.ages import Ages
 from foosim.vhub.fabric import Fabric

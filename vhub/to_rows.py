@@ -15,9 +15,10 @@ from msgspec.structs import replace
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import Slot
+from foosim.protocol.edits import Add, Disrupt, Edit, Freeze, Push, Remove
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Disrupt, Edit, Epoch, Freeze, Push, Recovered, Remove
+from foosim.protocol.messages import Epoch, Recovered
 from foosim.vhub.ages import quantile
 from foosim.vhub.air import DEAF
 from foosim.vhub.mcap_writer import McapWriter

@@ -15,8 +15,8 @@ from foosim.console.server.page_messages import Plot, Show, Watch
 from foosim.console.server.reader import Follows, Reader, Shown, TooSlow
 from foosim.console.shown.curves import points_of
 from foosim.console.shown.source import About, Curve, Link, Moment, Source, Wanted
-from foosim.protocol.codec import encode_json
 from foosim.protocol.errors import Malformed
+from foosim.protocol.json_text import encode_json
 
 MARKS_MAX: Final = 4096
 """Of one source: the last so many."""

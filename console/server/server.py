@@ -29,8 +29,8 @@ from foosim.console.server.page_messages import MESSAGE_BYTES_MAX, Ask, Hello, r
 from foosim.console.server.reader import Reader, Role, TooSlow
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import Answered, Curve, NotAsked, Source
-from foosim.protocol.codec import encode_json
 from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.json_text import encode_json
 
 READERS_MAX: Final = 64
 """Browsers at once."""

@@ -19,8 +19,8 @@ from foosim.console.server.board import Onlooker
 from foosim.console.server.server import ConsoleServer, Tokens, new_tokens
 from foosim.console.shown.source import Source
 from foosim.protocol.addresses import LOOPBACK, Address, Insecure, parse_address
-from foosim.protocol.codec import encode_json
 from foosim.protocol.errors import BadValue, Failed
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.process import Stop
 
 MakeSources = Callable[[], tuple[Sequence[Source], Sequence[Onlooker]]]

@@ -12,10 +12,10 @@ import numpy as np
 
 from foosim.node.sensors.fitting import Fitting
 from foosim.node.sensors.proximity import Proximity, ways_of
-from foosim.protocol.deployment import Deployment, RoverRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
-from foosim.protocol.rovers import ProximitySensor
+from foosim.protocol.rovers import ProximitySensor, RoverRobot
 
 
 class Overlays:

@@ -12,11 +12,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from foosim.protocol.deployment import Deployment, Sensor
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import ADDABLE, BALL, Layout
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.scene import Box, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
 from foosim.protocol.start import kickoff_spot
+from foosim.protocol.world_spec import Sensor
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "position": ("m",),

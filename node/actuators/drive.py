@@ -9,9 +9,9 @@ import struct
 from collections.abc import Sequence
 from math import isfinite
 
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity
 from foosim.protocol.names import CHANNEL_DRIVE
+from foosim.protocol.world_spec import WorldSpec
 
 _PAYLOAD = struct.Struct("<2d")
 
@@ -21,8 +21,8 @@ class DriveActuator:
 
     channel = CHANNEL_DRIVE
 
-    def __init__(self, deployment: Deployment, entity: Entity) -> None:
-        drive = deployment.hall.rover.drive
+    def __init__(self, spec: WorldSpec, entity: Entity) -> None:
+        drive = spec.hall.rover.drive
         self._wanted = entity.offsets["wanted"]
         self._speed, self._acceleration = drive.speed, drive.acceleration
 

@@ -10,9 +10,10 @@ import struct
 from collections.abc import Sequence
 from math import isfinite
 
-from foosim.protocol.deployment import Deployment, RodRobot
 from foosim.protocol.layout import Entity
 from foosim.protocol.names import CHANNEL_POSITION
+from foosim.protocol.rod import RodRobot
+from foosim.protocol.world_spec import WorldSpec
 
 ANGLE_RAD_MAX = 1000.0
 _PAYLOAD = struct.Struct("<2d")
@@ -23,11 +24,11 @@ class PositionActuator:
 
     channel = CHANNEL_POSITION
 
-    def __init__(self, deployment: Deployment, entity: Entity) -> None:
-        robot = deployment.robots[entity.name]
+    def __init__(self, spec: WorldSpec, entity: Entity) -> None:
+        robot = spec.robots[entity.name]
         assert isinstance(robot, RodRobot)
-        drive = deployment.table.drive
-        self._slide_m_max = deployment.table.lines[robot.line].half_stroke
+        drive = spec.table.drive
+        self._slide_m_max = spec.table.lines[robot.line].half_stroke
         self._wanted = entity.offsets["wanted"]
         self._position = entity.offsets["joint_positions"]
         self._slide = (drive.slide.gain, drive.slide.speed, drive.slide.force)

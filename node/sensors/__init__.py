@@ -16,9 +16,9 @@ from foosim.node.sensors.fitting import Fitting
 from foosim.node.sensors.odometry import Odometry
 from foosim.node.sensors.pose import PoseTracker
 from foosim.node.sensors.proximity import Proximity
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key
 from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.world_spec import WorldSpec
 
 
 class Sensor(Protocol):
@@ -45,7 +45,7 @@ def sample_all(sensors: Sequence[Sensor], numbers: Sequence[float], tick: int) -
     return [payloads[n] if n in payloads else sensor.sample(numbers, tick) for n, sensor in enumerate(sensors)]
 
 
-def make_sensor(settings: Any, deployment: Deployment, layout: Layout, robot: Entity, channel: str) -> Sensor:
+def make_sensor(settings: Any, spec: WorldSpec, layout: Layout, robot: Entity, channel: str) -> Sensor:
     """Return the sensor of one robot's channel, its noise keyed by seed, robot and channel."""
-    key = draw_key(deployment.seed, "noise", robot.name, channel)
-    return SENSORS[settings.kind](settings, Fitting(deployment, layout, robot, key))
+    key = draw_key(spec.seed, "noise", robot.name, channel)
+    return SENSORS[settings.kind](settings, Fitting(spec, layout, robot, key))

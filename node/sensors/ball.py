@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 
 from foosim.node.sensors.fitting import Fitting
-from foosim.protocol.deployment import BallSensor
+from foosim.protocol.camera import BallSensor
 from foosim.protocol.draws import draw_words, gaussian
 
 _PAYLOAD = struct.Struct("<3d")

@@ -16,7 +16,7 @@ class BatteryGauge:
     """Payload: charge as a share of the capacity, voltage in V, two little-endian float64."""
 
     def __init__(self, settings: BatterySensor, at: Fitting) -> None:
-        battery = at.deployment.hall.rover.battery
+        battery = at.spec.hall.rover.battery
         self._charge = at.robot.offsets["charge"]
         self._capacity_j = battery.capacity
         self._empty_v, self._span_v = battery.empty, battery.full - battery.empty

@@ -6,8 +6,8 @@ import struct
 from collections.abc import Sequence
 
 from foosim.node.sensors.fitting import Fitting
-from foosim.protocol.deployment import RodSensor
 from foosim.protocol.draws import draw_words, gaussian
+from foosim.protocol.rod import RodSensor
 
 _PAYLOAD = struct.Struct("<2d")
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import Entity, Layout
+from foosim.protocol.world_spec import WorldSpec
 
 
 @dataclass(frozen=True, slots=True)
 class Fitting:
     """A robot of a deployment and layout, and the key of the draws of one of its channels."""
 
-    deployment: Deployment
+    spec: WorldSpec
     layout: Layout
     robot: Entity
     key: bytes

@@ -31,8 +31,8 @@ class Proximity:
     """Payload: a little-endian float64 a ray, in m: the free way from the hull, `range` where nothing is hit."""
 
     def __init__(self, settings: ProximitySensor, at: Fitting) -> None:
-        rover = at.deployment.hall.rover
-        obstacles = obstacles_of(at.deployment)
+        rover = at.spec.hall.rover
+        obstacles = obstacles_of(at.spec)
         self._position = at.robot.offsets["position"]
         self._heading = at.robot.offsets["heading"]
         self._rovers = [rover.offsets["position"] for rover in at.layout.rovers]

@@ -33,10 +33,10 @@ from foosim.protocol.messages import (
     Go,
     Join,
     Received,
-    RobotPacket,
     Samples,
     Up,
 )
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import initial_numbers
 from foosim.vhub.core import HubCore
 

@@ -14,8 +14,9 @@ from foosim.client.core import ClientCore
 from foosim.node.inputs import Inputs
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode_any
+from foosim.protocol.edits import Add, Push
 from foosim.protocol.hub_messages import Standing
-from foosim.protocol.messages import Add, ClientWelcome, Epoch, Push
+from foosim.protocol.messages import ClientWelcome, Epoch
 from foosim.rehearsal.bus import CALM, Weather
 from foosim.rehearsal.failures import Broken
 from foosim.rehearsal.faults import TICKS, Fault, ask

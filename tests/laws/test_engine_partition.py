@@ -19,10 +19,11 @@ from foosim.node.engines.bullet import BulletEngine
 from foosim.node.engines.interface import Engine, EngineFactory
 from foosim.node.engines.pure import PureEngine
 from foosim.protocol.assign import Assignment, reach_of
-from foosim.protocol.deployment import Deployment, RodRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
 from foosim.protocol.layout import Entity, Layout, build_layout
+from foosim.protocol.rod import RodRobot
 from foosim.protocol.scene import Body, Shape
 from foosim.protocol.start import initial_numbers, place_ball
 from foosim.protocol.table_scene import figure_ys

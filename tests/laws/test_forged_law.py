@@ -18,7 +18,9 @@ from msgspec.structs import replace
 from foosim.protocol import channels
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.messages import Add, Outbox, Part, Push
+from foosim.protocol.edits import Add, Push
+from foosim.protocol.messages import Part
+from foosim.protocol.robot_packets import Outbox
 from foosim.rehearsal.bus import Traced
 
 if TYPE_CHECKING:

@@ -23,7 +23,8 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed, Refused
 from foosim.protocol.journal import Journal, read_records
 from foosim.protocol.mesh import AssetError, read_mesh
-from foosim.protocol.messages import Answer, Delivered, Request
+from foosim.protocol.messages import Answer, Request
+from foosim.protocol.robot_packets import Delivered
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.run_folder import RunFolder, RunInfo

@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.deployment import Network
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import RobotPacket, Sent
+from foosim.protocol.messages import Sent
+from foosim.protocol.network import Network
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import initial_frame
 from foosim.rehearsal.bus import Weather
 from foosim.rehearsal.rehearse import rehearse

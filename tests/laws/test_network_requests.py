@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.messages import Disrupt
+from foosim.protocol.edits import Disrupt
+from foosim.protocol.json_text import encode_json
 from foosim.rehearsal.hub_journal import ENDINGS, Ending
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System

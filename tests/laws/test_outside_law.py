@@ -21,19 +21,18 @@ from foosim.client.core import ClientCore
 from foosim.protocol import channels, limits
 from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
-from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.edits import Edit, Push
 from foosim.protocol.errors import Malformed
 from foosim.protocol.hub_messages import Proceed, Standing
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import (
-    AddedEntity,
     Build,
     ClientHello,
     ClientWelcome,
     Commit,
-    Delivered,
     Deliveries,
     Done,
-    Edit,
     Epoch,
     Farewell,
     Go,
@@ -44,18 +43,18 @@ from foosim.protocol.messages import (
     Order,
     Part,
     Prepare,
-    Push,
     Ready,
     Recall,
     Refusal,
     Request,
-    RobotPacket,
     Samples,
     Sent,
     Tempo,
     Up,
     Want,
 )
+from foosim.protocol.robot_packets import Delivered, RobotPacket
+from foosim.protocol.start import AddedEntity
 from foosim.protocol.units import Pace
 from foosim.protocol.view_messages import Watched
 from foosim.rehearsal.rehearse import with_nodes

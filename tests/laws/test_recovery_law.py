@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR
-from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.codec import decode, encode
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer, Request
 from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced, Weather

@@ -13,10 +13,12 @@ from foosim.client.packets import Outgoing
 from foosim.client.player import Samples, Turn
 from foosim.client.players import Team
 from foosim.protocol import channels, limits
-from foosim.protocol.codec import decode, encode_json
+from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets
-from foosim.protocol.messages import Deliveries, Disrupt, Go
+from foosim.protocol.edits import Disrupt
+from foosim.protocol.json_text import encode_json
+from foosim.protocol.messages import Deliveries, Go
 from foosim.rehearsal import hub_journal, swarm
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.faults import TICKS as SWARM_TICKS

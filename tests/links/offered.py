@@ -16,8 +16,10 @@ from typing import Final
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
+from foosim.protocol.edits import Edit
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Deliveries, Edit, RobotPacket, Sent
+from foosim.protocol.messages import Deliveries, Sent
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import initial_frame
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.memory import Joining

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.messages import RobotPacket, Sent
+from foosim.protocol.messages import Sent
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.vhub.packet import Flight
 from tests.links.offered import ENDS, MS, Hub, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof

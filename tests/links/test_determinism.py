@@ -13,8 +13,10 @@ import msgspec
 import pytest
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.messages import Disrupt, Edit, RobotPacket, Sent
+from foosim.protocol.edits import Disrupt, Edit
+from foosim.protocol.messages import Sent
 from foosim.protocol.presets import PRESETS
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.vhub.packet import Flight
 from foosim.vhub.state import HubState
 from foosim.vhub.to_rows import packet_row

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.protocol.messages import Disrupt, Sent
+from foosim.protocol.edits import Disrupt
+from foosim.protocol.messages import Sent
 from foosim.protocol.network import event_of
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.packet import Flight

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import RobotPacket, Sent
+from foosim.protocol.messages import Sent
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import initial_frame
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight

@@ -16,7 +16,7 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Delivered, OutboxPacket, RobotPacket
+from foosim.protocol.robot_packets import Delivered, OutboxPacket, RobotPacket
 from foosim.protocol.start import initial_numbers
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -15,7 +15,7 @@ from foosim.node.actuators.position import ANGLE_RAD_MAX, PositionActuator
 from foosim.node.step import Stepper
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Delivered
+from foosim.protocol.robot_packets import Delivered
 from foosim.protocol.start import initial_numbers
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

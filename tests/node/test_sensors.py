@@ -13,12 +13,13 @@ import pytest
 
 from foosim.node.sensors import SENSORS, make_sensor
 from foosim.node.step import Stepper
-from foosim.protocol.deployment import Deployment, RodSensor
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.draws import draw_key, draw_words, gaussian
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import RobotPacket
+from foosim.protocol.robot_packets import RobotPacket
+from foosim.protocol.rod import RodSensor
 from foosim.protocol.start import initial_numbers
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()

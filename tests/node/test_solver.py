@@ -14,8 +14,8 @@ from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import AddedEntity, Build, Prepare, Ready
-from foosim.protocol.start import initial_numbers
+from foosim.protocol.messages import Build, Prepare, Ready
+from foosim.protocol.start import AddedEntity, initial_numbers
 
 TEXT = (Path(__file__).parent.parent.parent / "deploy" / "table.yaml").read_text()
 DEPLOYMENT = load_deployment(TEXT, "table.yaml")

@@ -10,14 +10,14 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from foosim.node.edits import check_edits
 from foosim.node.engines import ENGINES
 from foosim.node.step import Stepper, Work
 from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.edits import Add, Edit, Push, Remove, check_edits
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.messages import Add, Delivered, Edit, Push, Remove
+from foosim.protocol.robot_packets import Delivered
 from foosim.protocol.start import initial_frame, initial_numbers, place_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

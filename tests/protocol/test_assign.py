@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.protocol.assign import Assignment, islands_of, reach_of, touching_of
-from foosim.protocol.deployment import Deployment, RodRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.layout import Layout, build_layout
+from foosim.protocol.rod import RodRobot
 from foosim.protocol.start import initial_numbers
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

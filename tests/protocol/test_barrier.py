@@ -20,7 +20,8 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Outbox, OutboxPacket, Part
+from foosim.protocol.messages import Part
+from foosim.protocol.robot_packets import Outbox, OutboxPacket
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 LAYOUT: Final = build_layout(load_deployment(TABLE.read_text(), TABLE.name))

@@ -19,30 +19,13 @@ from msgspec import inspect
 
 from foosim.protocol import codec, limits
 from foosim.protocol.channels import CHANNELS, Channel
-from foosim.protocol.codec import decode, decode_any, decode_json, encode, encode_json
+from foosim.protocol.codec import decode, decode_any, encode
+from foosim.protocol.edits import Add, Edit, Freeze, Push, Remove, Thaw
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import (
-    Add,
-    AddedEntity,
-    Commit,
-    Delivered,
-    Deliveries,
-    Done,
-    Edit,
-    End,
-    Epoch,
-    Freeze,
-    Hello,
-    Order,
-    Part,
-    Push,
-    Remove,
-    Request,
-    Sent,
-    Thaw,
-    Up,
-    Want,
-)
+from foosim.protocol.json_text import decode_json, encode_json
+from foosim.protocol.messages import Commit, Deliveries, Done, End, Epoch, Hello, Order, Part, Request, Sent, Up, Want
+from foosim.protocol.robot_packets import Delivered
+from foosim.protocol.start import AddedEntity
 
 LONG: Final = 5
 """How long lists, texts and bytes of an example are at most; limits have tests of their own."""

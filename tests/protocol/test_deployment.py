@@ -11,15 +11,12 @@ import pytest
 from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
-from foosim.protocol.deployment import (
-    CameraRobot,
-    Deployment,
-    RodRobot,
-    deployment_schema_text,
-)
+from foosim.protocol.camera import CameraRobot
+from foosim.protocol.deployment import Deployment, deployment_schema_text
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.impairments import GammaJitter
 from foosim.protocol.names import LINE_NAMES, TEAMS
+from foosim.protocol.rod import RodRobot
 from foosim.protocol.units import Pace
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree
 

@@ -13,21 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from foosim.protocol.barrier import basis_of, edits_content
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.edits import Add, Edit, Push, Remove, fitting_edits, layout_after
 from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import (
-    CHAIN_START,
-    Frame,
-    basis_of,
-    chain_next,
-    edits_content,
-    fitting_edits,
-    frame_from_bytes,
-    layout_after,
-)
+from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.protocol.layout import build_layout
-from foosim.protocol.messages import Add, Edit, Order, Outbox, Push, Remove
+from foosim.protocol.messages import Order
+from foosim.protocol.robot_packets import Outbox
 from foosim.protocol.start import initial_frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 
 from foosim.protocol import limits
-from foosim.protocol.deployment import Deployment, RodRobot
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment
 from foosim.protocol.errors import DeploymentError
+from foosim.protocol.rod import RodRobot
 
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 

@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import BadValue
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import AddedEntity
-from foosim.protocol.start import Start, first_frame, start_with
+from foosim.protocol.start import AddedEntity, Start, first_frame, start_with
 from foosim.rehearsal.rehearse import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.rehearse_command import app as rehearse_app
 from foosim.rehearsal.replay_command import app as replay_app

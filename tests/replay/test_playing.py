@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from foosim.protocol.codec import decode_json, encode_json
 from foosim.protocol.errors import BadValue
+from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.limits import LAG_ANCHOR_NS
 from foosim.protocol.messages import Answer, Request
 from foosim.protocol.units import Pace, parse_pace

@@ -8,8 +8,8 @@ import pytest
 
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.edits import Push
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.messages import Push
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.core import SupervisorCore

@@ -14,8 +14,9 @@ import pytest
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish
-from foosim.protocol.codec import decode, decode_json, encode, encode_json
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.frame import Frame
+from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.messages import Answer, Epoch, Order, Prepare, Request
 from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.protocol.codec import decode_json
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.json_text import decode_json
 from foosim.protocol.messages import Answer
 from foosim.protocol.network import EVENTS_MAX, event_of
 from foosim.protocol.network_request import BadEvent, event_text, told

@@ -16,8 +16,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel
-from foosim.protocol.codec import decode, encode, encode_json
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment_file import apply_sets
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.message_types import Message
 from foosim.protocol.messages import Answer, Epoch, Heartbeat, Hello, Part, Ready, Request
 from foosim.protocol.units import Pace

@@ -9,9 +9,10 @@ import pytest
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish
-from foosim.protocol.codec import decode, decode_json, encode, encode_json
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.frame import frame_from_bytes
+from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Answer, Commit, Inquiry, Request
 from foosim.protocol.units import Pace

@@ -20,33 +20,29 @@ from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.edits import Add, Edit, Push, Remove
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import (
-    Add,
-    AddedEntity,
     Build,
     ClientHello,
     Commit,
     Deliveries,
     Done,
     Down,
-    Edit,
     End,
     Epoch,
     Go,
     Heard,
     Join,
-    Push,
     Recovered,
-    Remove,
-    RobotPacket,
     Samples,
     Sent,
     Subscription,
     Up,
 )
-from foosim.protocol.start import initial_numbers
+from foosim.protocol.robot_packets import RobotPacket
+from foosim.protocol.start import AddedEntity, initial_numbers
 from foosim.vhub import capture_file, capture_writer
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore

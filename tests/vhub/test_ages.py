@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.protocol.codec import decode_any, decode_json
+from foosim.protocol.codec import decode_any
+from foosim.protocol.json_text import decode_json
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.report import gather
 from foosim.rehearsal.report_page import page

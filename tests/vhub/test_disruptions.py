@@ -11,12 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.codec import encode_json
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.edits import Disrupt
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Disrupt, RobotPacket, Sent
+from foosim.protocol.json_text import encode_json
+from foosim.protocol.messages import Sent
 from foosim.protocol.network import Event, Network
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import initial_frame
 from foosim.vhub.events import Timeline
 from foosim.vhub.memory import Joining

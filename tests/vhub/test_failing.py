@@ -16,12 +16,13 @@ import pytest
 
 from foosim.protocol import channels, limits
 from foosim.protocol.channels import Channel
-from foosim.protocol.codec import decode, decode_any, decode_json, encode
+from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.command import DONE, FAILED
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Failed
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, journal_files
+from foosim.protocol.json_text import decode_json
 from foosim.protocol.messages import Build, End, Heartbeat
 from foosim.protocol.session import Session
 from foosim.vhub import capture_file

@@ -10,7 +10,8 @@ import pytest
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.journal import Journal
-from foosim.protocol.messages import Deliveries, RobotPacket, Sent, Up
+from foosim.protocol.messages import Deliveries, Sent, Up
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.vhub.records import fold
 from tests.vhub.conftest import Driver, HubRun
 

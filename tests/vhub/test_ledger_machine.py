@@ -17,7 +17,8 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import RobotPacket, Sent
+from foosim.protocol.messages import Sent
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import initial_frame
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight

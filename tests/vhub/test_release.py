@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.protocol import channels
-from foosim.protocol.codec import decode_json
+from foosim.protocol.json_text import decode_json
 from foosim.protocol.messages import Tempo
 from foosim.vhub.packet import Flight
 from foosim.vhub.release import ANCHOR_WINDOW_NS, Release, Releases

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words
+from foosim.protocol.edits import Add, Edit, Push, Remove
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Add, Edit, Push, Remove
 from foosim.vhub.capture_columns import word_of
 from foosim.vhub.rows import (
     AGES,

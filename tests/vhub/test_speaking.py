@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
-from foosim.protocol.codec import decode_any, decode_json
+from foosim.protocol.codec import decode_any
+from foosim.protocol.json_text import decode_json
 from foosim.protocol.limits import HEARTBEAT_NS
 from foosim.protocol.messages import Farewell, Tempo, Up
 from foosim.vhub.report import LINKS_TOLD_EVERY

@@ -15,10 +15,13 @@ from msgspec.structs import replace
 
 from foosim.console.live.watched import Watched as Shown
 from foosim.protocol import channels, limits
-from foosim.protocol.codec import decode, decode_json, encode_json
+from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.edits import Disrupt
 from foosim.protocol.frame import Frame
-from foosim.protocol.messages import Disrupt, Heartbeat, RobotPacket
+from foosim.protocol.json_text import decode_json, encode_json
+from foosim.protocol.messages import Heartbeat
+from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.units import Pace
 from foosim.protocol.view_messages import Watched
 from foosim.rehearsal.bus import Traced

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from foosim.protocol import channels
-from foosim.protocol.codec import encode, encode_json
+from foosim.protocol.codec import encode
+from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Request
 from foosim.rehearsal.rehearse import rehearse
 from foosim.supervisor.control import Control, answer_to
