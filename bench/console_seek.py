@@ -32,7 +32,7 @@ from foosim.console.server.server import ConsoleServer, new_tokens
 from foosim.console.shown.poses import HEAD
 from foosim.rehearsal.between import Between
 from foosim.rehearsal.rehearse import rehearse
-from foosim.vhub.capture_file import CHUNK_BYTES, declare_topics, write_all
+from foosim.vhub.capture_contents import CHUNK_BYTES, declare_topics, write_all
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, read_about
 from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import McapFile, Message

@@ -19,7 +19,8 @@ from typing import Any, Final
 
 from bench.machine import Use, children, free_ports, use_of
 from foosim.supervisor.display import Display
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.plan import make_plan
+from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.up import Up
 
 ROOT: Final = Path(__file__).resolve().parents[1]

@@ -21,8 +21,9 @@ from typing import Final, NamedTuple
 
 from foosim.client.loading import ClassPathError, load_player
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.finding import Finding
 from foosim.protocol.process import STACK_SIGNAL, end_with, end_with_stack
-from foosim.protocol.references import Finding, quoted
+from foosim.protocol.references import quoted
 
 OURS: Final = "foosim."
 LOOK_S: Final = 0.02

@@ -28,14 +28,15 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
 
 from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
-from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded, UnknownName
+from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded
 from foosim.client.packets import Outgoing, check_packet, check_subscription
-from foosim.client.payloads import Command, Drive, Value, channel_kind, command_channels, decode_payload, encode_command
+from foosim.client.payloads import Command, Drive, Value, command_channels, decode_payload, encode_command
 from foosim.client.player import NS_PER_S, Newest, Sample
 from foosim.protocol import channels, limits
+from foosim.protocol.channel_kinds import channel_kind
 from foosim.protocol.channels import VHUB, Plane
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import BadValue, Malformed
+from foosim.protocol.errors import BadValue, Malformed, UnknownName
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.messages import Received
 from foosim.protocol.names import CHANNEL_DRIVE, CHANNEL_POSITION, is_name

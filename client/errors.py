@@ -5,23 +5,7 @@ Neighbours: `protocol.errors` has their base; the command turns them into exit c
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Final
-
-from foosim.protocol.errors import BadValue, Failed, Refused, show
-from foosim.protocol.names import nearest_name
-
-CHOICES_MAX: Final = 24
-
-
-class UnknownName(BadValue):
-    """A robot, channel, destination or class that does not exist; the text lists those that do."""
-
-    def __init__(self, what: str, value: str, choices: Iterable[str]) -> None:
-        names = sorted(set(choices))
-        nearest = nearest_name(value, names)
-        shown = ", ".join(names[:CHOICES_MAX]) + (", ..." if len(names) > CHOICES_MAX else "")
-        super().__init__(f"{what} (there are: {shown or 'none'})", value, None if nearest is None else show(nearest))
+from foosim.protocol.errors import Failed, Refused
 
 
 class PacketError(Refused):

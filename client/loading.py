@@ -13,8 +13,9 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from foosim.client.errors import CHOICES_MAX, PlayerError
+from foosim.client.errors import PlayerError
 from foosim.client.failing import Unanswered, describe, in_library, place_of
+from foosim.protocol.errors import CHOICES_MAX
 from foosim.protocol.names import class_path_of, nearest_name
 
 if TYPE_CHECKING:

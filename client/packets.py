@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
-from foosim.client.errors import PacketError, UnknownName
+from foosim.client.errors import PacketError
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import UnknownName
 from foosim.protocol.messages import Sent
 from foosim.protocol.names import CHANNEL_ECHO
 

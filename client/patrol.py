@@ -28,7 +28,6 @@ from foosim.client.beacons import (
     encode_beacon,
     encode_telemetry,
 )
-from foosim.client.errors import UnknownName
 from foosim.client.packets import Outgoing
 from foosim.client.payloads import Battery, Drive, Pose, Ranges, WheelTravel
 from foosim.client.player import Samples, Turn
@@ -36,7 +35,7 @@ from foosim.client.roadmap import roadmap_of
 from foosim.client.steering import Estimate, Steering, wrapped
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key, draw_words, unit_interval
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, UnknownName
 from foosim.protocol.obstacles import obstacles_of
 from foosim.protocol.rovers import RoverRobot, StationRobot
 

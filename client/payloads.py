@@ -14,13 +14,11 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any, Final, NamedTuple
 
-from foosim.client.errors import UnknownName
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import BadValue, Malformed
+from foosim.protocol.errors import BadValue, Malformed, UnknownName
 from foosim.protocol.names import CHANNEL_DRIVE, CHANNEL_ECHO, CHANNEL_NAMES_RESERVED, CHANNEL_POSITION
 from foosim.protocol.rod import RodRobot
 from foosim.protocol.rovers import RAYS_MAX
-from foosim.protocol.world_spec import Robot
+from foosim.protocol.world_spec import Robot, WorldSpec
 
 ANGLE_RAD_MAX: Final = 1000.0
 """The greatest angle that a rod's actuator takes."""
@@ -111,21 +109,6 @@ def command_channels(robot: Robot) -> list[str]:
     return [COMMANDS[robot.model][0]] if robot.model in COMMANDS else []
 
 
-def channel_kind(deployment: Deployment, robot: str, channel: str) -> str:
-    """Return the kind of an endpoint's channel, bytes for players and clients; raises UnknownName."""
-    if robot in deployment.players or robot in deployment.clients:
-        return CHANNEL_ECHO
-    if robot not in deployment.robots:
-        raise UnknownName("unknown robot", robot, deployment.robots)
-    settings = deployment.robots[robot]
-    built_in = [CHANNEL_ECHO, *command_channels(settings)]
-    if channel in built_in:
-        return channel
-    if channel not in settings.sensors:
-        raise UnknownName(f"{robot} has no such channel", channel, [*settings.sensors, *built_in])
-    return settings.sensors[channel].kind
-
-
 def value_fields(kind: str) -> tuple[str, ...]:
     """Return the names of the numbers that a kind carries; none for bytes."""
     fields: tuple[str, ...] = _NUMBERS[kind][1]._fields if kind in _NUMBERS else ()
@@ -175,32 +158,32 @@ def encode_payload(kind: str, value: Value) -> bytes:
     return packed.pack(*value)
 
 
-def command_channel(deployment: Deployment, robot: str, command: Command | Drive) -> str:
+def command_channel(spec: WorldSpec, robot: str, command: Command | Drive) -> str:
     """Return the channel of a robot's commands; raises UnknownName for a robot that takes no such command."""
     model = next(model for model, (_, kind) in COMMANDS.items() if isinstance(command, kind))
-    settings = deployment.robots.get(robot)
+    settings = spec.robots.get(robot)
     if settings is None or settings.model != model:
-        fitting = [name for name, other in deployment.robots.items() if other.model == model]
+        fitting = [name for name, other in spec.robots.items() if other.model == model]
         raise UnknownName(f"no {model}", robot, fitting)
     return COMMANDS[model][0]
 
 
-def encode_command(deployment: Deployment, robot: str, command: Command | Drive) -> bytes:
+def encode_command(spec: WorldSpec, robot: str, command: Command | Drive) -> bytes:
     """Return the payload of a robot's command; raises UnknownName for one that takes none, BadValue out of its reach.
 
     A node refuses, and counts, what is out of a rod's reach, and holds a rover's speeds within its drive's; here the
     sender is told.
     """
-    payload = encode_payload(command_channel(deployment, robot, command), command)
+    payload = encode_payload(command_channel(spec, robot, command), command)
     if isinstance(command, Drive):
-        speed = deployment.hall.rover.drive.speed
+        speed = spec.hall.rover.drive.speed
         for side, wanted in zip(Drive._fields, command, strict=True):
             if abs(wanted) > speed:
                 raise BadValue(f"{side} wheel of {robot} is not within -{speed} to {speed} m/s", wanted)
         return payload
-    settings = deployment.robots[robot]
+    settings = spec.robots[robot]
     assert isinstance(settings, RodRobot)
-    half_stroke = deployment.table.lines[settings.line].half_stroke
+    half_stroke = spec.table.lines[settings.line].half_stroke
     if abs(command.slide) > half_stroke:
         raise BadValue(f"slide of {robot} is not within -{half_stroke} to {half_stroke} m", command.slide)
     if abs(command.spin) > ANGLE_RAD_MAX:

@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Protocol
 
 from foosim.client.core import NEVER_NS, ClientCore
-from foosim.client.errors import PacketError, PlayerError, UnknownName
+from foosim.client.errors import PacketError, PlayerError
 from foosim.client.failing import Unanswered, failed
 from foosim.client.loading import load_player
 from foosim.client.packets import Outgoing, check_packet
-from foosim.client.payloads import Command, Drive, Value, channel_kind, command_channel, decode_payload, encode_command
+from foosim.client.payloads import Command, Drive, Value, command_channel, decode_payload, encode_command
+from foosim.protocol.channel_kinds import channel_kind
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment import Player as Declaration
-from foosim.protocol.errors import Malformed, Refused
+from foosim.protocol.errors import Malformed, Refused, UnknownName
 from foosim.protocol.messages import Received
 
 NS_PER_S: Final = 1_000_000_000

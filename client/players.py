@@ -13,14 +13,13 @@ from typing import Any, Final, NamedTuple
 
 from mypy_extensions import mypyc_attr
 
-from foosim.client.errors import UnknownName
 from foosim.client.payloads import BallPosition, Command, RodPosition
 from foosim.client.player import Commands, Samples
 from foosim.client.tracking import Ball, BallTrack, moved
 from foosim.protocol.camera import BallSensor
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key, draw_words
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, UnknownName
 from foosim.protocol.names import TEAMS
 from foosim.protocol.rod import RodRobot, RodSensor
 

@@ -22,15 +22,16 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
-from foosim.client.errors import ConnectionFailed, UnknownName
-from foosim.client.payloads import Value, channel_kind, decode_payload
+from foosim.client.errors import ConnectionFailed
+from foosim.client.payloads import Value, decode_payload
 from foosim.protocol import channels, limits
 from foosim.protocol.certificates import operator_credentials
+from foosim.protocol.channel_kinds import channel_kind
 from foosim.protocol.channels import ALIVE, PLAYED, REPLAY, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import BadValue, Malformed, Refused, show
+from foosim.protocol.errors import BadValue, Malformed, Refused, UnknownName, show
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.messages import Answer, Request

@@ -110,7 +110,7 @@ class Capture(SpecBase):
 
 
 class AccessSpec(SpecBase):
-    """Who may control the run, who may look at it, and how clients prove who they are: where the run has certificates."""
+    """Who may control the run, who may look at it, and how clients prove who they are, in a run with certificates."""
 
     operators: list[OperatorName] = Field(default=["admin"], max_length=limits.OPERATORS_MAX)
     viewers: list[OperatorName] = Field(default=[], max_length=limits.OPERATORS_MAX)

@@ -21,11 +21,12 @@ from pydantic import ValidationError
 from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import DeploymentError, describe
+from foosim.protocol.finding import Finding
 from foosim.protocol.hall_start import start_findings
 from foosim.protocol.network import Network
 from foosim.protocol.network_references import check_network, check_network_alone
 from foosim.protocol.radio_references import place_findings, rule_findings
-from foosim.protocol.references import Finding, check_references, path_text
+from foosim.protocol.references import check_references, path_text
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.settings import place_sets
 from foosim.protocol.table_clearance import clearance_findings

@@ -5,9 +5,12 @@ and is not acceptable raises a `Refused` or a class made from it, whose text nam
 choices, so that it can be shown to a person as it is. Each part of the project adds its own classes beside its code.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar, Final, TypeVar
 
+from foosim.protocol.names import nearest_name
+
+CHOICES_MAX: Final = 24
 ABSENT: Final = object()
 """Stands for a value that was not given, so that there is none to show."""
 
@@ -82,3 +85,13 @@ def show(value: object, length: int = 48) -> str:
 
 class Malformed(Refused):
     """Bytes, or a message made of them, that do not fit the schema or the world they claim to be about."""
+
+
+class UnknownName(BadValue):
+    """A robot, channel, destination or class that does not exist; the text lists those that do."""
+
+    def __init__(self, what: str, value: str, choices: Iterable[str]) -> None:
+        names = sorted(set(choices))
+        nearest = nearest_name(value, names)
+        shown = ", ".join(names[:CHOICES_MAX]) + (", ..." if len(names) > CHOICES_MAX else "")
+        super().__init__(f"{what} (there are: {shown or 'none'})", value, None if nearest is None else show(nearest))

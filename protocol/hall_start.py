@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from foosim.protocol.finding import Finding
 from foosim.protocol.obstacles import Circle, Obstacle, named_obstacles
-from foosim.protocol.references import Finding
 from foosim.protocol.rovers import RoverRobot, StationRobot
 from foosim.protocol.world_spec import WorldSpec
 

@@ -115,7 +115,9 @@ class Want(Message, frozen=True):
 DONE_OF: Final = "Done of "
 SAMPLES_OF: Final = "samples of "
 JOIN_OF: Final = "join of "
-"""How a heartbeat of the vHub says whom it waits for: names follow, joined by a comma and a space."""
+CAPTURE: Final = "capture"
+"""How a heartbeat of the vHub says whom it waits for: names follow, joined by a comma and a space. `CAPTURE`
+says that its run has ended and that it closes the capture."""
 
 
 class Heartbeat(Message, frozen=True):

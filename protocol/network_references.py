@@ -10,11 +10,12 @@ from typing import Any, Final
 
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
+from foosim.protocol.finding import Finding, Location
 from foosim.protocol.impairments import BURST_MAX, BURSTS, PARETO_MAX
 from foosim.protocol.names import nearest_name
 from foosim.protocol.network import ACTIONS, EVENTS_MAX, LINK_RULES_MAX, RADIOS_MAX, REST
 from foosim.protocol.radio_references import is_on_air, radio_findings
-from foosim.protocol.references import BODILESS, Finding, Location, View, quoted
+from foosim.protocol.references import BODILESS, View, quoted
 
 JITTER_RATIO_MAX: Final = 100
 NO_ENDPOINT: Final = "a selector that matches no endpoint"

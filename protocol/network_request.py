@@ -16,12 +16,13 @@ from pydantic import ValidationError
 from foosim.protocol import limits, units
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Refused, describe
+from foosim.protocol.finding import Finding, Location
 from foosim.protocol.impairments import Trace
 from foosim.protocol.json_text import encode_json
 from foosim.protocol.network import Event, Network
 from foosim.protocol.network_references import event_findings
 from foosim.protocol.radio_references import set_findings
-from foosim.protocol.references import Finding, Location, View, path_text
+from foosim.protocol.references import View, path_text
 from foosim.protocol.schema_problems import schema_findings
 from foosim.protocol.traces import file_settings
 

@@ -10,11 +10,12 @@ from typing import Any, Final
 from foosim.protocol import units
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import BadValue
+from foosim.protocol.finding import Finding, Location
 from foosim.protocol.impairments import Impairments
 from foosim.protocol.network import Event, LinkRule, Network
 from foosim.protocol.presets import PRESETS, preset_settings
 from foosim.protocol.radios import Radio, lora_longest
-from foosim.protocol.references import BODILESS, Finding, Location, View
+from foosim.protocol.references import BODILESS, View
 
 BANDWIDTHS: Final = {"802.11a/g": ("20 MHz", "10 MHz"), "802.11n": ("20 MHz",)}
 """Of Wi-Fi: those whose rates are known here; 10 MHz is 802.11p."""

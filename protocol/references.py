@@ -8,16 +8,14 @@ network_references.py, rates and offsets are in timing_references.py.
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from fractions import Fraction
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue, show
+from foosim.protocol.finding import Finding, Location
 from foosim.protocol.names import LINE_NAMES, nearest_name
-
-Location = tuple[str | int, ...]
 
 # Bounds of what is looked at; what is beyond them, the schema refuses.
 TEXTS_MAX: Final = 4096
@@ -29,21 +27,6 @@ WORLD_OF_MODEL: Final[Mapping[str, str]] = {"rod": "table", "camera": "table", "
 """The kind of world that a model of robot is for."""
 BODILESS: Final = "camera"
 """The model of robots that have no body."""
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A problem at a location in the data: at the value there, at its key, or at the mapping that lacks the key.
-
-    `other` is the same problem at the other of two values that do not fit: it is what is told where that one was set.
-    """
-
-    location: Location
-    what: str
-    value: object
-    nearest: str | None = None
-    at: Literal["value", "key", "missing"] = "value"
-    other: "Finding | None" = None
 
 
 def check_references(data: object) -> Iterator[Finding]:

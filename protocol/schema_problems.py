@@ -15,8 +15,9 @@ from pydantic_core import ErrorDetails
 
 from foosim.protocol import hosts, names
 from foosim.protocol.deployment import deployment_schema
+from foosim.protocol.finding import Finding, Location
 from foosim.protocol.names import nearest_name
-from foosim.protocol.references import Finding, Location, quoted
+from foosim.protocol.references import quoted
 
 _NAME = "lower case letters, digits, - and _, a letter first"
 _PATTERNS: Final = {

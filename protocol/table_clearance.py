@@ -18,8 +18,8 @@ import numpy as np
 
 from foosim.protocol.assign import line_x_m
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.finding import Finding
 from foosim.protocol.mesh import Mesh
-from foosim.protocol.references import Finding
 from foosim.protocol.rod import RodRobot
 from foosim.protocol.scene import Box, Cylinder, Quaternion, Shape, Vector, rotate, shape_box
 from foosim.protocol.scenery import scenery_shape

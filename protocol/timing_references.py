@@ -8,8 +8,9 @@ from fnmatch import fnmatchcase
 
 from foosim.protocol import names, units
 from foosim.protocol.errors import BadValue
+from foosim.protocol.finding import Finding, Location
 from foosim.protocol.names import nearest_name
-from foosim.protocol.references import Finding, Location, View, quoted
+from foosim.protocol.references import View, quoted
 from foosim.protocol.units import format_ns
 
 

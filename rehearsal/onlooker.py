@@ -13,7 +13,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.names import TEAMS
 from foosim.rehearsal.settings import AtWork
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.display import score_text
+from foosim.supervisor.status import score_text
 
 LINE_S: Final = 1.0
 LOOK_S: Final = 0.05

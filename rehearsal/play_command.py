@@ -10,11 +10,10 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from foosim.client.errors import UnknownName
 from foosim.client.replay import hear_replay
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.command import DONE, FAILED, PKI_VARIABLE, PkiOption
-from foosim.protocol.errors import BadValue, read_at
+from foosim.protocol.errors import BadValue, UnknownName, read_at
 from foosim.protocol.json_text import encode_json
 from foosim.protocol.process import Stop
 from foosim.protocol.units import NS_PER_S, RATE, TIME, Dimension, parse, parse_ns, parse_pace

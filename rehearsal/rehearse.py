@@ -24,9 +24,9 @@ from foosim.protocol.start import Start
 from foosim.protocol.units import Pace
 from foosim.rehearsal.attendant import Attendant
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import result
-from foosim.vhub.capture_file import ending_metadata, origin_metadata
+from foosim.vhub.capture_contents import ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.records import Closing

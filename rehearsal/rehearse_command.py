@@ -24,9 +24,10 @@ from foosim.rehearsal.onlooker import LINE_S
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.swarm import Flown, fly
 from foosim.rehearsal.system import Settings
-from foosim.supervisor.display import score_text
 from foosim.supervisor.new_capture import check_rooms
-from foosim.supervisor.plan import Plan, RunOptions, check_models_here, check_players_here, make_plan
+from foosim.supervisor.plan import Plan, check_models_here, check_players_here, make_plan
+from foosim.supervisor.run_options import RunOptions
+from foosim.supervisor.status import score_text
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
 

@@ -46,7 +46,7 @@ from foosim.rehearsal.packet_laws import hold
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 
 FAULTS: Final[tuple[int, ...]] = (8, 20)
 NODES: Final[tuple[int, ...]] = (3, 3, 3, 4, 4, 5)

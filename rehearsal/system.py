@@ -27,8 +27,8 @@ from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.hub_journal import Ending, HubJournal
 from foosim.rehearsal.people import OPERATOR, People
 from foosim.rehearsal.settings import AtWork, Process, Settings
-from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch

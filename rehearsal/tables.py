@@ -16,10 +16,10 @@ from typing import Any, Final, Literal
 import msgspec
 from msgspec import inspect
 
-from foosim.client.errors import UnknownName
-from foosim.client.payloads import COMMAND_KINDS, channel_kind, decode_payload, value_fields
+from foosim.client.payloads import COMMAND_KINDS, decode_payload, value_fields
+from foosim.protocol.channel_kinds import channel_kind
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import BadValue, Malformed, show
+from foosim.protocol.errors import BadValue, Malformed, UnknownName, show
 from foosim.protocol.json_text import encode_json
 from foosim.protocol.names import nearest_name
 from foosim.vhub.mcap_file import Message

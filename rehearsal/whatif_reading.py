@@ -20,8 +20,8 @@ from foosim.protocol.messages import Sent
 from foosim.protocol.robot_packets import RobotPacket
 from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
+from foosim.vhub.capture_contents import CUT_REASON, CUT_TICK
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick
-from foosim.vhub.capture_split import CUT_REASON, CUT_TICK
 from foosim.vhub.payload_hash import check_payloads
 from foosim.vhub.rows import (
     AGES,

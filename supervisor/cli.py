@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,6 +28,7 @@ from foosim.supervisor.console_child import Page
 from foosim.supervisor.detach import detach
 from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
+from foosim.supervisor.journal_check import supervisor_records
 from foosim.supervisor.leftovers import recover_leftovers
 from foosim.supervisor.main import serve
 from foosim.supervisor.new_capture import check_capture, check_rooms, default_capture
@@ -34,7 +36,6 @@ from foosim.supervisor.outcome import Outcome, detached_outcome, ended_outcome, 
 from foosim.supervisor.pki_hosts import files_for, send_files
 from foosim.supervisor.plan import (
     Plan,
-    RunOptions,
     check_certificates,
     check_models_here,
     check_players_here,
@@ -43,6 +44,7 @@ from foosim.supervisor.plan import (
 )
 from foosim.supervisor.remote import Remote, unit_name
 from foosim.supervisor.run_folder import RunFolder, create_run, open_run, run_exists, runs_folder
+from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.units import units_of
 from foosim.supervisor.up import Killed, Up
 
@@ -235,7 +237,8 @@ def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
     if not has_launcher():  # which has looked, and ends a run in order whose room gets lost meanwhile
         _look_for_room(plan, None, runs_folder(), Display(sys.stderr))
     folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
-    raise typer.Exit(serve(plan, folder, progress_file))
+    settings, records = plan.settings(folder.name), partial(supervisor_records, folder, plan.options)
+    raise typer.Exit(serve(settings, plan.address, plan.options.pki, folder, records, progress_file))
 
 
 def _options(  # noqa: PLR0913, PLR0917  # a command's options

@@ -53,11 +53,11 @@ from foosim.supervisor.closing import Closing
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.head import control_of, head_of
 from foosim.supervisor.pacing import Pacer
-from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import CommitRecord, Control, History, RunRecord, Solved, solved_by
 from foosim.supervisor.recovery import Recovery
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
+from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import SupervisorStatistics
 from foosim.supervisor.take_over import TakeOver
 from foosim.supervisor.viewing import Viewing

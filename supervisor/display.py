@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from foosim.protocol.disk import megabytes
+from foosim.supervisor.status import score_text
 from foosim.vhub.room_watch import CLOSING
 
 LINKS_SHOWN_MAX: Final = 20
@@ -60,11 +61,6 @@ def rovers_text(status: dict[str, Any]) -> str:
     rovers = status["rovers"]
     count, drive, least, charge = (rovers[key] for key in ("count", "drive", "least", "charge"))
     return f"{count} rovers, {drive} drive, {least} has {charge:.0%} of its charge"
-
-
-def score_text(status: dict[str, Any]) -> str:
-    """`red 2 : 1 blue`."""
-    return f"red {status['score']['red']} : {status['score']['blue']} blue"
 
 
 def ball_text(status: dict[str, Any]) -> str:

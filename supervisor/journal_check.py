@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode, decode_any
@@ -18,11 +17,9 @@ from foosim.protocol.messages import Commit
 from foosim.supervisor.leftovers import captured_at
 from foosim.supervisor.records import CommitRecord, HeadRecord, Record
 from foosim.supervisor.run_folder import RunFolder
+from foosim.supervisor.run_options import RunOptions
 from foosim.vhub.branching import branch_command
 from foosim.vhub.resume import last_tick_of
-
-if TYPE_CHECKING:
-    from foosim.supervisor.plan import RunOptions
 
 
 def check_journals(folder: RunFolder, options: RunOptions) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -16,10 +17,11 @@ import msgspec
 from foosim.protocol import channels, limits, wall
 from foosim.protocol.access import access_to
 from foosim.protocol.actions import Say
-from foosim.protocol.addresses import parse_address
+from foosim.protocol.addresses import Address, parse_address
 from foosim.protocol.certificates import check_host, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.command import DONE, FAILED, REFUSED
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
@@ -31,11 +33,10 @@ from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot,
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.journal_check import supervisor_records
 from foosim.supervisor.journal_room import JournalRoom
-from foosim.supervisor.plan import Plan, RunSettings
 from foosim.supervisor.records import History, fold
 from foosim.supervisor.run_folder import RESULT_FILE, RunFolder, RunInfo
+from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import result
 
 
@@ -44,7 +45,8 @@ class SupervisorProcess:
 
     def __init__(
         self,
-        plan: Plan,
+        settings: RunSettings,
+        pki: Path | None,
         folder: RunFolder,
         session: Session,
         inbox: Inbox,
@@ -52,8 +54,6 @@ class SupervisorProcess:
         history: History | None,
         progress: Path | None = None,
     ) -> None:
-        what = str(plan.options.file), plan.text, plan.pace, plan.ticks, plan.start, plan.options.balance, plan.files
-        settings = RunSettings(folder.name, *what)
         start = time.monotonic_ns(), new_boot(), clock_name()
         self.core = SupervisorCore(settings, library_fingerprint(), *start, history)
         self._folder = folder
@@ -61,12 +61,12 @@ class SupervisorProcess:
         self._is_told_to_end = False
         self._info = RunInfo(
             folder.name,
-            plan.deployment.world,
-            str(plan.options.file.absolute()),
+            self.core.deployment.world,
+            str(Path(settings.deployment_name).absolute()),
             os.getpid(),
             wall.now_text(),
             session.locator,
-            pki="" if plan.options.pki is None else str(plan.options.pki.absolute()),
+            pki="" if pki is None else str(pki.absolute()),
         )
         self._exposure = Exposure(parse_address(session.locator), time.monotonic_ns())
         known = folder.info()
@@ -82,7 +82,7 @@ class SupervisorProcess:
         self._loop.notify = Notify()
         self._loop.turn = self._turn
         self._loop.on_unwritten = self._on_unwritten
-        self._room = JournalRoom(folder.journals, plan.deployment.capture.reserve_bytes)
+        self._room = JournalRoom(folder.journals, self.core.deployment.capture.reserve_bytes)
         self._loop.took = self.core.watch.took
         self._loop.stood = lambda stood_ns, now_ns: self.core.watch.rest(self.core, stood_ns, now_ns)
         self._loop.lacking = lambda: self.core.lacking
@@ -153,21 +153,32 @@ class SupervisorProcess:
             self.core.process_gone(name, time.monotonic_ns())
 
 
-def serve(plan: Plan, folder: RunFolder, progress: Path | None = None) -> int:
-    """Run the supervisor of a run in this process; return the exit code. Raises Refused before it has begun."""
+def serve(
+    settings: RunSettings,
+    address: Address,
+    pki: Path | None,
+    folder: RunFolder,
+    read_records: Callable[[], list[bytes]],
+    progress: Path | None = None,
+) -> int:
+    """Run the supervisor of a run in this process; return the exit code.
+
+    `read_records` returns the records of its journal, and raises Refused when it is damaged. Raises Refused before it
+    has begun.
+    """
     die_with_parent()
     folder.hold()
     inbox = Inbox(limits.INBOX_MESSAGES_MAX)
     stop = Stop()
-    history = _history(plan, folder)
+    deployment = settings.load_deployment()
+    history = _history(settings, deployment, folder, read_records)
     known = folder.info()
-    address = str(plan.address) if history is None or known is None else known.simulation
-    credentials = load_credentials(plan.options.pki, SUPERVISOR)
-    access = access_to(Plane.SIMULATION, plan.deployment)
-    security = None if credentials is None else Security(credentials, access)
-    with Journal(folder.journals, SUPERVISOR) as journal, Session.router(address, security=security) as session:
+    listen = str(address) if history is None or known is None else known.simulation
+    credentials = load_credentials(pki, SUPERVISOR)
+    security = None if credentials is None else Security(credentials, access_to(Plane.SIMULATION, deployment))
+    with Journal(folder.journals, SUPERVISOR) as journal, Session.router(listen, security=security) as session:
         check_host(credentials, session.locator)
-        supervisor = SupervisorProcess(plan, folder, session, inbox, journal, history, progress)
+        supervisor = SupervisorProcess(settings, pki, folder, session, inbox, journal, history, progress)
         warn_of_end(credentials, supervisor.log)
         stop.then(supervisor.stop)
         code = supervisor.run()
@@ -176,16 +187,18 @@ def serve(plan: Plan, folder: RunFolder, progress: Path | None = None) -> int:
     return code
 
 
-def _history(plan: Plan, folder: RunFolder) -> History | None:
+def _history(
+    settings: RunSettings, deployment: Deployment, folder: RunFolder, read_records: Callable[[], list[bytes]]
+) -> History | None:
     """Return what the journal in the run's folder says; None for a new run. Raises Refused when it is another's."""
     if folder.result() is not None:
         raise Refused(f"run {folder.name} has ended, its result is {folder.path / RESULT_FILE}")
     if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
         return None  # the one before may have ended when it had only made the file
     try:
-        history = fold(plan.deployment, supervisor_records(folder, plan.options))
+        history = fold(deployment, read_records())
     except (JournalError, Malformed) as error:
         raise Refused(f"run {folder.name} cannot go on: {error}") from None
-    if history.run.deployment != plan.text:
-        raise Refused(f"run {folder.name} was started with another deployment than {plan.options.file} is now")
+    if history.run.deployment != settings.deployment_text:
+        raise Refused(f"run {folder.name} was started with another deployment than {settings.deployment_name} is now")
     return history

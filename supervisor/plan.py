@@ -21,87 +21,15 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment, read_de
 from foosim.protocol.errors import BadValue, Refused, read_at
 from foosim.protocol.hall_start import start_findings
 from foosim.protocol.hosts import places
-from foosim.protocol.start import Origin, Start
+from foosim.protocol.start import Start
 from foosim.protocol.table_clearance import clearance_findings
 from foosim.protocol.units import Pace, parse_ns, parse_pace
 from foosim.supervisor.resumable import check_resumable
-from foosim.supervisor.run_folder import Launch, RunFolder
+from foosim.supervisor.run_folder import RunFolder
+from foosim.supervisor.run_options import RunOptions, options_of
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.branching import Branch, read_branch
 from foosim.vhub.link_models import check_link_models
-
-
-@dataclass(frozen=True, slots=True)
-class RunOptions:
-    """How to run a deployment file; texts as a person types them."""
-
-    file: Path
-    pace: str | None = None
-    duration: str | None = None
-    seed: int | None = None
-    sets: tuple[str, ...] = ()
-    listen: str | None = None
-    """Where to listen; None is where the deployment says."""
-    insecure: bool = False
-    pki: Path | None = None
-    branch: str | None = None
-    """`CAPTURE@12.5s`: begin with that frame."""
-    balance: bool = False
-    """Move robots by the nodes' measured load."""
-
-    @property
-    def all_sets(self) -> tuple[str, ...]:
-        return self.sets if self.seed is None else (*self.sets, f"seed={self.seed}")
-
-    def arguments(self) -> list[str]:
-        """Return the options as arguments of `foosim-supervisor run`."""
-        given = [str(self.file)]
-        given += ["--listen", self.listen] if self.listen is not None else []
-        given += ["--insecure"] if self.insecure else []
-        given += self.pki_arguments()
-        given += ["--pace", self.pace] if self.pace is not None else []
-        given += ["--for", self.duration] if self.duration is not None else []
-        given += ["--seed", str(self.seed)] if self.seed is not None else []
-        given += ["--from", self.branch] if self.branch is not None else []
-        given += ["--balance"] if self.balance else []
-        for setting in self.sets:
-            given += ["--set", setting]
-        return given
-
-    def pki_arguments(self) -> list[str]:
-        """Return where the certificates are, as each process of the run is told it."""
-        return [] if self.pki is None else ["--pki", str(self.pki.absolute())]
-
-
-@dataclass(frozen=True, slots=True)
-class RunSettings:
-    """What a supervisor is started with. `ticks` is how many there are; 0 is until it is asked to end.
-
-    `start` is the frame of another run that it begins with; None: frame 0.
-    """
-
-    run: str
-    deployment_name: str
-    deployment_text: str
-    pace: Pace
-    ticks: int = 0
-    start: Start | None = None
-    balance: bool = False
-    """Whether robots move by the nodes' measured load."""
-    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
-    """The contents of the files that the deployment refers to, by path."""
-
-    def load_deployment(self) -> Deployment:
-        """The deployment with its files; raises DeploymentError or AssetError."""
-        return load_deployment(self.deployment_text, self.deployment_name).with_assets(self.files)
-
-    @property
-    def origin(self) -> Origin | None:
-        return None if self.start is None else self.start.origin
-
-    @property
-    def last_tick(self) -> int:
-        """The tick of the frame that ends the run; 0: it ends when it is asked to."""
-        return self.ticks and self.ticks + (0 if self.start is None else self.start.origin.tick)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +51,11 @@ class Plan:
     @property
     def start(self) -> Start | None:
         return None if self.branch is None else self.branch.start
+
+    def settings(self, run: str) -> RunSettings:
+        """Return what the supervisor of the run with this name is started with."""
+        name, balance = str(self.options.file), self.options.balance
+        return RunSettings(run, name, self.text, self.pace, self.ticks, self.start, balance, self.files)
 
 
 def check_certificates(plan: Plan) -> list[str]:
@@ -182,32 +115,6 @@ def make_plan(options: RunOptions) -> Plan:
             raise BadValue("--for: a run has at least one tick", options.duration)
     branch = None if options.branch is None else read_branch(options.branch, deployment)
     return Plan(options, text, deployment, pace, ticks, address, branch, files)
-
-
-def launch_of(options: RunOptions, capture: Path | None) -> Launch:
-    """Return the options of a run as they are kept in its folder."""
-    return Launch(
-        str(options.file.absolute()),
-        "" if capture is None else str(capture.absolute()),
-        options.pace,
-        options.duration,
-        options.seed,
-        options.sets,
-        options.listen,
-        options.insecure,
-        None if options.pki is None else str(options.pki.absolute()),
-        None if options.branch is None else str(Path(options.branch).absolute()),
-        options.balance,
-    )
-
-
-def options_of(launch: Launch) -> RunOptions:
-    """Return the options that are kept in a run's folder; the inverse of `launch_of`."""
-    pki = None if launch.pki is None else Path(launch.pki)
-    timing = launch.pace, launch.duration, launch.seed
-    return RunOptions(
-        Path(launch.file), *timing, launch.sets, launch.listen, launch.insecure, pki, launch.branch, launch.balance
-    )
 
 
 def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:

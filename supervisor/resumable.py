@@ -9,7 +9,6 @@ import shlex
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any
@@ -17,13 +16,11 @@ from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.journal import JournalError, journal_files, read_records
 from foosim.supervisor.journal_check import check_journals
 from foosim.supervisor.run_folder import RunFolder
+from foosim.supervisor.run_options import RunOptions
 from foosim.vhub.branching import branch_command
 from foosim.vhub.capture_parts import files_from, first_there, has_end, head_of, parts_at
 from foosim.vhub.records import HeadRecord, HubRecord
 from foosim.vhub.rows import CaptureError
-
-if TYPE_CHECKING:
-    from foosim.supervisor.plan import RunOptions
 
 
 def check_resumable(folder: RunFolder, options: RunOptions, capture: Path | None, *, has_hub_here: bool) -> None:

@@ -175,3 +175,8 @@ def _state(core: SupervisorCore) -> str:
     if not core.is_open:
         return "starting" if core.take_over is None else "recovering"
     return "paused" if core.pacer.paused else "running"
+
+
+def score_text(status: dict[str, Any]) -> str:
+    """`red 2 : 1 blue`."""
+    return f"red {status['score']['red']} : {status['score']['blue']} blue"

@@ -29,11 +29,12 @@ from foosim.supervisor.hosts import check_hosts, fetch_capture
 from foosim.supervisor.launcher import Child, Launcher, command_line
 from foosim.supervisor.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
 from foosim.supervisor.outcome import Outcome, capture_lines, plan_facts, result_without_supervisor, with_capture
-from foosim.supervisor.plan import Plan, launch_of
+from foosim.supervisor.plan import Plan
 from foosim.supervisor.remote import CAPTURE
 from foosim.supervisor.remote import remotes as remotes_of
 from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
+from foosim.supervisor.run_options import launch_of
 from foosim.supervisor.signals import counted_signals
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Final
 from foosim.protocol import limits
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.messages import DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
+from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
 from foosim.protocol.standstill import TOLD_NS, told
 from foosim.supervisor.roster import Process, Roster
-from foosim.vhub.closing import CAPTURE
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore

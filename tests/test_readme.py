@@ -25,7 +25,8 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.yaml_tree import locate_in, plain, read_tree
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import System
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.plan import make_plan
+from foosim.supervisor.run_options import RunOptions
 from foosim.vhub.capture_reader import open_capture
 
 ROOT: Final = Path(__file__).parents[1]

@@ -17,10 +17,19 @@ from mcap import records
 from foosim.protocol.errors import BadValue, Failed
 from foosim.protocol.frame import chain_next
 from foosim.protocol.units import format_ns
-from foosim.vhub.capture_file import CHUNK_BYTES, check_new, declare_topics
+from foosim.vhub.capture_contents import (
+    CHUNK_BYTES,
+    CUT,
+    CUT_CHAIN,
+    CUT_DIGEST,
+    CUT_REASON,
+    CUT_TICK,
+    OWN,
+    check_new,
+    declare_topics,
+)
 from foosim.vhub.capture_parts import END_METADATA, METADATA, Joined
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
-from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_REASON, CUT_TICK, OWN
 from foosim.vhub.in_force import InForce
 from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import Message

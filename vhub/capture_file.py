@@ -9,14 +9,11 @@ left), `capture_writer` (the thread), `capture_recovery`.
 from __future__ import annotations
 
 import os
-import platform
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
-from importlib.metadata import PackageNotFoundError, version
+from functools import cached_property
 from pathlib import Path
-from typing import Final
 
 import msgspec
 
@@ -24,22 +21,27 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Room, megabytes, room_on_disk
 from foosim.protocol.frame import Frame
 from foosim.protocol.json_text import encode_json
-from foosim.protocol.messages import End, Epoch
-from foosim.protocol.start import Origin
+from foosim.protocol.messages import Epoch
+from foosim.vhub.capture_contents import (
+    ASSETS,
+    DEPLOYMENT,
+    OWN,
+    VERSIONS,
+    check_new,
+    declare_topics,
+    library_versions,
+    sync_folder,
+    write_all,
+)
 from foosim.vhub.capture_left import Journalled, Left, Progress, look, run_of
 from foosim.vhub.capture_parts import (
     END_METADATA,
-    FAILED_RUN,
     METADATA,
     NEXT,
-    ORIGIN,
-    ORIGIN_CHAIN,
-    ORIGIN_DIGEST,
-    ORIGIN_TICK,
     part_path,
     parts_at,
 )
-from foosim.vhub.capture_split import OWN, Split
+from foosim.vhub.capture_split import Split
 from foosim.vhub.earlier_crc import EarlierCrc
 from foosim.vhub.in_force import HOLDING
 from foosim.vhub.link_models import model_versions
@@ -50,19 +52,9 @@ from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.model_hash import MODEL_HASH, model_hash
 from foosim.vhub.payload_hash import hashed_row, keeps_hashes
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE, ROW_TYPES, CaptureError, Row, row_schema
+from foosim.vhub.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE, CaptureError, Row
 from foosim.vhub.to_rows import add_packets, epoch_entry, frame_row, plan_of, world_rows
-from foosim.vhub.viewing import LOG, POSES, SCENE, VIEW_TYPES, View
-
-DEPLOYMENT: Final = "deployment.yaml"
-ASSETS: Final = "assets/"
-"""How the names of the files begin that the deployment refers to; their paths follow."""
-VERSIONS: Final = "versions.json"
-CHUNK_BYTES: Final = 4 * 1024 * 1024
-"""A chunk is ended at this size, or when it is to be flushed; a reader holds one at a time."""
-_LIBRARIES: Final = (
-    *("foosim", "eclipse-zenoh", "foxglove-sdk", "mcap", "msgspec", "numpy", "pybullet", "pydantic", "zstandard"),
-)
+from foosim.vhub.viewing import LOG, POSES, SCENE, View
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,62 +77,6 @@ class Described:
     name: str
     text: str
     metadata: Mapping[str, str]
-
-
-def origin_metadata(origin: Origin | None) -> dict[str, str]:
-    """Return what a capture says of where its run began."""
-    if origin is None:
-        return {}
-    digest, chain = origin.digest.hex(), origin.chain.hex()
-    return {ORIGIN: origin.source, ORIGIN_TICK: str(origin.tick), ORIGIN_DIGEST: digest, ORIGIN_CHAIN: chain}
-
-
-def ending_metadata(end: End) -> dict[str, str]:
-    """Return what a capture says of how its run ended."""
-    return {"reason": end.reason, **({FAILED_RUN: "true"} if end.failed else {})}
-
-
-def declare_topics(mcap: McapWriter) -> dict[str, int]:
-    """Declare all topics, also those that stay empty; return their channels."""
-    return {topic: mcap.add_channel(topic, encoding, schema) for topic, encoding, schema in _topics()}
-
-
-@cache
-def _topics() -> tuple[tuple[str, str, tuple[str, str, bytes]], ...]:
-    """Return each topic with its encoding and schema, made once: a run waits while another file is begun."""
-    topics = []
-    for topic, kind in ROW_TYPES.items():
-        schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(row_schema(kind)))
-        topics.append((topic, "json", schema))
-    for topic, message in VIEW_TYPES.items():
-        view = message.get_schema()
-        topics.append((topic, "protobuf", (view.name, view.encoding, view.data)))
-    return tuple(topics)
-
-
-def library_versions() -> dict[str, str]:
-    """Return the versions that a run depends on, for the capture."""
-    versions = {"python": platform.python_version(), "platform": platform.platform()}
-    for name in _LIBRARIES:
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed"
-    return versions
-
-
-def write_all(file: int, content: bytes) -> None:
-    """Write to a file descriptor until all of it is written."""
-    written = os.write(file, content)
-    while written < len(content):
-        written += os.write(file, content[written:])
-
-
-def check_new(path: Path, *, is_split: bool = False) -> None:
-    """Raise CaptureError when there is something where a capture is to be, or where one that is split goes on."""
-    there = parts_at(path) if is_split else {0: path} if os.path.lexists(path) else {}
-    for found in there.values():
-        raise CaptureError(f"{found}: exists already; a capture is never overwritten")
 
 
 class CaptureFile:
@@ -474,12 +410,3 @@ class CaptureFile:
 
 def _is_described(found: Scanned) -> bool:
     return CHECKS in found.metadata
-
-
-def sync_folder(folder: Path) -> None:
-    """Bring the names of a folder's files to the disk; raises OSError."""
-    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(opened)
-    finally:
-        os.close(opened)

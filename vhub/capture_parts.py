@@ -151,7 +151,7 @@ def end_of(path: Path) -> dict[str, str] | None:
                 raise ValueError("it does not end with a footer")
             stream.seek(start)
             summary = stream.read(footer - start) if start else b""
-            compare("all of it", crc32(tail[: -_BEHIND_FOOTER], crc32(summary)), told)
+            compare("all of it", crc32(tail[:-_BEHIND_FOOTER], crc32(summary)), told)
             return _end_in(stream, summary, size)
     except OSError as error:
         raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None

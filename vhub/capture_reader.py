@@ -34,11 +34,7 @@ from foosim.protocol.scene import Body
 from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import Origin, first_chain
 from foosim.vhub.capture_columns import AllFrames, Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
-from foosim.vhub.capture_file import (
-    ASSETS,
-    DEPLOYMENT,
-    VERSIONS,
-)
+from foosim.vhub.capture_contents import ASSETS, CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK, DEPLOYMENT, VERSIONS
 from foosim.vhub.capture_parts import (
     END_METADATA,
     METADATA,
@@ -51,7 +47,6 @@ from foosim.vhub.capture_parts import (
     files_from,
     has_end,
 )
-from foosim.vhub.capture_split import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
 from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import (

@@ -25,7 +25,8 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.journal import JournalError, journal_files, lock_journal, read_journal
 from foosim.protocol.messages import Epoch
-from foosim.vhub.capture_file import CHUNK_BYTES, CaptureFile, Described, Line
+from foosim.vhub.capture_contents import CHUNK_BYTES
+from foosim.vhub.capture_file import CaptureFile, Described, Line
 from foosim.vhub.capture_left import Journalled
 from foosim.vhub.capture_parts import whole_path
 from foosim.vhub.capture_reader import About, deployment_of, read_about

@@ -8,22 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 from foosim.protocol.deployment import Capture
 from foosim.protocol.units import format_ns
+from foosim.vhub.capture_contents import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
 from foosim.vhub.capture_parts import AFTER, LAST, ORIGIN_TICK, PART, head_of, number_of, part_path, parts_at
 from foosim.vhub.in_force import InForce
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import CaptureError
-
-CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cut_chain"
-"""Which capture a file is of that begins later, its first frame, its digest, and the chain up to it: entries of the
-metadata `foosim`."""
-CUT_REASON: Final = "cut"
-"""The reason of its end that a part says."""
-OWN: Final = frozenset({PART, AFTER, LAST, CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN})
-"""What the files of a capture say otherwise, each for itself."""
 
 
 @dataclass(frozen=True, slots=True)

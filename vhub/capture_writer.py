@@ -23,7 +23,7 @@ from foosim.protocol import limits
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.disk import Level
 from foosim.protocol.messages import Epoch
-from foosim.vhub import capture_file
+from foosim.vhub import capture_contents
 from foosim.vhub.capture_file import CaptureFile, Described, Item, Line
 from foosim.vhub.capture_left import Journalled
 from foosim.vhub.records import Closing
@@ -239,7 +239,7 @@ class CaptureWriter:
             for item in items:
                 self._write_item(item)
             now_ns = time.monotonic_ns()
-            if now_ns >= flush_at_ns or self._file.mcap.chunk_bytes > capture_file.CHUNK_BYTES:
+            if now_ns >= flush_at_ns or self._file.mcap.chunk_bytes > capture_contents.CHUNK_BYTES:
                 self._flush()
                 flush_at_ns = now_ns + interval_ns
             if now_ns >= sync_at_ns and self._syncer.lags and not self._pending:

@@ -6,16 +6,13 @@ Neighbours: `core` has decided all that there was, `capture_writer` closes, `sup
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 from msgspec.structs import replace
 
 from foosim.protocol.channels import Channel
-from foosim.protocol.messages import Heartbeat
+from foosim.protocol.messages import CAPTURE, Heartbeat
 from foosim.vhub.core import HubCore
-
-CAPTURE: Final = "capture"
-"""What such a vHub says that it waits for."""
 
 
 class ClosingCore:

@@ -16,10 +16,11 @@ from typing import Any, Final, Literal, NamedTuple, NoReturn, Protocol
 
 from foosim.protocol.deployment_file import refuse_findings
 from foosim.protocol.errors import Refused
+from foosim.protocol.finding import Finding, Location
 from foosim.protocol.impairments import OwnModel
 from foosim.protocol.names import nearest_name
 from foosim.protocol.network import Network
-from foosim.protocol.references import Finding, Location, quoted
+from foosim.protocol.references import quoted
 from foosim.protocol.scene import Vector
 
 GROUP: Final = "foosim.link_models"

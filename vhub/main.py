@@ -44,16 +44,16 @@ from foosim.protocol.journal import (
     remove_journal,
 )
 from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.messages import Build
+from foosim.protocol.messages import CAPTURE, Build
 from foosim.protocol.notify import Notify
 from foosim.protocol.probe import ProgressOption
 from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
-from foosim.vhub.capture_file import check_new, ending_metadata, origin_metadata
+from foosim.vhub.capture_contents import check_new, ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.closing import CAPTURE, ClosingCore
+from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.link_models import check_link_models

@@ -9,15 +9,15 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from typing import Any, Final
 
-from foosim.client.errors import UnknownName
-from foosim.client.payloads import channel_kind, decode_payload
+from foosim.client.payloads import decode_payload
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.capture_status import status_at
 from foosim.console.recorded.link_history import PACKET_MARKS
 from foosim.console.recorded.playhead import Playhead
 from foosim.console.shown.curves import link_figure, value_at
 from foosim.console.shown.source import Curve
-from foosim.protocol.errors import Malformed
+from foosim.protocol.channel_kinds import channel_kind
+from foosim.protocol.errors import Malformed, UnknownName
 from foosim.vhub.rows import FRAME, PACKETS
 
 POINTS: Final = 600

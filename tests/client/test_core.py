@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foosim.client.core import AGAIN_NS, NEVER_NS, ClientCore
-from foosim.client.errors import PacketError, UnknownName
+from foosim.client.errors import PacketError
 from foosim.client.packets import Outgoing
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish, Say
@@ -19,6 +19,7 @@ from foosim.protocol.channels import CLIENT_READS, Plane
 from foosim.protocol.client_messages import ClientRefusal
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
+from foosim.protocol.errors import UnknownName
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import (

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.client.errors import UnknownName
 from foosim.client.payloads import (
     KINDS,
     BallPosition,
@@ -22,13 +21,13 @@ from foosim.client.payloads import (
     RodPosition,
     Value,
     WheelTravel,
-    channel_kind,
     decode_payload,
     encode_command,
     encode_payload,
 )
+from foosim.protocol.channel_kinds import channel_kind
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import BadValue, Malformed
+from foosim.protocol.errors import BadValue, Malformed, UnknownName
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)

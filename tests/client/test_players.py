@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from foosim.client.errors import UnknownName
 from foosim.client.payloads import BallPosition, Command, RodPosition
 from foosim.client.player import Commands, Sample
 from foosim.client.players import Team
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, UnknownName
 from foosim.protocol.names import LINE_NAMES
 from foosim.rehearsal.rehearse import rehearse
 

@@ -20,7 +20,7 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.rehearse import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()

@@ -59,7 +59,7 @@ from foosim.protocol.units import Pace
 from foosim.protocol.view_messages import Watched
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed

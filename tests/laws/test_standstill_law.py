@@ -30,8 +30,9 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.main import SupervisorProcess
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.plan import make_plan
 from foosim.supervisor.run_folder import RunFolder
+from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.watch import Watch
 from foosim.vhub.door import Door
 from foosim.vhub.main import HubOptions, HubProcess
@@ -232,7 +233,7 @@ def plane() -> Iterator[Session]:
 def supervisor_of(session: Session, inbox: Inbox, folder: Path) -> object:
     plan = make_plan(RunOptions(TABLE, duration="1 s", sets=("engine=pure",)))
     with Journal(folder / "journals", SUPERVISOR) as journal:
-        return SupervisorProcess(plan, RunFolder(folder), session, inbox, journal, None)
+        return SupervisorProcess(plan.settings(folder.name), None, RunFolder(folder), session, inbox, journal, None)
 
 
 SHELLS: Final[dict[str, tuple[Callable[[Session, Inbox, Path], Any], type]]] = {

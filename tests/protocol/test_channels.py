@@ -17,7 +17,7 @@ from foosim.protocol.channels import CHANNELS, Channel, Plane
 from foosim.protocol.loop import channel_of
 from foosim.protocol.units import Pace
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
 
 ROOT: Final = Path(__file__).parents[2]

@@ -9,7 +9,8 @@ from foosim.protocol.assets import pin_assets
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import DeploymentError
 from foosim.protocol.table_clearance import clearance_findings
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.plan import make_plan
+from foosim.supervisor.run_options import RunOptions
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 CUBE: Final = "shape: box, length: 10 cm, width: 10 cm, height: 10 cm"

@@ -31,7 +31,7 @@ from foosim.rehearsal.rehearse_command import app
 from foosim.rehearsal.replay_command import app as replay_app
 from foosim.rehearsal.settings import AtWork
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.capture_reader import open_capture
 from tests.turns import BY_PERIOD
 

@@ -19,8 +19,8 @@ from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.replay_command import app
 from foosim.rehearsal.report import Report, gather
 from foosim.rehearsal.system import System
-from foosim.vhub import capture_file, capture_writer
-from foosim.vhub.capture_file import declare_topics, write_all
+from foosim.vhub import capture_contents, capture_writer
+from foosim.vhub.capture_contents import declare_topics, write_all
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.mcap_checks import CHECKS
 from foosim.vhub.mcap_file import McapFile, Message
@@ -60,7 +60,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of 0.6 s with players and an added ball, in many small chunks; not to be changed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(capture_writer, "BATCH_ROWS", 100)
-        patch.setattr(capture_file, "CHUNK_BYTES", 1)
+        patch.setattr(capture_contents, "CHUNK_BYTES", 1)
         return capture_to(tmp_path_factory.mktemp("replay") / "run.mcap")
 
 

@@ -15,7 +15,7 @@ from foosim.protocol.journal import Journal
 from foosim.rehearsal.diff import diff_captures
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
-from foosim.vhub import capture_file, capture_writer
+from foosim.vhub import capture_contents, capture_writer
 from foosim.vhub.branching import BadBranch, read_branch
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
@@ -71,7 +71,7 @@ def test_without_a_journal_something_is_lost(run: Path, tmp_path: Path) -> None:
 
 def test_with_its_journal_nothing_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(capture_writer, "BATCH_ROWS", 100)
-    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
+    monkeypatch.setattr(capture_contents, "CHUNK_BYTES", 1)
     path, left, journals = tmp_path / "run.mcap", tmp_path / "left.mcap", tmp_path / "journals"
     records: list[bytes] = []
 

@@ -16,8 +16,8 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import Rehearsed, with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
+from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import result, status
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

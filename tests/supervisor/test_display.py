@@ -19,7 +19,7 @@ from foosim.supervisor.display import (
     recovery_text,
     render_text,
 )
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import NO_PACKETS, status
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"

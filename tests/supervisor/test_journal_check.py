@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -17,10 +18,11 @@ from foosim.protocol.journal import Journal, journal_files, read_records
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.cli import main
-from foosim.supervisor.journal_check import check_journals
+from foosim.supervisor.journal_check import check_journals, supervisor_records
 from foosim.supervisor.main import serve
-from foosim.supervisor.plan import RunOptions, launch_of, make_plan, plan_again
+from foosim.supervisor.plan import make_plan, plan_again
 from foosim.supervisor.run_folder import LAUNCHER_FILE, RunFolder, create_run
+from foosim.supervisor.run_options import RunOptions, launch_of
 from foosim.vhub.branching import read_branch
 from foosim.vhub.capture_reader import open_capture
 from tests.supervisor.conftest import Typed
@@ -112,8 +114,10 @@ def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
 
 def test_a_supervisor_that_is_started_again_does_not_go_on_over_it(folder: RunFolder) -> None:
     where = damage(folder, channels.SUPERVISOR, 30)
+    plan = make_plan(RunOptions(TABLE, sets=SETS))
+    records = partial(supervisor_records, folder, plan.options)
     with pytest.raises(Refused, match=re.escape(where)):
-        serve(make_plan(RunOptions(TABLE, sets=SETS)), folder)
+        serve(plan.settings(folder.name), plan.address, None, folder, records)
     assert len(journal_files(folder.journals, channels.SUPERVISOR)) == 1, "nothing was begun"
 
 

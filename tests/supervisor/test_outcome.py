@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -22,12 +23,14 @@ from foosim.protocol.session import Session
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.cli import main
+from foosim.supervisor.journal_check import supervisor_records
 from foosim.supervisor.main import SupervisorProcess
 from foosim.supervisor.main import _history as history_of
 from foosim.supervisor.outcome import plan_facts, result_without_supervisor, with_capture
-from foosim.supervisor.plan import RunOptions, launch_of, make_plan, plan_again
+from foosim.supervisor.plan import make_plan, plan_again
 from foosim.supervisor.records import Record, fold
 from foosim.supervisor.run_folder import RunFolder, create_run
+from foosim.supervisor.run_options import RunOptions, launch_of
 from foosim.supervisor.status import UNFINISHED, status
 from foosim.supervisor.up import Killed, Up
 from foosim.vhub.capture_parts import FOOTER
@@ -168,11 +171,13 @@ def test_a_run_that_cannot_go_on_says_so_before_anything_starts(run: Run, left: 
 
 def test_a_supervisor_goes_on_from_no_journal_that_has_nothing_and_from_none_that_is_damaged(left: Left) -> None:
     plan, folder = make_plan(RunOptions(TABLE, sets=("engine=pure",))), left.folder
+    settings, records = plan.settings(folder.name), partial(supervisor_records, folder, plan.options)
     damage(left.journal(SUPERVISOR))
     with pytest.raises(Refused, match=r"run mine cannot go on: .*head of the file is damaged"):
-        history_of(plan, folder)
+        history_of(settings, plan.deployment, folder, records)
     left.journal(SUPERVISOR).write_bytes(b"")
-    assert history_of(plan, folder) is None, "the one before was killed when it had made the file: the run begins"
+    begun = history_of(settings, plan.deployment, folder, records)
+    assert begun is None, "the one before was killed when it had made the file: the run begins"
 
 
 def test_a_resume_of_a_run_that_has_ended_reports_its_result(run: Run, left: Left, typed: Typed) -> None:
@@ -251,7 +256,8 @@ def test_of_a_run_that_is_not_gone_on_with_no_result_is_written(left: Left) -> N
         for record in records:
             written.append(record)
         history = fold(plan.deployment, iter(records))
-        process = SupervisorProcess(plan, left.folder, session, Inbox(1000), written, history)
+        settings, inbox = plan.settings(left.folder.name), Inbox(1000)
+        process = SupervisorProcess(settings, None, left.folder, session, inbox, written, history)
         process.core.finish("lost vhub", failed=True)
         assert process.run() == REFUSED and process.core.beginning.abandoned == "lost vhub"
     gc.set_threshold(*thresholds)

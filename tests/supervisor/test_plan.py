@@ -9,8 +9,9 @@ import pytest
 from foosim.protocol.addresses import Address, Insecure
 from foosim.protocol.errors import BadValue
 from foosim.supervisor import cli
-from foosim.supervisor.plan import Plan, RunOptions, make_plan
+from foosim.supervisor.plan import Plan, make_plan
 from foosim.supervisor.run_folder import RunFolder
+from foosim.supervisor.run_options import RunOptions
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 EVERYTHING = RunOptions(TABLE, "2x", "1.5 s", 7, ("engine=pure", "table.ball.mass=27 g"), "0.0.0.0:7447", insecure=True)

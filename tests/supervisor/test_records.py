@@ -13,8 +13,8 @@ from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import History, fold
+from foosim.supervisor.settings import RunSettings
 
 TEXT = apply_sets(
     (Path(__file__).parent.parent.parent / "deploy" / "table.yaml").read_text(),

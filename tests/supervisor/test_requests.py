@@ -22,7 +22,7 @@ from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.system import OPERATOR, Settings, System
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

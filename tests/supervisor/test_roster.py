@@ -18,8 +18,8 @@ from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Refusal
 from foosim.protocol.units import Pace
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.roster import SILENT_NS, Roster
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

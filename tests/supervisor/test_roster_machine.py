@@ -24,7 +24,7 @@ from foosim.protocol.messages import Answer, Epoch, Heartbeat, Hello, Part, Read
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NODES: Final = ("n1", "n2", "n3")

@@ -16,8 +16,9 @@ from foosim.protocol.errors import BadValue, Failed, Refused
 from foosim.supervisor import cli, pki
 from foosim.supervisor.hosts import NoFolder, OutOfReach, check_hosts
 from foosim.supervisor.pki_hosts import files_for
-from foosim.supervisor.plan import RunOptions, check_certificates, make_plan
+from foosim.supervisor.plan import check_certificates, make_plan
 from foosim.supervisor.remote import remotes
+from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.units import units_of
 
 DEPLOY = Path(__file__).parents[2] / "deploy"

@@ -19,9 +19,10 @@ from foosim.supervisor.display import Display
 from foosim.supervisor.launcher import Child
 from foosim.supervisor.liveness import UNANSWERED_MAX
 from foosim.supervisor.outcome import capture_lines
-from foosim.supervisor.plan import RunOptions, make_plan
+from foosim.supervisor.plan import make_plan
 from foosim.supervisor.restarts import WAITS_S
 from foosim.supervisor.run_folder import RunInfo
+from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.status import NOT_RECORDED
 from foosim.supervisor.up import END_S, Killed, Up
 

@@ -18,8 +18,8 @@ from foosim.protocol.messages import Answer, Commit, Inquiry, Request
 from foosim.protocol.units import Pace
 from foosim.rehearsal.system import OPERATOR, Settings, System
 from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.records import fold
+from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.viewing import BYTES_PER_S_MAX
 from tests.supervisor.test_requests import MS, REALTIME, TABLE, TEXT, Run
 

@@ -16,15 +16,14 @@ from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.messages import DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat, Request
+from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat, Request
 from foosim.protocol.units import Pace, parse_pace
 from foosim.rehearsal.rehearse import rehearse, with_nodes
 from foosim.rehearsal.system import IDLE_NS_MAX, OPERATOR, Settings, System
-from foosim.supervisor.plan import RunSettings
 from foosim.supervisor.roster import Roster
+from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import status
 from foosim.supervisor.watch import Watch, _names
-from foosim.vhub.closing import CAPTURE
 from foosim.vhub.core import HubCore
 from foosim.vhub.waits import Waits
 from tests.turns import BY_PERIOD

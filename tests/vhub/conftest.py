@@ -43,7 +43,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import AddedEntity, initial_numbers
-from foosim.vhub import capture_file, capture_writer
+from foosim.vhub import capture_contents, capture_writer
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep, KeepEpoch
@@ -318,5 +318,5 @@ def chunked(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The same in a file of many small chunks."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(capture_writer, "BATCH_ROWS", 40)
-        patch.setattr(capture_file, "CHUNK_BYTES", 1)
+        patch.setattr(capture_contents, "CHUNK_BYTES", 1)
         return write_capture(tmp_path_factory.mktemp("captures") / "chunked.mcap", hub_run).read_bytes()

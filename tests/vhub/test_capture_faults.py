@@ -16,7 +16,7 @@ import zstandard
 
 from foosim.protocol import limits
 from foosim.protocol.errors import Refused
-from foosim.vhub import capture_file, capture_writer
+from foosim.vhub import capture_contents, capture_file, capture_writer
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
@@ -266,7 +266,7 @@ class Disk:
 
     def __init__(self, room: int, monkeypatch: pytest.MonkeyPatch) -> None:
         self.room = room
-        self._write = capture_file.write_all
+        self._write = capture_contents.write_all
         monkeypatch.setattr(capture_file, "write_all", self.write)
 
     def write(self, file: int, content: bytes) -> None:

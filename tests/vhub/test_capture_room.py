@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from foosim.protocol import disk, limits
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.disk import Level, Room
-from foosim.vhub import capture_file, capture_writer
+from foosim.vhub import capture_contents, capture_file, capture_writer
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.capture_writer import CaptureWriter
@@ -35,7 +35,7 @@ class Disk:
         self.looks: Callable[[int], int] = lambda free: free
         """What a look at the disk finds: others may take what is left behind it."""
         self._number = number
-        self._write = capture_file.write_all
+        self._write = capture_contents.write_all
         monkeypatch.setattr(capture_file, "write_all", self.write)
         monkeypatch.setattr(disk, "free_bytes", lambda place: self.looks(max(0, self.room)))
 
@@ -50,7 +50,7 @@ class Disk:
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     """A chunk for each batch of a few closings: a full disk is met between two of them."""
-    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
+    monkeypatch.setattr(capture_contents, "CHUNK_BYTES", 1)
     monkeypatch.setattr(capture_writer, "BATCH_ROWS", 20)
     monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 60)
 
@@ -183,7 +183,7 @@ def test_on_a_disk_that_others_fill_what_was_whole_stays(
     hub_run: HubRun, small_disk: Callable[[int], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They take all that is left between a look and the next write, which fails in its midst, and so does the end."""
-    path, write = small_disk(256) / "run.mcap", capture_file.write_all
+    path, write = small_disk(256) / "run.mcap", capture_contents.write_all
     others = path.with_name("others")
 
     def others_write_first(file: int, content: bytes) -> None:
@@ -211,7 +211,7 @@ def test_a_capture_that_takes_long_to_close_shows_how_far_it_is(
     tmp_path: Path, hub_run: HubRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its disk takes nothing for a while: the vHub's loop goes on, and is told when it is closed."""
-    writer, write, gate, closed = new_writer(tmp_path / "c.mcap", hub_run), capture_file.write_all, Event(), Event()
+    writer, write, gate, closed = new_writer(tmp_path / "c.mcap", hub_run), capture_contents.write_all, Event(), Event()
     room = RoomWatch(writer, tmp_path, 1)
     monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 1_000_000)
 

@@ -14,7 +14,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.disk import Level
 from foosim.protocol.journal import Journal
-from foosim.vhub import capture_file, capture_left, capture_writer
+from foosim.vhub import capture_contents, capture_left, capture_writer
 from foosim.vhub.capture_cut import cut_capture
 from foosim.vhub.capture_file import CaptureFile, Described
 from foosim.vhub.capture_info import capture_info
@@ -145,7 +145,7 @@ def test_a_file_ends_when_it_is_large(
     hub_run: HubRun, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(capture_writer, "BATCH_ROWS", 40)
-    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
+    monkeypatch.setattr(capture_contents, "CHUNK_BYTES", 1)
     write(tmp_path / "run.mcap", hub_run, "capture.split_size=64 KiB")
     files = files_from(tmp_path / "run.mcap")
     assert messages(files[0]) == messages(path)
@@ -354,7 +354,7 @@ def test_a_disk_that_refuses_leaves_whole_files(
 ) -> None:
     """It refuses rows, the next file's description, what is repeated there, or a file's end."""
     monkeypatch.setattr(capture_writer, "BATCH_ROWS", 40)
-    monkeypatch.setattr(capture_file, "CHUNK_BYTES", 1)
+    monkeypatch.setattr(capture_contents, "CHUNK_BYTES", 1)
     taken = Disk(1 << 40, monkeypatch)
     taken.looks = lambda free: 1 << 40
     counts = set()

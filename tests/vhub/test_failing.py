@@ -23,15 +23,14 @@ from foosim.protocol.errors import Failed
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, journal_files
 from foosim.protocol.json_text import decode_json
-from foosim.protocol.messages import Build, End, Heartbeat
+from foosim.protocol.messages import CAPTURE, Build, End, Heartbeat
 from foosim.protocol.session import Session
-from foosim.vhub import capture_file
+from foosim.vhub import capture_contents, capture_file
 from foosim.vhub.capture_file import CaptureFile, Described
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_parts import end_of, has_end
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import UNCLEAN, recover_capture
-from foosim.vhub.closing import CAPTURE
 from foosim.vhub.main import HubOptions, HubProcess
 from foosim.vhub.records import HeadRecord, HubRecord, TickRecord
 from tests.vhub.conftest import NAME
@@ -140,7 +139,7 @@ def test_a_vhub_that_closes_its_capture_says_meanwhile_how_far_it_is(
     hub_run: HubRun, plane: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its disk takes the end of the capture only when it has said so three times."""
-    inbox, gate, write, told = Inbox(limits.INBOX_MESSAGES_MAX), Event(), capture_file.write_all, list[str]()
+    inbox, gate, write, told = Inbox(limits.INBOX_MESSAGES_MAX), Event(), capture_contents.write_all, list[str]()
     monkeypatch.setattr(limits, "DOWNLINK_KEPT_NS", 0)
 
     def slow(file: int, content: bytes) -> None:

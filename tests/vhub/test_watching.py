@@ -27,7 +27,7 @@ from foosim.protocol.view_messages import Watched
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.drops_shown import Reported, explain_drops
-from foosim.supervisor.plan import RunSettings
+from foosim.supervisor.settings import RunSettings
 from foosim.vhub.explain import explain_row
 from foosim.vhub.packet import DROPPED, Flight
 from foosim.vhub.records import Closing

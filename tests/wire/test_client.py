@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from foosim.client import connect
-from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded, UnknownName
+from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded
 from foosim.client.payloads import RodPosition
-from foosim.protocol.errors import BadValue
+from foosim.protocol.errors import BadValue, UnknownName
 from foosim.supervisor import control
 
 if TYPE_CHECKING:

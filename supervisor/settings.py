@@ -1,0 +1,43 @@
+"""What a supervisor is started with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.start import Origin, Start
+from foosim.protocol.units import Pace
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """What a supervisor is started with. `ticks` is how many there are; 0 is until it is asked to end.
+
+    `start` is the frame of another run that it begins with; None: frame 0.
+    """
+
+    run: str
+    deployment_name: str
+    deployment_text: str
+    pace: Pace
+    ticks: int = 0
+    start: Start | None = None
+    balance: bool = False
+    """Whether robots move by the nodes' measured load."""
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+    """The contents of the files that the deployment refers to, by path."""
+
+    def load_deployment(self) -> Deployment:
+        """The deployment with its files; raises DeploymentError or AssetError."""
+        return load_deployment(self.deployment_text, self.deployment_name).with_assets(self.files)
+
+    @property
+    def origin(self) -> Origin | None:
+        return None if self.start is None else self.start.origin
+
+    @property
+    def last_tick(self) -> int:
+        """The tick of the frame that ends the run; 0: it ends when it is asked to."""
+        return self.ticks and self.ticks + (0 if self.start is None else self.start.origin.tick)
