@@ -11,15 +11,12 @@ import sys
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final
 
 from foosim.client.errors import PlayerError
 from foosim.client.failing import Unanswered, describe, in_library, place_of
 from foosim.protocol.errors import CHOICES_MAX
 from foosim.protocol.names import class_path_of, nearest_name
-
-if TYPE_CHECKING:
-    from foosim.client.player import PlayerFactory
 
 MADE_WITH: Final = ("deployment", "parameters")
 CALLED_WITH: Final = ("tick", "samples")
@@ -35,7 +32,7 @@ class ClassPathError(PlayerError):
         self.problem, self.nearest = problem, nearest
 
 
-def load_player(path: str) -> PlayerFactory:
+def load_player(path: str) -> Callable[..., Any]:
     """Import the class that `module:Class` names and return it. Raises ClassPathError, which says what is wrong."""
     module_name, colon, class_name = path.partition(":")
     if not (module_name and colon and class_name):
@@ -51,7 +48,8 @@ def load_player(path: str) -> PlayerFactory:
     problem = _unfit(made, class_name)
     if problem:
         raise ClassPathError(path, problem)
-    return cast("PlayerFactory", made)
+    found: Callable[..., Any] = made
+    return found
 
 
 def _import(path: str, name: str) -> ModuleType:

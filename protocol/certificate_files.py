@@ -13,7 +13,7 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import serialization
 from cryptography.x509.oid import NameOID
 
-from foosim.protocol.certificates import CA_FILE, CERTIFICATE_SUFFIX, CertificateError, read_bounded
+from foosim.protocol.certificate_folder import CA_FILE, CERTIFICATE_SUFFIX, CertificateError, read_bounded
 from foosim.protocol.errors import show
 
 

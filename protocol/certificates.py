@@ -24,25 +24,23 @@ from typing import Final
 
 from foosim.protocol import wall
 from foosim.protocol.addresses import parse_address
+from foosim.protocol.certificate_folder import (
+    CA_FILE,
+    CERTIFICATE_SUFFIX,
+    KEY_SUFFIX,
+    PASSWORD_SUFFIX,
+    CertificateError,
+    read_bounded,
+)
 from foosim.protocol.errors import Refused
 from foosim.protocol.identity import parse_identity
 
-CA_FILE: Final = "ca.pem"
-CA_KEY_FILE: Final = "ca.key"
-CERTIFICATE_SUFFIX: Final = ".pem"
-KEY_SUFFIX: Final = ".key"
-PASSWORD_SUFFIX: Final = ".password"
-FILE_BYTES_MAX: Final = 65_536
 OPERATOR_VARIABLE: Final = "FOOSIM_OPERATOR"
 """Names the operator whose certificate control commands show, where there are several."""
 VIEWER_VARIABLE: Final = "FOOSIM_VIEWER"
 """The same of the viewer whose certificate is shown by who only looks."""
 SOON: Final = timedelta(days=14)
 """A certificate that ends within this is to be renewed."""
-
-
-class CertificateError(Refused):
-    """A certificate, key or password that is not there, or with which nobody would be let in; the text says why."""
 
 
 class NotAuthorised(Refused):
@@ -199,12 +197,3 @@ def check_host(credentials: Credentials | None, locator: str) -> None:
             f"{credentials.certificate} is for {shown}, not for {host}, where {who} listens: "
             f"foosim-pki renew {credentials.certificate.parent} {who} --host {host}"
         )
-
-
-def read_bounded(path: Path) -> bytes:
-    """Return what is in a file of the folder, of a huge one the beginning. Raises CertificateError."""
-    try:
-        with path.open("rb") as file:
-            return file.read(FILE_BYTES_MAX)
-    except OSError as error:
-        raise CertificateError(f"{path}: cannot be read, {error.strerror}") from None

@@ -221,6 +221,24 @@ class Deployment(WorldSpec):
         return dict(sorted(owner.items()))
 
 
+def places(deployment: Deployment) -> dict[str, str]:
+    """Return the host of each process that has one: nodes, players and the vHub, by name; players that share one, too.
+
+    Of the hosts with a label, each process in name order gets the one that has the fewest by then, ties by name.
+    """
+    shared = {process: deployment.players[names[0]] for process, names in deployment.player_processes().items()}
+    processes: dict[str, Placed] = {**deployment.nodes, **shared, "vhub": deployment.vhub}
+    found = {name: placed.host for name, placed in sorted(processes.items()) if placed.host is not None}
+    for name, placed in sorted(processes.items()):
+        if placed.label is not None:
+            fitting = [host for host, about in sorted(deployment.hosts.items()) if placed.label in about.labels]
+            found[name] = min(fitting, key=lambda host: sum(taken == host for taken in found.values()))
+    for process, players in deployment.player_processes().items():
+        if process in found:
+            found.update(dict.fromkeys(players, found[process]))
+    return dict(sorted(found.items()))
+
+
 def deployment_schema() -> dict[str, Any]:
     """The JSON Schema of a deployment file, for editors and for people; deploy/deployment.schema.json is its text."""
     schema = Deployment.model_json_schema(by_alias=True, mode="validation")

@@ -7,7 +7,7 @@ reached), `references` (whether names refer to something).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 from pydantic import AfterValidator, Field, StringConstraints
 
@@ -15,9 +15,6 @@ from foosim.protocol.addresses import parse_address
 from foosim.protocol.errors import BadValue
 from foosim.protocol.spec_base import Name, SpecBase
 from foosim.protocol.units import custom_error
-
-if TYPE_CHECKING:
-    from foosim.protocol.deployment import Deployment
 
 # None of these can begin with a dash: ssh would take it for an option.
 ADDRESS_PATTERN: Final = r"^([A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?|\[[0-9a-fA-F:.]+\])$"
@@ -67,21 +64,3 @@ class Placed(SpecBase):
 
     host: Name | None = None
     label: Name | None = None
-
-
-def places(deployment: Deployment) -> dict[str, str]:
-    """Return the host of each process that has one: nodes, players and the vHub, by name; players that share one, too.
-
-    Of the hosts with a label, each process in name order gets the one that has the fewest by then, ties by name.
-    """
-    shared = {process: deployment.players[names[0]] for process, names in deployment.player_processes().items()}
-    processes: dict[str, Placed] = {**deployment.nodes, **shared, "vhub": deployment.vhub}
-    found = {name: placed.host for name, placed in sorted(processes.items()) if placed.host is not None}
-    for name, placed in sorted(processes.items()):
-        if placed.label is not None:
-            fitting = [host for host, about in sorted(deployment.hosts.items()) if placed.label in about.labels]
-            found[name] = min(fitting, key=lambda host: sum(taken == host for taken in found.values()))
-    for process, players in deployment.player_processes().items():
-        if process in found:
-            found.update(dict.fromkeys(players, found[process]))
-    return dict(sorted(found.items()))

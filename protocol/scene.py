@@ -9,16 +9,13 @@ the slots of an entity.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import cos, sin, sqrt
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.radio_materials import UNKNOWN, RadioMaterial
-
-if TYPE_CHECKING:
-    from foosim.protocol.layout import Entity
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -140,56 +137,6 @@ def turn(axis: Vector, angle: float) -> Quaternion:
     return axis[0] * s, axis[1] * s, axis[2] * s, cos(0.5 * angle)
 
 
-def forward_kinematics(body: Body, entity: Entity, numbers: Sequence[float]) -> list[Pose]:
-    """Return the pose of each link of a body, in their order, from the frame's numbers."""
-    position, orientation = body.position, UPRIGHT
-    joint = entity.offsets.get("joint_positions", 0)
-    poses: list[Pose] = []
-    for link in body.links:
-        if link.joint == "free":
-            start, turned = entity.offsets["position"], entity.offsets["orientation"]
-            position = (numbers[start], numbers[start + 1], numbers[start + 2])
-            orientation = (numbers[turned], numbers[turned + 1], numbers[turned + 2], numbers[turned + 3])
-        elif link.joint == "prismatic":
-            way = numbers[joint]
-            dx, dy, dz = rotate(orientation, (way * link.axis[0], way * link.axis[1], way * link.axis[2]))
-            position = (position[0] + dx, position[1] + dy, position[2] + dz)
-            joint += 1
-        elif link.joint == "revolute":
-            orientation = multiply(orientation, turn(link.axis, numbers[joint]))
-            joint += 1
-        poses.append((link.name, position, orientation))
-    return poses
-
-
-def velocity(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
-    """Return the velocity (m/s, world frame) of the origin of a body's last link, from the frame's numbers.
-
-    A rover's is that of its wheels, which slip where it is kept from where it goes.
-    """
-    orientation, sliding = UPRIGHT, ORIGIN
-    joint = entity.offsets.get("joint_positions", 0)
-    for link in body.links:
-        if link.joint == "free":
-            turned = entity.offsets["orientation"]
-            orientation = (numbers[turned], numbers[turned + 1], numbers[turned + 2], numbers[turned + 3])
-            if "wheel_speeds" in entity.offsets:
-                wheels = entity.offsets["wheel_speeds"]
-                sliding = rotate(orientation, (0.5 * (numbers[wheels] + numbers[wheels + 1]), 0.0, 0.0))
-            else:
-                start = entity.offsets["linear_velocity"]
-                sliding = numbers[start], numbers[start + 1], numbers[start + 2]
-        elif link.joint == "prismatic":
-            speed = numbers[joint - entity.offsets["joint_positions"] + entity.offsets["joint_velocities"]]
-            step = rotate(orientation, (speed * link.axis[0], speed * link.axis[1], speed * link.axis[2]))
-            sliding = _moved(sliding, step, 1.0)
-            joint += 1
-        elif link.joint == "revolute":
-            orientation = multiply(orientation, turn(link.axis, numbers[joint]))
-            joint += 1
-    return sliding
-
-
 def place(shape: Shape, position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
     """Return the world pose of a shape whose link has this pose."""
     dx, dy, dz = rotate(orientation, shape.position)
@@ -210,12 +157,12 @@ def shape_box(shape: Shape) -> tuple[Vector, Vector]:
         else:
             low, high = geometry.box
             half = ((high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2)
-            middle = rotate(shape.orientation, _moved(low, half, 1.0))
+            middle = rotate(shape.orientation, moved(low, half, 1.0))
         sides = [
             rotate(shape.orientation, side) for side in ((half[0], 0.0, 0.0), (0.0, half[1], 0.0), (0.0, 0.0, half[2]))
         ]
         extent = [sum(abs(side[axis]) for side in sides) for axis in range(3)]
-    x, y, z = _moved(shape.position, middle, 1.0)
+    x, y, z = moved(shape.position, middle, 1.0)
     low = (x - extent[0], y - extent[1], z - extent[2])
     return low, (x + extent[0], y + extent[1], z + extent[2])
 
@@ -245,16 +192,16 @@ def swept_box(body: Body) -> tuple[Vector, Vector]:
         boxes = [shape_box(shape) for shape in link.shapes] + ([swept] if swept else [])
         low, high = enclosing(boxes)
         if link.joint == "prismatic":
-            low = _moved(low, link.axis, min(link.limits))
-            high = _moved(high, link.axis, max(link.limits))
+            low = moved(low, link.axis, min(link.limits))
+            high = moved(high, link.axis, max(link.limits))
         elif link.joint == "revolute":
             low, high = _revolved(low, high, link.axis)
         swept = low, high
     assert swept is not None, f"{body.name} has no links"
-    return _moved(swept[0], body.position, 1.0), _moved(swept[1], body.position, 1.0)
+    return moved(swept[0], body.position, 1.0), moved(swept[1], body.position, 1.0)
 
 
-def _moved(point: Vector, direction: Vector, way: float) -> Vector:
+def moved(point: Vector, direction: Vector, way: float) -> Vector:
     return point[0] + way * direction[0], point[1] + way * direction[1], point[2] + way * direction[2]
 
 

@@ -18,6 +18,7 @@ from foosim.console.shown.scene_json import standing_bounds
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import draw_key, draw_words
 from foosim.protocol.frame import Frame
+from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.layout import Layout
 from foosim.protocol.network import selects
 from foosim.protocol.scene import (
@@ -30,7 +31,6 @@ from foosim.protocol.scene import (
     Shape,
     Sphere,
     Vector,
-    forward_kinematics,
     multiply,
     rotate,
 )

@@ -14,6 +14,11 @@ from typing import Any, Final
 
 from mypy_extensions import mypyc_attr
 
+from foosim.client.core import ClientCore
+from foosim.client.errors import PlayerError
+from foosim.client.failing import Unanswered, tell_failure
+from foosim.client.loading import load_player
+from foosim.client.player import PlayerLoop
 from foosim.node.solver import Solver
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish, Say
@@ -21,7 +26,6 @@ from foosim.protocol.channels import Channel
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.frame import Frame
 from foosim.rehearsal.bus import Bus, Message, Traced
-from foosim.rehearsal.clients import Clients
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Stuck
 from foosim.rehearsal.hub_journal import Ending, HubJournal
@@ -53,8 +57,8 @@ class System:
         self.solvers: dict[str, Solver] = {}
         self.people = People(self.bus, self.later)
         self.answers = self.people.answers
-        self.clients = Clients(self)
-        self.players = self.clients.players
+        self.players: dict[str, PlayerLoop] = {}
+        self._boots_of_players = 0
         self.at_work = AtWork()
         self.healed = False
         """Whether a test has said that nothing new is to happen."""
@@ -88,7 +92,7 @@ class System:
         self._enter_hub(fingerprint)
         for name in sorted(deployment.nodes):
             self._enter_node(name, fingerprint)
-        self.clients.enter_all()
+        self._enter_clients()
         self._hub_back_ns = HUB_BACK_NS
 
     def enter(
@@ -393,11 +397,46 @@ class System:
         self.bus.now_ns = max(self.bus.now_ns, due_ns)
         self.soon(action)
 
+    def _enter_clients(self) -> None:
+        """Let in the players of the deployment and the lockstep clients of the rehearsal."""
+        for name, player in sorted(self.supervisor.deployment.players.items()):
+            assert player.lockstep, "a rehearsal has lockstep players only"
+            self._enter_player(name, "boot")
+        for name, client in sorted(self.settings.clients.items()):
+            core = ClientCore(name, "boot", self.now_of(name))
+            self.enter(name, core, client(core), channels.CLIENT_READS)
+
+    def _enter_player(self, name: str, boot: str) -> None:
+        """Let a player's process in, with new memory; where the player's code fails, it says so and ends."""
+        core = ClientCore(name, boot, self.now_of(name))
+        loop = self.players[name] = PlayerLoop(core, load_player)
+
+        def turn(now_ns: int) -> None:
+            self.at_work.tick = -1 if core.go is None else core.go.tick
+            try:
+                self.at_work.acts = True
+                loop.step(now_ns)
+                self.at_work.acts = False
+            except (PlayerError, Unanswered) as error:
+                self.at_work.acts = False
+                tell_failure(core, error)
+                self.soon(lambda: self.leave(name))
+
+        self.enter(name, core, turn, channels.CLIENT_READS)
+        self.processes[name].stood = core.rest
+
+    def _client_gone(self, name: str) -> None:
+        """Have the vHub see that a client's presence has ended."""
+        hub = self.processes.get(channels.VHUB)
+        if hub is not None:
+            self.hub.client_gone(name, hub.clock.at(self.bus.now_ns))
+            self.take_turn(hub)
+
     def kill(self, name: str) -> None:
         """End a node, a player or the supervisor at once: what is on its way to it is lost; it is seen to go."""
         self.leave(name)
         if name in self.players:
-            self.clients.gone(name)
+            self._client_gone(name)
         elif name in self.solvers:
             self.solvers.pop(name).close()
             self._supervisor_sees_gone(name)
@@ -421,7 +460,8 @@ class System:
             self.supervisor = self.settings.supervisor(self._run, library_fingerprint(), now_ns, boot, history=history)
             self._enter_supervisor()
         elif name in self.players:
-            self.clients.start(name)
+            self._boots_of_players += 1
+            self._enter_player(name, f"boot-{self._boots_of_players}")
         else:
             self._enter_node(name, library_fingerprint())
         self.wake(self.processes[name])
@@ -460,7 +500,9 @@ class System:
         self.leave(channels.VHUB)
         self.hub.actions.clear()
         self.later(self._hub_back_ns, self._start_hub)
-        self.clients.hub_gone()
+        for client in self._clients_here():
+            client.core.hub_gone(client.clock.at(self.bus.now_ns))
+            self.take_turn(client)
 
     def _hub_again(self, refused: HubCore) -> None:
         """A vHub that is refused ends, was never present to the supervisor, and is started again after a while."""
@@ -471,7 +513,12 @@ class System:
     def _start_hub(self) -> None:
         self._enter_hub(library_fingerprint())
         self.wake(self.processes[channels.VHUB])
-        self.clients.hub_here()
+        for client in self._clients_here():
+            client.core.hub_here(client.clock.at(self.bus.now_ns))
+            self.wake(client)
+
+    def _clients_here(self) -> list[Process]:
+        return [process for process in self.processes.values() if isinstance(process.core, ClientCore)]
 
     def pause(self, name: str, for_ns: int) -> None:
         """Stop a process for some virtual time, as SIGSTOP and SIGCONT do: what it is told waits for it."""

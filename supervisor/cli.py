@@ -15,8 +15,8 @@ import typer
 
 from foosim.protocol.channels import VHUB
 from foosim.protocol.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
+from foosim.protocol.deployment import places
 from foosim.protocol.errors import BadValue, Refused, read_at
-from foosim.protocol.hosts import places
 from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer
 from foosim.protocol.probe import ProgressOption

@@ -28,29 +28,18 @@ from foosim.client.class_check import player_findings
 from foosim.protocol import limits, wall
 from foosim.protocol.addresses import Address, check_listen
 from foosim.protocol.certificate_files import check_certificate, check_key, hosts_of, read_ca, read_certificate
-from foosim.protocol.certificates import (
-    CA_FILE,
-    CA_KEY_FILE,
-    KEY_SUFFIX,
-    PASSWORD_SUFFIX,
-    CertificateError,
-    certificate_path,
-    key_path,
-    load_credentials,
-    read_password,
-)
+from foosim.protocol.certificate_folder import CA_FILE, CA_KEY_FILE, KEY_SUFFIX, PASSWORD_SUFFIX, CertificateError
+from foosim.protocol.certificates import certificate_path, key_path, load_credentials, read_password
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment import Deployment, places
 from foosim.protocol.errors import Refused, describe
 from foosim.protocol.fingerprint import is_compiled, library_fingerprint
-from foosim.protocol.hosts import places
-from foosim.supervisor.guard import hosted_folder
 from foosim.supervisor.install import SYSTEM_FOLDER, USER_FOLDER
 from foosim.supervisor.new_capture import place_of
 from foosim.supervisor.pki_hosts import identities_on, passwords_of
 from foosim.supervisor.reach import REMEDIES, listen
 from foosim.supervisor.remote import unit_name
-from foosim.supervisor.run_folder import runs_folder
+from foosim.supervisor.run_folder import hosted_folder, runs_folder
 from foosim.supervisor.units import units_of
 
 State = Literal["fine", "warning", "problem"]

@@ -24,11 +24,11 @@ import msgspec
 from foosim.protocol import wall
 from foosim.protocol.addresses import parse_address
 from foosim.protocol.certificate_files import read_ca
-from foosim.protocol.certificates import CertificateError
+from foosim.protocol.certificate_folder import CertificateError
 from foosim.protocol.channels import VHUB
+from foosim.protocol.deployment import places
 from foosim.protocol.errors import Refused
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.hosts import places
 from foosim.supervisor.children import GUARD, OTHER_VERSION
 from foosim.supervisor.doctor import Case, Finding, examine, fingerprint, is_well
 from foosim.supervisor.doctor_there import CLOCK, GREETING, LINE_BYTES_MAX, Answer, Question

@@ -22,13 +22,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import IO, Annotated, Final
 
-import platformdirs
 import typer
 
 from foosim.protocol.command import DONE, VersionOption, new_app, run_app
 from foosim.protocol.errors import BadValue, Failed
 from foosim.protocol.names import NAME_RULE, is_name
 from foosim.supervisor.children import BY_SIGNAL, GRACE_S, GUARD, OTHER_VERSION, child_environment, script
+from foosim.supervisor.run_folder import hosted_folder
 
 BLOCK_BYTES: Final = 1 << 20
 TAKE_OVER_S: Final = 10.0
@@ -36,11 +36,6 @@ TAKE_OVER_S: Final = 10.0
 Run = Annotated[str, typer.Argument(help="Which run.", show_default=False)]
 VersionOfLauncher = Annotated[str, typer.Option(help="Refuse another version of foosim than this.")]
 File = Annotated[str, typer.Argument(help="Which file of the run's folder.", show_default=False)]
-
-
-def hosted_folder() -> Path:
-    """Return the folder of the runs that have processes on this machine, and their supervisor elsewhere."""
-    return platformdirs.user_state_path("foosim") / "hosts"
 
 
 def run_folder(run: str) -> Path:

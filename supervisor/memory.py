@@ -24,7 +24,7 @@ class OomKills(NamedTuple):
     machine: int = 0
 
     def since(self, before: OomKills) -> str:
-        """Return what is known of one that lived since `before`: where the kernel has killed since; empty for nowhere."""
+        """Return what is known of one that lived since `before`: where the kernel killed; empty for nowhere."""
         if self.group > before.group:
             return "in its control group"
         return "on this machine" if self.machine > before.machine else ""

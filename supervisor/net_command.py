@@ -19,9 +19,9 @@ from rich.live import Live
 from foosim.protocol.assets import pin_assets, read_files
 from foosim.protocol.channels import VHUB
 from foosim.protocol.command import VersionOption, new_app, run_app
+from foosim.protocol.deployment import places
 from foosim.protocol.deployment_file import apply_sets, load_deployment, load_network, read_deployment_text
 from foosim.protocol.errors import BadValue
-from foosim.protocol.hosts import places
 from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer
 from foosim.protocol.names import nearest_name

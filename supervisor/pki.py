@@ -33,16 +33,8 @@ from foosim.protocol.certificate_files import (
     read_certificate,
     read_key,
 )
-from foosim.protocol.certificates import (
-    CA_FILE,
-    CA_KEY_FILE,
-    PASSWORD_SUFFIX,
-    CertificateError,
-    certificate_path,
-    check_password,
-    identities_in,
-    key_path,
-)
+from foosim.protocol.certificate_folder import CA_FILE, CA_KEY_FILE, PASSWORD_SUFFIX, CertificateError
+from foosim.protocol.certificates import certificate_path, check_password, identities_in, key_path
 from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.identity import parse_identity
 

@@ -12,7 +12,8 @@ from typing import Annotated
 import typer
 
 from foosim.protocol import wall
-from foosim.protocol.certificates import CA_KEY_FILE, identities_in
+from foosim.protocol.certificate_folder import CA_KEY_FILE
+from foosim.protocol.certificates import identities_in
 from foosim.protocol.command import DONE, FAILED, VersionOption, new_app, run_app
 from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.errors import BadValue

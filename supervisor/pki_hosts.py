@@ -12,19 +12,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from foosim.protocol import identity, wall
-from foosim.protocol.certificates import (
-    CA_FILE,
-    PASSWORD_SUFFIX,
-    CertificateError,
-    certificate_path,
-    key_path,
-    load_credentials,
-    read_password,
-)
+from foosim.protocol.certificate_folder import CA_FILE, PASSWORD_SUFFIX, CertificateError
+from foosim.protocol.certificates import certificate_path, key_path, load_credentials, read_password
 from foosim.protocol.channels import VHUB
-from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment import Deployment, places
 from foosim.protocol.errors import Failed
-from foosim.protocol.hosts import places
 from foosim.supervisor.install import run_there
 from foosim.supervisor.remote import Remote
 

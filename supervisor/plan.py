@@ -16,11 +16,10 @@ from foosim.protocol.addresses import Address, check_listen
 from foosim.protocol.assets import pin_assets
 from foosim.protocol.certificates import load_credentials, operator_credentials
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment import Deployment, places
 from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment_text, refuse_findings
 from foosim.protocol.errors import BadValue, Refused, read_at
 from foosim.protocol.hall_start import start_findings
-from foosim.protocol.hosts import places
 from foosim.protocol.start import Start
 from foosim.protocol.table_clearance import clearance_findings
 from foosim.protocol.units import Pace, parse_ns, parse_pace

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Final
 
-from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment import Deployment, places
 from foosim.protocol.errors import BadValue
-from foosim.protocol.hosts import Host, places
+from foosim.protocol.hosts import Host
 from foosim.protocol.names import nearest_name
 from foosim.supervisor.children import BY_SIGNAL, GUARD, OTHER_VERSION
 

@@ -195,6 +195,11 @@ def _replace(path: Path, content: bytes) -> None:
     fresh.replace(path)
 
 
+def hosted_folder() -> Path:
+    """Return the folder of the runs that have processes on this machine, and their supervisor elsewhere."""
+    return platformdirs.user_state_path("foosim") / "hosts"
+
+
 def runs_folder() -> Path:
     """Return the folder of all runs of this user."""
     return platformdirs.user_state_path("foosim") / "runs"

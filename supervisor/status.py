@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 from msgspec.structs import asdict
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.deployment import places
 from foosim.protocol.frame import Frame
-from foosim.protocol.hosts import places
 from foosim.protocol.json_text import decode_json
 from foosim.protocol.layout import BALL
 from foosim.protocol.names import TEAMS

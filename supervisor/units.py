@@ -12,11 +12,10 @@ from typing import Final
 
 from foosim.protocol import identity
 from foosim.protocol.addresses import Address
-from foosim.protocol.certificates import CA_FILE, CERTIFICATE_SUFFIX, KEY_SUFFIX
+from foosim.protocol.certificate_folder import CA_FILE, CERTIFICATE_SUFFIX, KEY_SUFFIX
 from foosim.protocol.command import BAD_INPUT, REFUSED
-from foosim.protocol.deployment import Deployment
+from foosim.protocol.deployment import Deployment, places
 from foosim.protocol.errors import BadValue, Failed
-from foosim.protocol.hosts import places
 from foosim.supervisor.remote import Remote, remote_of, unit_name
 
 WATCHDOG_S: Final = 5

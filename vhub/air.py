@@ -13,17 +13,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from foosim.vhub.memory import AirState, RadioState, Transmission
 from foosim.vhub.packet import Flight
 from foosim.vhub.propagation import Propagation
 from foosim.vhub.radio.errors import LORA_FACTORS
 from foosim.vhub.radio.noise import NEGLIGIBLE_CDB, units_of
-from foosim.vhub.turns import Contest, Turn
-
-if TYPE_CHECKING:
-    from foosim.vhub.stages.delay import Delay
+from foosim.vhub.turns import Contest, PutOff, Turn
 
 DEAF: Final = 2**62
 """In units of 1e-21 W: the interference of a station with itself. That of others stays below: it is cut there, since
@@ -151,11 +148,11 @@ class Air:
         """Put off what comes behind a turn that takes so long."""
         contest.put_off(turn_ns, busy_ns, slot_ns, self._open)
 
-    def plan(self, flight: Flight, of: Propagation, delay: Delay) -> None:
+    def plan(self, flight: Flight, of: Propagation, put_off: PutOff) -> None:
         """Take a packet that is on its way; where its turn has not begun, what puts that off makes the packet late."""
         turn = self._turn_of(flight)
         if turn is not None:
-            turn.packets.append((flight, of, delay))
+            turn.packets.append((flight, of, put_off))
 
     def settle(self, until_ns: int) -> None:
         """Nobody comes before a time any more: turns up to it have begun, and spoil others and are spoilt."""

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.protocol.frame import Frame
+from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.layout import Layout
 from foosim.protocol.names import nearest_name
-from foosim.protocol.scene import Body, forward_kinematics
+from foosim.protocol.scene import Body
 from foosim.vhub.rows import CaptureError, FrameRow, PacketRow
 
 Integers: TypeAlias = NDArray[np.int64]

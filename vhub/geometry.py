@@ -15,6 +15,7 @@ from typing import Final, Generic, NamedTuple, TypeVar
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
+from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.layout import Layout
 from foosim.protocol.mesh import Mesh
 from foosim.protocol.radio_materials import RadioMaterial
@@ -30,7 +31,6 @@ from foosim.protocol.scene import (
     Sphere,
     Vector,
     enclosing,
-    forward_kinematics,
     rotate,
     shape_box,
     swept_box,

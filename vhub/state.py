@@ -23,8 +23,7 @@ from foosim.protocol.messages import Deliveries, Epoch, Sent
 from foosim.protocol.robot_packets import Delivered, RobotPacket
 from foosim.protocol.sampling import Sampling, are_answered
 from foosim.vhub.ages import Ages
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.links import Link
+from foosim.vhub.fabric import Fabric, Link
 from foosim.vhub.members import Here, Member
 from foosim.vhub.memory import Age, Joining, Snapshot
 from foosim.vhub.packet import Flight, Packets, content_of, flight_of, order_of, state_of

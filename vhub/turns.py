@@ -11,15 +11,16 @@ Neighbours: `air` (who is on it), `stages.medium` (draws), `radio.contention` (h
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from operator import attrgetter
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from foosim.vhub.memory import RadioState, Transmission
 from foosim.vhub.packet import Flight
 from foosim.vhub.propagation import Propagation
 
-if TYPE_CHECKING:
-    from foosim.vhub.stages.delay import Delay
+PutOff = Callable[[Flight, int, dict[int, int]], None]
+"""Has a packet come so many ns later, with the due times of those before it that were put off, by link."""
 
 
 class Turn:
@@ -29,7 +30,7 @@ class Turn:
 
     def __init__(self, known: Transmission, sender: RadioState) -> None:
         self.known, self.sender = known, sender
-        self.packets: list[tuple[Flight, Propagation, Delay]] = []
+        self.packets: list[tuple[Flight, Propagation, PutOff]] = []
 
     def put_off(self, by_ns: int, ready_by_ns: int, last_ns: dict[int, int]) -> None:
         """Have it begin so much later, and its packet be the first of its queue so much later.
@@ -52,7 +53,7 @@ class Turn:
                 if until_ns == old_ns:
                     waiting[place] = new_ns, size
                     break
-        for flight, _, delay in self.packets:
+        for flight, _, put_off in self.packets:
             if not flight.cause:
                 if by_ns:
                     flight.air_start_ns += by_ns
@@ -60,7 +61,7 @@ class Turn:
                     flight.access_ns += by_ns - ready_by_ns
                     if ready_by_ns:
                         flight.queue_ns += ready_by_ns
-                delay.put_off(flight, by_ns, last_ns)
+                put_off(flight, by_ns, last_ns)
 
 
 _ORDER: Final = attrgetter("known.turn_ns", "known.source")

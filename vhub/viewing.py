@@ -33,9 +33,10 @@ from foxglove.messages import (
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
+from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.layout import Layout
 from foosim.protocol.mesh import Mesh
-from foosim.protocol.scene import Box, Scene, Shape, Sphere, Vector, forward_kinematics
+from foosim.protocol.scene import Box, Scene, Shape, Sphere, Vector
 from foosim.protocol.scene import Quaternion as Turn
 from foosim.protocol.scenes import build_scene
 

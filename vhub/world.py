@@ -12,10 +12,11 @@ import numpy as np
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
+from foosim.protocol.kinematics import forward_kinematics, velocity
 from foosim.protocol.layout import Entity, Layout
 from foosim.protocol.network import Network
 from foosim.protocol.rovers import RoverRobot
-from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Quaternion, Vector, forward_kinematics, rotate, velocity
+from foosim.protocol.scene import ORIGIN, UPRIGHT, Body, Quaternion, Vector, rotate
 from foosim.protocol.scenes import build_scene
 from foosim.vhub.geometry import Crossing, LineOfSight, Sight, Trace
 

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.console.shown.source import Moment
+from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.layout import Entity, Layout
-from foosim.protocol.scene import Body, Scene, forward_kinematics
+from foosim.protocol.scene import Body, Scene
 
 POSES_KIND: Final = 1
 HEAD: Final = struct.Struct("<BBBBIdII")

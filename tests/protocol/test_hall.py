@@ -14,9 +14,10 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.hall_start import start_findings
+from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.layout import build_layout
 from foosim.protocol.obstacles import Circle, Rectangle, obstacle, obstacles_of
-from foosim.protocol.scene import Cylinder, Shape, forward_kinematics
+from foosim.protocol.scene import Cylinder, Shape
 from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import initial_frame, initial_numbers
 

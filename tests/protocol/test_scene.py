@@ -7,8 +7,9 @@ import pytest
 
 from foosim.protocol.assign import reach_of
 from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.layout import build_layout
-from foosim.protocol.scene import Box, Shape, Vector, forward_kinematics, multiply, place, rotate, swept_box, turn
+from foosim.protocol.scene import Box, Shape, Vector, multiply, place, rotate, swept_box, turn
 from foosim.protocol.scenes import build_scene
 from foosim.protocol.start import initial_numbers, place_ball
 from foosim.protocol.table_scene import spin_inertia

@@ -36,7 +36,8 @@ from foosim.client.replay import (
     ReplayTime,
     hear_replay,
 )
-from foosim.protocol.certificates import CertificateError, load_credentials
+from foosim.protocol.certificate_folder import CertificateError
+from foosim.protocol.certificates import load_credentials
 from foosim.protocol.errors import BadValue
 from foosim.protocol.units import Pace
 from foosim.rehearsal.play import PlayOptions, PlayResult, Stopper, play_capture

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from foosim.protocol import certificates, wall
 from foosim.protocol.certificate_files import hosts_of, read_certificate
+from foosim.protocol.certificate_folder import CertificateError
 from foosim.protocol.certificates import (
-    CertificateError,
     check_host,
     load_credentials,
     operator_credentials,

@@ -19,7 +19,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap_protobuf.decoder import DecoderFactory
 
 from foosim.protocol.frame import CHAIN_START, chain_next
-from foosim.protocol.scene import forward_kinematics
+from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.scenes import build_scene
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import CaptureData, open_capture

@@ -73,7 +73,7 @@ class Delay(Stage):
     def plan(self, flight: Flight) -> None:
         """Have a packet come later where its turn on the air is put off."""
         if self._air is not None and self._budget is not None:
-            self._air.plan(flight, self._budget.propagation, self)
+            self._air.plan(flight, self._budget.propagation, self.put_off)
 
     def put_off(self, flight: Flight, by_ns: int, last_ns: dict[int, int]) -> None:
         """Have a packet come so much later; `last_ns` are the due times of those before it that were put off, by link.
