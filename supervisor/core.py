@@ -13,7 +13,6 @@ from mypy_extensions import mypyc_attr
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
-from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.closed import closed
@@ -29,6 +28,7 @@ from foosim.protocol.messages import (
     End,
     Epoch,
     Farewell,
+    Fetch,
     Heartbeat,
     Hello,
     Inquiry,

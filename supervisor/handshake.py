@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
-from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.codec import encode
 from foosim.protocol.fetching import piece_of
 from foosim.protocol.json_text import decode_json
-from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Recall, Refusal
+from foosim.protocol.messages import Build, Farewell, Fetch, Heartbeat, Hello, Ready, Recall, Refusal
 from foosim.supervisor.absence import SAID_NS
 
 if TYPE_CHECKING:

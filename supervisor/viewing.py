@@ -20,8 +20,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.edits import Add, Edit, Remove
 from foosim.protocol.errors import Refused, show
 from foosim.protocol.json_text import encode_json
-from foosim.protocol.messages import Answer, Heartbeat, Request
-from foosim.protocol.view_messages import Watched
+from foosim.protocol.messages import Answer, Heartbeat, Request, Watched
 from foosim.supervisor.choices import chosen
 
 if TYPE_CHECKING:
