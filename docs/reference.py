@@ -123,7 +123,10 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("node.main", "CONNECT_S"): ("nodes", "the same"),
     ("client.main", "CONNECT_S"): ("players", "a vHub to connect to; then they fail"),
     ("client.client", "CONNECT_S"): ("`connect` in a program", "the same, unless it says another time"),
-    ("protocol.admission", "ADMISSION_NS"): ("every process", "with certificates, to be let in; then the log says so"),
+    ("protocol.admission", "ADMISSION_NS"): (
+        "every process",
+        "with certificates, to be let in; then the log says so",
+    ),
 }
 """The same of what no deployment sets: constants, whose names end with their units."""
 _PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
