@@ -85,7 +85,13 @@ interface Step { stage: string; outcome: string; text: string }
 interface ExplainedDrop { tick: number; cause: string; head: string; steps: Step[]; verdict: string }
 interface WatchedMessage { source: number; link: [string, string]; rule: string; drops: ExplainedDrop[] }
 interface Answer { id: number; accepted: boolean; text: string; tick: number; verb: string; who: string }
-interface Compared { at: number; entities: { name: string; distance_m: number }[]; series: [number, number][] }
+interface Compared {
+  at: number;
+  /** First and last tick of the first source's clock at which the second one has something. */
+  covers?: [number, number];
+  entities: { name: string; distance_m: number }[];
+  series: [number, number][];
+}
 interface Overlay {
   source: number;
   generation: number;
