@@ -50,9 +50,9 @@ def foosim_console(  # noqa: PLR0913, PLR0917  # a command's options
     """Serve a page that shows a live run, and lets operators do what foosim-supervisor's commands do.
 
     Prints an address for who operates and one for who only looks; the token in it is the permission. While no browser
-    is open it asks the run for nothing. With --second a recording follows the run on its clock, beside it or as a ghost
-    in it, and the distance between the two is plotted, entity by entity. Ctrl-C ends it; the run goes on. Exit codes: 0
-    ended, 1 no run is live or nobody can listen, 2 bad input, 3 refused.
+    is open it asks the run for its status once a second. With --second a recording follows the run on its clock, beside
+    it or as a ghost in it, and the distance between the two is plotted, entity by entity. Ctrl-C ends it; the run goes
+    on. Exit codes: 0 ended, 1 no run is live or nobody can listen, 2 bad input, 3 refused.
     """
     die_with_parent()
     offset_ns = read_offset(second, offset)
