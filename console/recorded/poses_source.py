@@ -158,7 +158,7 @@ def _scene(tracks: Mapping[str, Track], deployment: Deployment | None) -> dict[s
         {"name": name, "model": models.get(name, ""), "links": [place], "removable": False, "pushable": False}
         for place, name in enumerate(tracks)
     ]
-    empty = {"layout": "", "scenery": [], "fields": [], "sensors": [], "meshes": {}, "addable": []}
+    empty = {"layout": "", "scenery": [], "fields": [], "commands": [], "sensors": [], "meshes": {}, "addable": []}
     return {**empty, "meshes": content.get("meshes", {}), "links": links, "bodies": bodies, "bounds": _bounds(tracks)}
 
 
