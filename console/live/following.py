@@ -58,7 +58,7 @@ class Following:
         self._frame: Frame | None = None
         """The newest one that was shown."""
         self._is_paused = self._has_changed = False
-        self.history = History(about.tick_ns)
+        self._history, self._wanted = History(about.tick_ns), Wanted()
         self._marks = StatusMarks()
         self._events: WorldEvents | None = None
         self._planned: list[Event] = []
@@ -105,7 +105,8 @@ class Following:
             self._frame = None
             if before is None or before.drawing.deployment is not deployment:
                 self._events, self._watched = WorldEvents(deployment), Watched(deployment)
-                self.history = History(deployment.tick_ns)
+                self._history = History(deployment.tick_ns)
+                self._history.listen(self._wanted)
                 self._planned = sorted(deployment.network.events, key=lambda event: event.at_ns, reverse=True)
             world.links.turn_to(world.drawing.scene)
         return is_new
@@ -146,7 +147,7 @@ class Following:
         """Return what there is to see in a frame that was read just now."""
         jump = self._frame is None or frame.tick < self._frame.tick
         self._frame = frame
-        self.history.keep_frame(frame)
+        self._history.keep_frame(frame)
         if self._watched is not None:
             self._watched.keep(frame)
         return world.drawing.moment(frame, jump=jump, paused=self._is_paused)
@@ -157,9 +158,14 @@ class Following:
             return None
         return self._world.drawing.overlay(self._frame, wanted)
 
+    def listen(self, wanted: Wanted) -> None:
+        """Take note of what is looked at from here on: all else is not heard."""
+        self._wanted = wanted
+        self._history.listen(wanted)
+
     def points(self, curve: Curve) -> Callable[[], list[tuple[float, float]]]:
         """Return what makes the points that are kept of a curve, in any thread."""
-        return list if self._world is None else self.history.reader(curve, self._world.drawing.layout)
+        return list if self._world is None else self._history.reader(curve, self._world.drawing.layout)
 
     # --- statuses ----------------------------------------------------------------------------------------------------
 
@@ -205,7 +211,7 @@ class Following:
         if self._watched is not None:
             messages += self._watched.readings(status["watched"])
         for message in messages:
-            self.history.keep(message)
+            self._history.keep(message)
         return messages
 
     def explained(self, status: Mapping[str, Any], wanted: Wanted) -> list[dict[str, Any]]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from foosim.console.shown.curves import link_figure
-from foosim.console.shown.source import FIGURES, Curve, Link, Reading
+from foosim.console.shown.source import FIGURES, Curve, Link, Reading, Wanted
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 
@@ -119,13 +119,15 @@ class History:
         self._statuses = Rows(STATUSES_BYTES)
         self._links = Rows(LINKS_BYTES)
         self._readings: dict[Reading, Rows] = {}
+        self._watched: Collection[Reading] = ()
 
-    def interrupt(self, frames: bool, readings: Collection[Reading]) -> None:
-        """Take note of what is not heard from here on: frames, and readings but for these."""
-        if frames:
+    def listen(self, wanted: Wanted) -> None:
+        """Take note of what is heard from here on: frames while somebody looks, readings that somebody plots."""
+        if not (wanted.readers and wanted.hz):
             self._frames.interrupt()
+        self._watched = wanted.readings  # further ones come as long as their lease lasts
         for reading, rows in self._readings.items():
-            if reading not in readings:
+            if reading not in wanted.readings:
                 rows.interrupt()
 
     def keep_frame(self, frame: Frame) -> None:
@@ -163,6 +165,8 @@ class History:
         self._links.keep(tick, _places(self._links.newest or {}, rows), numbers)
 
     def _keep_readings(self, reading: Reading, points: list[tuple[int, list[float]]]) -> None:
+        if reading not in self._watched:
+            return
         rows = self._readings.pop(reading, None) or Rows(READINGS_BYTES)
         self._readings[reading] = rows  # the one that was heard last
         if len(self._readings) > READINGS_MAX:

@@ -70,7 +70,7 @@ class LiveSource:
 
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
-        self._following.history.interrupt(not (wanted.readers and wanted.hz), wanted.readings)
+        self._following.listen(wanted)
         self._changed.set()
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:

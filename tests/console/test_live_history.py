@@ -48,6 +48,7 @@ def test_numbers_of_frames_are_kept_some_time_apart_by_name_through_a_change_of_
 
 def test_values_of_the_status_figures_of_links_and_readings_are_kept() -> None:
     found, _ = following()
+    found.listen(Wanted(1, 50.0, readings=(("camera", "ball"),)))
     link = ["a", "b", 4, 3, 1, 2_000_000, "everything", 5_000_000, {"loss": 1}]
     for number in range(1, 5):
         said: dict[str, Any] = status("running") | {"ticks": number * WIDE, "lag_ms": {"p99": number / 2}}
@@ -72,7 +73,8 @@ def test_what_nobody_looked_at_is_a_hole_and_time_that_goes_back_forgets_what_wa
     curve = Curve("z", field=3)
     for tick in (APART, 2 * APART):
         history.keep_frame(frame_of(tick))
-    history.interrupt(frames=not Wanted().hz, readings=())
+    for wanted in (Wanted(), Wanted(1, 50.0)):
+        history.listen(wanted)
     history.keep_frame(frame_of(9 * APART))
     points = history.reader(curve, layout)()
     assert [tick for tick, _ in points] == [APART, 2 * APART, 2 * APART + 1, 9 * APART]
@@ -95,8 +97,20 @@ def test_what_is_kept_is_bounded_and_reaches_as_far_back_in_a_large_world(count:
     assert rows._bytes == sum(row[2].nbytes + kept.ROW_BYTES for row in rows._rows)
 
 
+def test_readings_that_come_after_nobody_plots_them_are_none_and_leave_a_hole() -> None:
+    history, layout = History(TICK_NS), frame_of(1).layout
+    plotted = Wanted(1, 50.0, readings=(("camera", "ball"),))
+    for number, wanted in enumerate((plotted, Wanted(1, 50.0), Wanted(), plotted), start=1):
+        history.listen(wanted)
+        said = {"type": "readings", "robot": "camera", "channel": "ball", "points": [[number * WIDE, [1.0]]]}
+        history.keep(said)
+    points = history.reader(Curve("x", reading=("camera", "ball")), layout)()
+    assert [(tick, isnan(value)) for tick, value in points] == [(WIDE, False), (WIDE + 1, True), (4 * WIDE, False)]
+
+
 def test_readings_of_the_channels_that_were_heard_last_are_kept() -> None:
     history, layout = History(TICK_NS), frame_of(1).layout
+    history.listen(Wanted(1, 50.0, readings=tuple((f"r{number}", "c") for number in range(kept.READINGS_MAX + 1))))
     for number in range(kept.READINGS_MAX + 1):
         history.keep({"type": "readings", "robot": f"r{number}", "channel": "c", "points": [[5, [1.0]]]})
     known = [bool(history.reader(Curve("x", reading=(f"r{number}", "c")), layout)()) for number in (0, 1)]
