@@ -74,11 +74,11 @@ class Up:
         display: Display,
         run: str | None = None,
         resumed: RunFolder | None = None,
-        console: Page = "",
+        console: Page | None = None,
     ) -> None:
         """`capture` is where it is captured; None captures nothing. `run` names it, `resumed` is one to go on with.
 
-        `console` says whether one is started beside the run.
+        `console` is the page that is served beside the run.
         """
         self.plan = plan
         self.capture = capture

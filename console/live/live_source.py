@@ -1,9 +1,9 @@
 """A running system as a source: frames of the simulation plane's `view`, statuses, and requests of an operator.
 
-Looking on costs the run what its leases say: they are renewed only while a browser looks. A supervisor that dies is
-looked for again under the run's name, and what was seen stays in sight meanwhile. Asking waits in threads, one
-connection each, so that nobody waits for another's answer. Neighbours: `following` (what becomes of what arrives),
-`supervisor.control`.
+Looking on costs the run what its leases say: they are renewed only while a browser looks; while none does, a status is
+asked for each second. A supervisor that dies is looked for again under the run's name, and what was seen stays in sight
+meanwhile. Asking waits in threads, one connection each, so that nobody waits for another's answer.
+Neighbours: `following` (what becomes of what arrives), `supervisor.control`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from functools import partial
 from typing import Any, Final, TypeVar
 
 from foosim.console.live.following import Following, World
+from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
 from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.inbox import Inbox, Item
@@ -28,6 +29,8 @@ VERBS: Final = (
 )
 POLL_S: Final = 0.25
 """How often the status is asked for while a browser looks."""
+UNSEEN_S: Final = 1.0
+"""How often it is while none does: a page that is opened later scrolls back."""
 RENEW_S: Final = 1.5
 QUESTION_S: Final = 3.0
 """How long a status is waited for; a supervisor that does not answer is looked for again."""
@@ -67,6 +70,7 @@ class LiveSource:
 
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
+        self._following.listen(wanted)
         self._changed.set()
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
@@ -98,8 +102,8 @@ class LiveSource:
         return Answered(answer.text, answer.tick), answer.sender
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
-        """Nothing is kept of a run but what its capture has: a page keeps what it has plotted."""
-        return "", "", []
+        points = await asyncio.to_thread(self._following.points(curve))
+        return *name_and_unit(curve), points
 
     # --- looking on --------------------------------------------------------------------------------------------------
 
@@ -175,14 +179,11 @@ class LiveSource:
         while True:
             self._changed.clear()
             wanted = self._wanted
-            if wanted.readers == 0:
-                await self._changed.wait()
-                continue
             if following.is_stale and time.monotonic() >= described_s + POLL_S:
                 await self._describe(control, feed)
                 described_s = time.monotonic()
             now_s = time.monotonic()
-            if wanted != lease or now_s >= renewed_s + RENEW_S:
+            if wanted.readers and (wanted != lease or now_s >= renewed_s + RENEW_S):
                 await self._renew(control, feed, following.watch_arguments(wanted, HZ_MAX), wanted != lease)
                 lease, renewed_s = wanted, now_s
             status = await self._in_thread(lambda: control.status(QUESTION_S, self._closing.is_set))
@@ -195,7 +196,7 @@ class LiveSource:
             if moment is not None:
                 feed.show(moment)
             with suppress(TimeoutError):
-                async with asyncio.timeout(POLL_S):
+                async with asyncio.timeout(POLL_S if wanted.readers else UNSEEN_S):
                     await self._changed.wait()
 
     async def _renew(self, control: Control, feed: Feed, wanted: dict[str, Any], is_new: bool) -> None:

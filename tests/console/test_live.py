@@ -10,10 +10,13 @@ import pytest
 
 from foosim.console.live import live_source
 from foosim.console.live.live_source import LiveSource
-from foosim.console.shown.source import About, Moment
+from foosim.console.shown.source import About, Curve, Moment, Wanted
 from foosim.protocol.errors import BadValue
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.messages import Answer
 from foosim.supervisor.control import Control
 from foosim.supervisor.run_folder import NoRun
+from tests.console.test_following import described, frame_of, status
 
 
 class Heard:
@@ -31,6 +34,16 @@ class Heard:
     def tell(self, message: Mapping[str, Any]) -> None:
         assert message["type"] == "note"
         self.notes.append(message["text"])
+
+
+class Seen:
+    """A feed that takes all."""
+
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None: ...
+
+    def show(self, moment: Moment) -> None: ...
+
+    def tell(self, message: Mapping[str, Any]) -> None: ...
 
 
 def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,6 +66,54 @@ def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest
         "mine is not there: run mine is starting; it is looked for",
         "mine is not there: run mine is over; it is looked for",
     ]
+
+
+class Standing(Control):
+    """A run that is not moved by anybody, without a wire: it remembers what it was asked for."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def describe(self, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool) -> dict[str, Any]:
+        return described(frame_of(5), [])
+
+    def status(self, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool) -> dict[str, Any]:
+        self.asked.append("status")
+        return status("running") | {"ticks": 100 * self.asked.count("status")}
+
+    def ask(
+        self, verb: str, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool, **arguments: Any
+    ) -> Answer:
+        self.asked.append(verb)
+        return Answer("operator", "1", True, 5, "", b"")
+
+    def view(self, inbox: Inbox) -> None:
+        """No frame comes."""
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+def test_while_nobody_looks_statuses_alone_are_asked_for_and_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_source, "UNSEEN_S", 0.0)
+    control = Standing()
+
+    async def scene() -> None:
+        source = LiveSource("mine", lambda give_up: control, None)
+        running = asyncio.create_task(source.run(Seen()))
+        async with asyncio.timeout(30):
+            while control.asked.count("status") < 4:
+                await asyncio.sleep(0)
+            assert {*control.asked} == {"status"}, "no frames"
+            name, _, points = await source.history(Curve("t", status="ticks"))
+            assert name == "ticks" and points[:3] == [(100.0, 100.0), (200.0, 200.0), (300.0, 300.0)]
+            source.want(Wanted(1, 50.0))
+            while "watch" not in control.asked:
+                await asyncio.sleep(0)
+        running.cancel()
+        await asyncio.wait((running,))
+
+    asyncio.run(scene())
 
 
 @pytest.mark.parametrize("name", ["self", "timeout_s", "a b", ""])

@@ -90,6 +90,19 @@ test("numbers of a field whose units differ have names of their own", () => {
   assert.equal(choiceOf(choices, "nothing"), null);
 });
 
+test("a command is picked by robot, channel and number, and holds until the next one", () => {
+  const source = new Source(INFO);
+  const run = { entity: "red.goal", field: "wanted" };
+  const told = { robot: "red.goal", channel: "position" };
+  source.scene = {
+    fields: [{ ...run, unit: "m", index: 4, count: 1 }, { ...run, unit: "rad", index: 5, count: 1 }], sensors: [],
+    commands: [{ ...told, number: "slide", unit: "m", index: 4 }, { ...told, number: "spin", unit: "rad", index: 5 }],
+  };
+  const choices = choicesOf(source);
+  assert.deepEqual([...choices.keys()], ["command red.goal/position.slide", "command red.goal/position.spin"]);
+  assert.deepEqual(choiceOf(choices, "command red.goal/position.spin"), { name: "command red.goal/position.spin", unit: "rad", hint: "set-point", step: true, request: { field: 5 } });
+});
+
 test("values of a status are found by their path, also under names with dots", () => {
   const status = { lag_ms: { p99: 1.5 }, nodes: { "a.b": { solved_ticks: 3 } }, state: "running" };
   assert.deepEqual(numberPaths(status).map((path) => [path, valueAt(status, path)]), [["lag_ms.p99", 1.5], ["nodes.a.b.solved_ticks", 3]]);
