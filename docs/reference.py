@@ -96,7 +96,6 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
         "the end of the vHub's connection, before nodes are lost whose samples it lacks though they have sent them",
     ),
     ("supervisor.absence", "SAID_NS"): ("supervisor", "what a process said before its connection closed"),
-    ("supervisor.closing", "GONE_NS"): ("supervisor", "the last word of a vHub that ends while it closes its capture"),
     ("supervisor.take_over", "REJOIN_NS"): (
         "supervisor",
         "nodes that have to find one that was started again, beside `heartbeat`; then it goes on without them",
