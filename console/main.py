@@ -6,18 +6,20 @@ Neighbours: `live` (the run as a source), `serving` (serves it), `supervisor.up`
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from foosim.console.live.live_source import LiveSource
+from foosim.console.live.presence import how_ended
 from foosim.console.server.serving import ServeOptions, serve_sources
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.command import VersionOption, new_app, run_app
 from foosim.protocol.process import die_with_parent
 from foosim.supervisor.control import Control, connect
-from foosim.supervisor.run_folder import find_run
+from foosim.supervisor.run_folder import find_run, open_run
 
 app = new_app()
 
@@ -54,7 +56,9 @@ def foosim_console(
 
     options = ServeOptions(listen, certificate, key, view_only, open_browser, announce)
     operate = None if view_only else operating
-    serve_sources(lambda: ([LiveSource(name, viewing, operate)], ()), options, lambda text: print(text, flush=True))
+    ended = partial(how_ended, open_run(name))
+    source = partial(LiveSource, name, viewing, operate, ended)
+    serve_sources(lambda: ([source()], ()), options, lambda text: print(text, flush=True))
 
 
 def main() -> None:

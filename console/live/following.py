@@ -63,6 +63,8 @@ class Following:
         """Events of the deployment's network that are not marked yet, the last one first."""
         self._watched: Watched | None = None
         self._statuses = 0
+        self.stopped_by = ""
+        """Who asked for the end of the run; empty while nobody did."""
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
         """Who has asked: by the request's sender, tick and verb."""
 
@@ -168,6 +170,8 @@ class Following:
     def asked(self, sender: str, tick: int, verb: str, who: str) -> None:
         """Remember which browser has asked for something."""
         self._askers[sender, tick, verb] = who
+        if verb == "down":
+            self.stopped_by = who
         if len(self._askers) > ASKERS_KEPT:
             self._askers.popitem(last=False)
 
@@ -178,6 +182,7 @@ class Following:
             for asked in status["requests"]
         ]
         status = {**status, "requests": requests}
+        self.stopped_by = next((asked["who"] for asked in requests if asked["verb"] == "down"), self.stopped_by)
         was_paused, self._is_paused = self._is_paused, status["state"] == "paused"
         self._has_changed = was_paused != self._is_paused
         messages: list[dict[str, Any]] = [{"type": "status", "status": status}]

@@ -23,6 +23,8 @@ export class Source {
     this.overlay = null;
     /** @type {Mark[]} */
     this.marks = [];
+    /** @type {Presence | null} */
+    this.presence = null;
   }
 
   get tick() {
@@ -185,6 +187,9 @@ export class Store {
       case "overlay":
         if (source.scene?.generation !== message.generation) return;
         source.overlay = message;
+        break;
+      case "presence":
+        source.presence = message;
         break;
       case "marks":
         this._take_marks(source, message.marks);

@@ -4,11 +4,12 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { choiceOf, choicesOf } from "../src/choices.js";
 import { lossColour } from "../src/colours.js";
-import { tokenOf } from "../src/connection.js";
+import { Connection, tokenOf } from "../src/connection.js";
 import { settingsOf } from "../src/disturb.js";
 import { scaleLength } from "../src/map.js";
 import { fromAbove } from "../src/map_data.js";
 import { decodePoses } from "../src/messages.js";
+import { bannerOf, stateOf } from "../src/presence.js";
 import { Ring } from "../src/ring.js";
 import { Source, Store } from "../src/store.js";
 import { number, numberPaths, time, valueAt } from "../src/text.js";
@@ -118,4 +119,46 @@ test("a box that is turned is seen from above as it lies", () => {
   assert.deepEqual(at, [3, 4]);
   assert.equal(Math.round(Math.max(...points.map(([x]) => x))), 1);
   assert.equal(Math.round(Math.max(...points.map(([, y]) => y))), 2);
+});
+
+test("a run that has ended is said, with its capture, whatever becomes of the console", () => {
+  const store = new Store();
+  store.take({ type: "welcome", role: "viewer", version: "1", sources: [INFO] });
+  const ended = { type: "presence", source: 0, state: "ended", failed: false, text: "The run has ended at tick 5: done." };
+  const away = { type: "presence", source: 0, state: "away", text: "lost run; it is looked for" };
+  assert.equal(bannerOf("", store.main.presence), "");
+  store.take(away);
+  assert.deepEqual([bannerOf("", store.main.presence), stateOf(true, store.main.presence, "running")], [away.text, "supervisor away"]);
+  assert.deepEqual([bannerOf("Not connected", away), stateOf(false, away, "running")], ["Not connected", "not connected"]);
+  store.take(ended);
+  assert.deepEqual([bannerOf("Not connected", store.main.presence), stateOf(false, store.main.presence, "running")], [ended.text, "ended"]);
+  assert.equal(stateOf(true, { ...ended, failed: true }, "running"), "failed");
+});
+
+test("a console whose run has ended is asked for every 15 s, another one sooner, until it is back", () => {
+  const [sockets, waits, told] = [[], [], []];
+  globalThis.window = { setTimeout: (_, wait_ms) => waits.push(wait_ms) };
+  globalThis.WebSocket = class {
+    constructor() {
+      this.on = {};
+      sockets.push(this);
+    }
+    addEventListener(name, listener) { this.on[name] = listener; }
+  };
+  const connection = new Connection("ws://x/ws", "", { binary: () => {}, message: () => {}, changed: (_, text) => told.push(text) });
+  const close = (event) => {
+    connection.open();
+    sockets.at(-1).on.close(event);
+  };
+  close({ code: 1001, reason: "the console was ended" });
+  close({ code: 4410, reason: "The run has ended: done." });
+  close({ code: 1006, reason: "" });
+  connection.open();
+  sockets.at(-1).on.message({ data: '{"type": "welcome"}' });
+  close({ code: 1006, reason: "" });
+  delete globalThis.window;
+  delete globalThis.WebSocket;
+  assert.deepEqual(waits.map((wait_ms) => (wait_ms > 11_000 ? "long" : wait_ms < 1000 ? "short" : wait_ms)), ["short", "long", "long", "short"]);
+  assert.equal(told[0], "Not connected: the console was ended. Trying again …");
+  assert.equal(told[1], "The run has ended: done.");
 });
