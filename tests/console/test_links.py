@@ -53,8 +53,21 @@ def test_a_link_that_counts_anew_and_time_that_goes_back_begin_a_window() -> Non
     assert windows.take(0.5, {KEY: count(12, 1, snr=1)})[KEY] == count(12, 1, snr=1)
 
 
+def test_a_link_that_was_not_told_before_begins_with_its_first_count() -> None:
+    """Of many links the busiest are told: one that comes among them has not done all in this window."""
+    windows, other = Windows(5.0), ("b", "c", "rule")
+    windows.take(60.0, {KEY: count(600, 60)}, are_all=False)
+    assert windows.take(61.0, {KEY: count(610, 60), other: count(700, 70)}, are_all=False)[other] == count(0, 0)
+    assert windows.take(62.0, {KEY: count(610, 60), other: count(705, 71)}, are_all=False)[other] == count(5, 1)
+    windows.take(63.0, {KEY: count(610, 60), other: count(705, 71)})
+    new = ("c", "d", "rule")
+    for at_s in (70.0, 71.0):
+        found = windows.take(at_s, {KEY: count(610, 60), **({new: count(4, 0)} if at_s > 70.0 else {})})
+    assert found[new] == count(4, 0), "all were told: it is new"
+
+
 def status(ticks: int, *rows: list[Any]) -> dict[str, Any]:
-    return {"ticks": ticks, "tick_ns": 10_000_000, "links": list(rows)}
+    return {"ticks": ticks, "tick_ns": 10_000_000, "links": list(rows), "links_in_all": len(rows)}
 
 
 def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callable[..., str]) -> None:
@@ -68,7 +81,8 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
     links.turn_to(drawing.scene)
     links.move(initial_frame(deployment))
     row = ["pilot01", "pilot02", 10, 6, 4, 2_000_000, "fleet/wifi", 0, {"snr": 3, "queue_full": 1}, []]
-    message = links.message(status(100, row))
+    message = links.message({**status(100, row), "links_in_all": 300})
+    assert message["in_all"] == 300
     (line,) = message["links"]
     assert (line["radio"], line["loss"], line["delay_ms"]) == (True, 0.4, 2.0)
     history = LinkHistory(10_000_000)

@@ -25,6 +25,7 @@ from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.drops_shown import Reported, explain_drops
 from foosim.supervisor.plan import RunSettings
+from foosim.vhub import report
 from foosim.vhub.explain import explain_row
 from foosim.vhub.packet import DROPPED, Flight
 from foosim.vhub.records import Closing
@@ -131,6 +132,17 @@ def test_the_last_drops_of_a_watched_link_are_told_as_rows() -> None:
     dropped = [replace(packet_row(flight), payload=b"", wall_released_ns=0) for flight in drops_on(run, LINK)]
     at = dropped.index(rows[-1])
     assert rows == dropped[at + 1 - DROPS_KEPT : at + 1] and len(dropped) - at < 20, "the last ones when it was told"
+
+
+def test_watched_links_are_told_beside_the_busiest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(report, "LINKS_TOLD_MAX", 3)
+    state = seen().system.hub.state
+    assert state is not None and len(state.fabric.states) > 4
+    order = sorted(state.fabric.states, key=lambda key: (-state.fabric.states[key].offered, key))
+    last = order[-1]
+    for watched, expected in (([], order[:3]), ([last[:2], ("no", "body")], [*order[:3], last])):
+        lines = decode_json(bytes(report.LinksTold().lines(state, watched, anew=True)))
+        assert [(line[0], line[1], line[6]) for line in lines] == sorted(expected)
 
 
 def test_the_readings_of_a_watched_sensor_are_told_with_their_ticks() -> None:

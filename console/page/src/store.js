@@ -17,6 +17,8 @@ export class Source {
     /** @type {LinkWindow[]} */
     this.links = [];
     this.window_s = 0;
+    /** How many links were used: of many the busiest are told, and those that are watched. */
+    this.links_in_all = 0;
     /** @type {WatchedMessage | null} */
     this.watched = null;
     /** @type {Overlay | null} */
@@ -180,6 +182,7 @@ export class Store {
       case "links":
         source.links = message.links;
         source.window_s = message.window_s;
+        source.links_in_all = message.in_all;
         break;
       case "watched":
         source.watched = message;

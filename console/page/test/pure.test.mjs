@@ -10,6 +10,7 @@ import { scaleLength } from "../src/map.js";
 import { fromAbove } from "../src/map_data.js";
 import { decodePoses } from "../src/messages.js";
 import { bannerOf, stateOf } from "../src/presence.js";
+import { moreText, oldText } from "../src/network.js";
 import { Ring } from "../src/ring.js";
 import { Source, Store } from "../src/store.js";
 import { number, numberPaths, time, valueAt } from "../src/text.js";
@@ -161,4 +162,17 @@ test("a console whose run has ended is asked for every 15 s, another one sooner,
   assert.deepEqual(waits.map((wait_ms) => (wait_ms > 11_000 ? "long" : wait_ms < 1000 ? "short" : wait_ms)), ["short", "long", "long", "short"]);
   assert.equal(told[0], "Not connected: the console was ended. Trying again …");
   assert.equal(told[1], "The run has ended: done.");
+});
+
+test("what the table of links leaves out, and that its figures are old, is said", () => {
+  assert.equal(moreText(0, 0, 0), "No link was used yet.");
+  assert.equal(moreText(18, 18, 18), "");
+  assert.equal(moreText(200, 1482, 3), "200 of 1,482 links, the busiest and the watched ones. Any other is watched by its ends.");
+  assert.equal(moreText(203, 203, 203), "3 more links: find the ones you want above.");
+  assert.equal(oldText({ vhub_away: false, vhub_lost: null }), "");
+  assert.equal(oldText(null), "");
+  assert.equal(
+    oldText({ vhub_away: true, vhub_lost: { reason: "its connection has closed", tick: 73, for_s: 1.25 } }),
+    "⚠ The vHub is away since tick 73, for 1.25 s: its connection has closed. Packets and links are those that it told last.",
+  );
 });
