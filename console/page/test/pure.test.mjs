@@ -116,7 +116,7 @@ test("tokens, times, numbers, scales", () => {
 
 test("a box that is turned is seen from above as it lies", () => {
   const box = { kind: "box", half: [2, 1, 1], position: [0, 0, 0], orientation: [0, 0, Math.SQRT1_2, Math.SQRT1_2], colour: [1, 0, 0, 1], name: "" };
-  const { at, points } = fromAbove(box, [3, 4, 0], [0, 0, 0, 1]);
+  const { at, points } = fromAbove(box, [3, 4, 0], [0, 0, 0, 1], {});
   assert.deepEqual(at, [3, 4]);
   assert.equal(Math.round(Math.max(...points.map(([x]) => x))), 1);
   assert.equal(Math.round(Math.max(...points.map(([, y]) => y))), 2);
@@ -175,4 +175,26 @@ test("what the table of links leaves out, and that its figures are old, is said"
     oldText({ vhub_away: true, vhub_lost: { reason: "its connection has closed", tick: 73, for_s: 1.25 } }),
     "⚠ The vHub is away since tick 73, for 1.25 s: its connection has closed. Packets and links are those that it told last.",
   );
+});
+
+function meshOf(points) {
+  const base64 = (array) => Buffer.from(array.buffer).toString("base64");
+  return { vertices: base64(Float32Array.from(points.flat())), triangles: base64(new Uint32Array(0)) };
+}
+
+test("a mesh is seen from above by its convex outline, turned as it stands", () => {
+  const shape = { kind: "mesh", mesh: "m", position: [0, 0, 0], orientation: [0, 0, 0, 1], colour: [1, 0, 0, 1], name: "" };
+  const wedge = meshOf([[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 3], [0.5, 0.2, 1]]);
+  const around = (points) => points.map((point) => point.map((value) => Math.round(value * 100) / 100 + 0));
+  const flat = fromAbove(shape, [1, 1, 0], [0, 0, 0, 1], { m: wedge });
+  assert.deepEqual([flat.at, around(flat.points)], [[1, 1], [[0, 0], [2, 0], [0, 1]]]);
+  const lying = fromAbove(shape, [0, 0, 0], [0, Math.SQRT1_2, 0, Math.SQRT1_2], { m: wedge });
+  assert.deepEqual(around(lying.points), [[0, 0], [3, 0], [0, 1]], "what was up points along x");
+  assert.equal(fromAbove(shape, [0, 0, 0], [0, 0, 0, 1], {}), null);
+  const ball = Array.from({ length: 5000 }, (_, index) => {
+    const [z, angle] = [1 - (2 * index + 1) / 5000, index * 2.399963];
+    return [Math.sqrt(1 - z * z) * Math.cos(angle), Math.sqrt(1 - z * z) * Math.sin(angle), z];
+  });
+  const { points } = fromAbove(shape, [0, 0, 0], [0, 0, 0, 1], { m: meshOf(ball) });
+  assert.ok(points.length > 10 && points.length < 400 && points.every((point) => Math.hypot(...point) > 0.95));
 });
