@@ -25,7 +25,8 @@ from foosim.protocol.inbox import Inbox, Item
 from foosim.supervisor.control import Control, NoAnswer, RequestRefused
 
 VERBS: Final = (
-    *("pause", "resume", "step", "rate", "add", "remove", "move", "push", "network", "stop", "start", "down"),
+    *("pause", "resume", "step", "rate", "add", "remove", "move", "balance", "push", "network"),
+    *("stop", "start", "down"),
 )
 POLL_S: Final = 0.25
 """How often the status is asked for while a browser looks."""
