@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from foosim.console.live.live_source import LiveSource
+from foosim.console.live.presence import how_ended
 from foosim.console.recorded.leading import Leader
 from foosim.console.recorded.second import OffsetOption, SecondOption, compared_text, open_follower, read_offset
 from foosim.console.server.serving import ServeOptions, serve_sources
@@ -24,7 +26,7 @@ from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import BadValue
 from foosim.protocol.process import die_with_parent
 from foosim.supervisor.control import Control, connect
-from foosim.supervisor.run_folder import find_run
+from foosim.supervisor.run_folder import find_run, open_run
 from foosim.vhub.rows import CaptureError
 
 app = new_app()
@@ -65,7 +67,8 @@ def foosim_console(  # noqa: PLR0913, PLR0917  # a command's options
         return connect(name, "operator", give_up)
 
     options = ServeOptions(listen, certificate, key, view_only, open_browser, announce)
-    live = LiveSource(name, viewing, None if view_only else operating)
+    ended = partial(how_ended, open_run(name))
+    live = LiveSource(name, viewing, None if view_only else operating, ended)
     sources = [live] if second is None else _followed(live, name, second, offset_ns)
     serve_sources(lambda: (sources, ()), options, _say)
 

@@ -335,6 +335,12 @@ def move(
     _show(control.move(robot, node, run), json)
 
 
+@app.command()
+def balance(run: Run = None, json: Json = False) -> None:
+    """Move robots from busy nodes to idle ones, once; the answer says which, and by which loads."""
+    _show(control.balance(run), json)
+
+
 Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
 
 

@@ -21,6 +21,8 @@ from foosim.supervisor.run_folder import UNREADABLE, RunFolder
 CONSOLE: Final = "console"
 ADDRESSES: Final = "console.json"
 """In the run's folder: the addresses of the page, and the line that says them."""
+LEAVE_S: Final = 3.0
+"""How long a console has to tell pages how the run has ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,9 +105,12 @@ class ConsoleChild:
                 f"its log is {child.log}"
             )
 
-    def end(self) -> None:
-        """End it, at once."""
-        self._launcher.kill()
+    def __enter__(self) -> ConsoleChild:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """End it, once it has told its pages how the run has ended."""
+        self._launcher.stop(LEAVE_S)
         self._launcher.close()
         (self._folder.path / ADDRESSES).unlink(missing_ok=True)
 

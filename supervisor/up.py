@@ -119,7 +119,7 @@ class Up:
 
     def run(self) -> Outcome:
         """Start everything, show it until it is over, and return how it ended. Raises Killed."""
-        with counted_signals(self._count), self.display:
+        with counted_signals(self._count), self.display, self._console:  # whose pages learn how it ended
             try:
                 if self._start():
                     self._watch()
@@ -128,11 +128,10 @@ class Up:
                 leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
                 self._launcher.wait(leave_s if self.folder.result() is not None else END_S)
             finally:
-                self._console.end()
                 self._launcher.stop()
                 self._launcher.close()
             self._bring_home()
-        return self._outcome()
+            return self._outcome()
 
     @property
     def _can_resume(self) -> bool:

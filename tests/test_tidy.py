@@ -53,6 +53,7 @@ SHELLS = {
     "console/recorded/deck.py",
     "console/recorded/capture_source.py",
     "console/live/live_source.py",
+    "console/live/presence.py",
     "console/main.py",
     "console/recorded/replay_source.py",
     "console/recorded/poses_source.py",

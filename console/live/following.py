@@ -65,6 +65,10 @@ class Following:
         """Events of the deployment's network that are not marked yet, the last one first."""
         self._watched: Watched | None = None
         self._statuses = 0
+        self._disturbers: dict[int, str] = {}
+        """Who asked for an event of the network, by the tick from which it holds."""
+        self.stopped_by = ""
+        """Who asked for the end of the run; empty while nobody did."""
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
         """Who has asked: by the request's sender, tick and verb."""
 
@@ -182,6 +186,8 @@ class Following:
     def asked(self, sender: str, tick: int, verb: str, who: str) -> None:
         """Remember which browser has asked for something."""
         self._askers[sender, tick, verb] = who
+        if verb == "down":
+            self.stopped_by = who
         if len(self._askers) > ASKERS_KEPT:
             self._askers.popitem(last=False)
 
@@ -192,6 +198,8 @@ class Following:
             for asked in status["requests"]
         ]
         status = {**status, "requests": requests}
+        self._disturbers = {asked["tick"]: asked["who"] for asked in requests if asked["verb"] == "network"}
+        self.stopped_by = next((asked["who"] for asked in requests if asked["verb"] == "down"), self.stopped_by)
         was_paused, self._is_paused = self._is_paused, status["state"] == "paused"
         self._has_changed = was_paused != self._is_paused
         messages: list[dict[str, Any]] = [{"type": "status", "status": status}]
@@ -220,7 +228,8 @@ class Following:
         watched = self._watched
         if watched is None:
             return []
-        return watched.drops(report, [link for link in wanted.links if f"{link[0]}>{link[1]}" in drops])
+        links = [link for link in wanted.links if f"{link[0]}>{link[1]}" in drops]
+        return watched.drops(report, links, status["ticks"] * status["tick_ns"], self._disturbers)
 
     def standing_moment(self) -> Moment | None:
         """Return the last moment again where the run has just paused or gone on, which pages show."""

@@ -310,7 +310,14 @@ class FileSource:
             self._ends.move(frame)
         links = self._ends.with_ends(history.links.windows(at_ns, WINDOW_NS))
         told: list[dict[str, Any]] = [
-            {"type": "links", "at": tick, "window_s": WINDOW_NS / 1e9, "links": links, "drops": drops}
+            {
+                "type": "links",
+                "at": tick,
+                "window_s": WINDOW_NS / 1e9,
+                "in_all": len(links),
+                "links": links,
+                "drops": drops,
+            }
         ]
         for source, destination in self._wanted.links:
             told.append({"type": "watched", **history.watched(source, destination, at_ns)})

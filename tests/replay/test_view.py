@@ -121,7 +121,7 @@ def test_a_replay_that_ends_is_told(run: Path) -> None:
                 connection._read(None)
             return status
 
-        connection.ask = ask  # type: ignore[assignment, method-assign]
+        connection.ask = ask  # type: ignore[method-assign, assignment]
         return connection
 
     async def look(address: str) -> Heard:

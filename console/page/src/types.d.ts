@@ -86,6 +86,16 @@ interface Mark { tick: number; kind: string; text: string }
 interface Step { stage: string; outcome: string; text: string }
 interface ExplainedDrop { tick: number; cause: string; head: string; steps: Step[]; verdict: string }
 interface WatchedMessage { source: number; link: [string, string]; rule: string; drops: ExplainedDrop[] }
+/** Whether a run is there, its supervisor away, or the run over; then how, and what shows its capture. */
+interface Presence {
+  source: number;
+  state: "here" | "away" | "ended";
+  text: string;
+  failed?: boolean;
+  reason?: string;
+  capture?: string | null;
+  command?: string;
+}
 interface Answer { id: number; accepted: boolean; text: string; tick: number; verb: string; who: string }
 interface Compared {
   at: number;
