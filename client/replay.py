@@ -213,7 +213,6 @@ class Replay:
             yield from items
 
     def _read(self, timeout_s: float | None) -> None:
-        had_ended = self.ended
         for key, name, payload in self._inbox.take(timeout_s):
             try:
                 if key == PLAYED.key:
@@ -225,10 +224,6 @@ class Replay:
                     self._is_gone |= payload == b"-"
             except Malformed:
                 self.malformed += 1
-        if self.ended and not had_ended:
-            # Each stream has a queue, and some were looked at before that of the clock: what was said before the end is
-            # in them by now.
-            self._read(0.0)
 
     def _hear(self, message: Played) -> None:
         if isinstance(message, PlayedPacket):
