@@ -1,5 +1,4 @@
 """How fast foosim is, and where the time goes: `python -m bench`. No tests: figures depend on the machine.
 
-One file for each bench: a typed function that returns a dataclass, and a row of `benches`. Neighbours: `runs` (real
-processes), `meter` (where time goes), `machine` (what it was measured on), `barrier` (the messages of a tick alone).
+One file for each bench: a typed function that returns a dataclass, and a row of `benches`.
 """

@@ -11,9 +11,9 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.engines.bullet import BulletEngine
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.start import initial_frame
+from foosim.world.initial_state import initial_frame
 
 TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 BLOCKS: Final = 20

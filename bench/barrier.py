@@ -29,9 +29,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.limits import RELEASE_AHEAD, WANT_AFTER_NS
-from foosim.protocol.session import CLIENT_RUNTIME, ROUTER_RUNTIME, Session
+from foosim.common.limits import RELEASE_AHEAD, WANT_AFTER_NS
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import CLIENT_RUNTIME, ROUTER_RUNTIME, Session
 
 ROLES: Final = ("supervisor", "node1", "node2", "vhub")
 KIND: Final = {"supervisor": "supervisor", "node1": "node", "node2": "node", "vhub": "vhub"}

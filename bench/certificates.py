@@ -1,7 +1,6 @@
 """What certificates cost: runs of the table as fast as they go, by turns plain and with mutual TLS on both planes.
 
 The turns are pairs that follow each other, since the load of a shared machine drifts; the figure is the median of both.
-Neighbours: `runs`, `distributed` (the plain runs at more lengths of tick).
 """
 
 from __future__ import annotations
@@ -13,9 +12,9 @@ from statistics import median
 from typing import Final
 
 from bench.runs import TABLE, watch
-from foosim.protocol.deployment_file import load_deployment, read_deployment_text
+from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.launcher.pki import certificates as pki
 from foosim.protocol.identity import identities_of
-from foosim.supervisor import pki
 
 COST_MAX: Final = 0.2
 """How much of the tick rate mutual TLS may take."""

@@ -3,7 +3,7 @@
 `served` is the console alone, in this process, fed with commits as the supervisor shows them, its readers in another
 process: the table at 50 Hz, and as many poses as a large world has at 25 Hz. `runs` are real runs of the table in real
 time by turns without a console, with one reader, and with many of which some never read: the ticks' cost and lag of
-each, and what the console took. Neighbours: `console_reader` (the readers), `runs`.
+each, and what the console took.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from typing import Any, Final
 import numpy as np
 
 from bench.runs import ROOT, TABLE, watch
+from foosim.common.errors import Refused
 from foosim.console.live.following import Following
 from foosim.console.server.server import ConsoleServer, new_tokens
 from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import Refused
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit
+from foosim.world.frame import Frame
+from foosim.world.layout import build_layout
 
 WORLDS: Final = ((0, 50.0), (983, 25.0))
 """Balls beside the table's own bodies, which are 17 links; and frames a second."""

@@ -1,7 +1,7 @@
 """Raw readers of a console: browsers without a page, some of which stop reading.
 
 With `--port` they read one that serves already; else this starts `foosim-console` for the newest live run, and says in
-its last line what that took. Neighbours: `console` starts it.
+its last line what that took.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 
 from bench.machine import use_of
-from foosim.protocol.errors import Refused
+from foosim.common.errors import Refused
+from foosim.runtime.children import script
 from foosim.supervisor import control
-from foosim.supervisor.children import script
 
 START_S = 120.0
 

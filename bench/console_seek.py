@@ -3,7 +3,7 @@
 A rehearsal is repeated, row by row and moved in time, until there are ten minutes; each packet, tick, frame and pose is
 there. A browser without a page asks for a tick and waits for the poses of it, while the pass over what happened reads
 on; then it asks again when that is done. Chunks are as of a run in real time (flushed each 100 ms), and as large as
-they get. Neighbours: `foosim.console.recorded.capture_source`, `runs`.
+they get.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from msgspec.structs import replace
 from websockets.asyncio.client import ClientConnection, connect
 
 from bench.runs import TABLE, BenchError
+from foosim.capture.contents import CHUNK_BYTES, declare_topics, write_all
+from foosim.capture.foxglove import POSES
+from foosim.capture.mcap.checks import CHECKS
+from foosim.capture.mcap.format import McapFile, Message
+from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.reader import DECODERS, TICK_MARKS, read_about
+from foosim.capture.rows import FRAME, PACKETS, PROFILE, TICK, FrameRow, PacketRow, TickRow
 from foosim.console.recorded.capture_source import FileSource
 from foosim.console.server.server import ConsoleServer, new_tokens
 from foosim.console.shown.poses import HEAD
-from foosim.rehearsal.between import Between
-from foosim.rehearsal.rehearse import rehearse
-from foosim.vhub.capture_contents import CHUNK_BYTES, declare_topics, write_all
-from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, read_about
-from foosim.vhub.mcap_checks import CHECKS
-from foosim.vhub.mcap_file import McapFile, Message
-from foosim.vhub.mcap_writer import McapWriter
-from foosim.vhub.rows import FRAME, PACKETS, PROFILE, TICK, FrameRow, PacketRow, TickRow
-from foosim.vhub.viewing import POSES
+from foosim.rehearsal.run import rehearse
+from foosim.replay.between import Between
 
 REHEARSED_S: Final = 10
 MINUTES: Final = 10

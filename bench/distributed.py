@@ -1,7 +1,7 @@
 """Two nodes, a recording vHub, a supervisor and two lockstep players as processes, as fast as they go.
 
 For each length of tick the substep stays 0.5 ms. The plain runs give the figure, their median; one run more, whose node
-red is `metered_node`, gives the split of its tick. Neighbours: `runs`.
+red is `metered_node`, gives the split of its tick.
 """
 
 from __future__ import annotations

@@ -5,8 +5,7 @@ Here a packet crosses four processes' links, and waits for ticks by design: it r
 it was sent in, stands in the robot's outbox for one more, and is released at the one that sends it. So end to end is
 some ticks; `beyond due` is how much later than its simulated due time it came, measured from the promptest packet of
 the same tenth of a second, since a run that lagged far behind the clock does not make up for it (at 100 Hz these are
-ten packets, and the figure is that much too good). Links are perfect, so every loss is foosim's own. Neighbours:
-`echo_client`, `runs`.
+ten packets, and the figure is that much too good). Links are perfect, so every loss is foosim's own.
 """
 
 from __future__ import annotations

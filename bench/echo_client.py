@@ -3,7 +3,7 @@
 Free-running, a process of its own, made of the client library's core. Packets go to all robots in turn and hold but
 their number, 4 bytes, because a robot refuses what its outbox has no room for: 1 KiB a tick, here 56 packets, 500 for
 all nine robots. What has become due since the last look is sent in one message, looks being at least half a millisecond
-apart: the hub admits packets once a tick. Neighbours: `echo` starts it and reads its last line.
+apart: the hub admits packets once a tick.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ import numpy as np
 
 from foosim.client.core import ClientCore
 from foosim.client.packets import Outgoing
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.names import CHANNEL_ECHO
+from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.channels import Plane
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.loop import Wire
-from foosim.protocol.names import CHANNEL_ECHO
-from foosim.protocol.process import new_boot
-from foosim.protocol.session import Session, use_client_runtime
+from foosim.runtime.loop import Wire
+from foosim.runtime.process import new_boot
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session, use_client_runtime
 
 CONNECT_S: Final = 60.0
 START_S: Final = 60.0

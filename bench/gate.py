@@ -1,6 +1,6 @@
 """`python -m bench.gate [NAME...] [--seeds N]`: for each planted bug, the first seed of the swarm that finds it.
 
-Exit code 1 when a bug is found by no seed, or when its recorded seed does not find it. Neighbours: `mutants`.
+Exit code 1 when a bug is found by no seed, or when its recorded seed does not find it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from bench.mutants import MUTANTS
-from foosim.rehearsal.swarm import fly
+from foosim.rehearsal.swarm.campaign import fly
 
 TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 SEEDS: Final = 1000

@@ -5,7 +5,6 @@ profiled whole, so reading their deployments and captures is in them. A module's
 own functions, of that within all of foosim's. What has been compiled already (numpy, msgspec, the physics engine) is
 left out, since compiling whoever calls it does not shorten it. A star marks what `setup.py` compiles, the last line is
 the share of all that it leaves to the interpreter.
-Neighbours: `hub`, `verdict`, `rays` and `swarm` measure the same runs.
 """
 
 from __future__ import annotations
@@ -26,15 +25,33 @@ from typing import Any, Final
 
 from bench import hub, rays, verdict
 from bench.runs import ROOT, TABLE
+from foosim.capture.reader import open_capture
 from foosim.protocol.fingerprint import is_compiled
-from foosim.protocol.frame import Frame
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.swarm import fly
+from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.swarm.campaign import fly
 from foosim.rehearsal.system import Settings
-from foosim.rehearsal.whatif import what_if
-from foosim.vhub.capture_reader import open_capture
+from foosim.replay.what_if import what_if
+from foosim.world.frame import Frame
 
-PACKAGES: Final = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES: Final = (
+    "analysis",
+    "capture",
+    "cli",
+    "client",
+    "common",
+    "console",
+    "deployment",
+    "launcher",
+    "node",
+    "players",
+    "protocol",
+    "rehearsal",
+    "replay",
+    "runtime",
+    "supervisor",
+    "vhub",
+    "world",
+)
 LEAST: Final = 0.3
 """Per cent of a run: a module that has less in each of them is not shown."""
 WARM_TICKS: Final = 50

@@ -6,7 +6,6 @@ in each tick to twelve of its rovers, which drive, and once to one another; the 
 world say is encoded before the clock runs; reading it, judging, the record, the deliveries and, at the end, the
 finished capture are in the time; garbage is collected as seldom as in the hub's process. Whatever was sent and has no
 fate, or a fate and no row, is lost.
-Neighbours: `foosim.vhub.core`, `foosim.vhub.capture_writer`, `verdict` (a verdict alone).
 """
 
 from __future__ import annotations
@@ -22,19 +21,20 @@ from typing import Final
 
 from bench.runs import TABLE
 from bench.verdict import WAREHOUSE, WIFI, Frames, circling, resting
-from foosim.protocol import actions, channels, limits
+from foosim.capture.reader import open_capture
+from foosim.common import limits
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.protocol import actions, channels
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.journal import Journal
-from foosim.protocol.loop import collect_seldom
 from foosim.protocol.messages import Build, ClientHello, Commit, Epoch, Join, Samples, Sent, Subscription, Up
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_writer import CaptureWriter
+from foosim.runtime.journal import Journal
+from foosim.runtime.loop import collect_seldom
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep
+from foosim.vhub.recording.queue import Keep
+from foosim.vhub.recording.writer import CaptureWriter
+from foosim.world.robot_packets import RobotPacket
 
 CLIENTS: Final = tuple(f"client-{number}" for number in range(4))
 PACKETS_PER_TICK: Final = 25

@@ -12,8 +12,7 @@ lag of the commits tells whether it did.
 
 The lateness has two parts: when the vHub had all that closes the tick (commit and samples; then the run itself is
 late), and what its closing takes up to the release: verdicts, journal, deliveries. Behind the release come message and
-network until the client has it. All times are of one machine's monotonic clock. Neighbours: `runs`, `echo_client`,
-`foosim.vhub.release`.
+network until the client has it. All times are of one machine's monotonic clock.
 """
 
 from __future__ import annotations
@@ -29,9 +28,9 @@ from numpy.typing import NDArray
 
 from bench.distributed import cost_text
 from bench.runs import BenchError, ProcessCost, Watched, watch
-from foosim.vhub.capture_columns import Packets
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import TICK, TickRow
+from foosim.capture.columns import Packets
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import TICK, TickRow
 
 RATE_HZ: Final = 5_000
 TICK_MS: Final = 5

@@ -1,7 +1,4 @@
-"""The machine that a figure belongs to, and what its processes use, read from /proc.
-
-Neighbours: `runs` asks for processes, `__main__` prints the machine.
-"""
+"""The machine that a figure belongs to, and what its processes use, read from /proc."""
 
 from __future__ import annotations
 

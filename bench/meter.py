@@ -1,7 +1,6 @@
 """A meter of where the time of a tick goes, and an engine that is metered.
 
-Parts are of the wall: on a machine with more work than cores they hold the time of others, too. Neighbours:
-`table_one_process` and `metered_node` put the meter where they measure.
+Parts are of the wall: on a machine with more work than cores they hold the time of others, too.
 """
 
 from __future__ import annotations
@@ -10,10 +9,10 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Final, ParamSpec, TypeVar
 
+from foosim.deployment.schema import Deployment
 from foosim.node.engines import ENGINES
 from foosim.node.engines.interface import Engine
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.layout import Entity, Layout
+from foosim.world.layout import Entity, Layout
 
 ENGINE_PARTS: Final = ("load", "command", "step", "read")
 

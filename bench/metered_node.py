@@ -2,7 +2,7 @@
 
 The bench starts it for a node that the deployment declares as `launch: manual`; its last line is JSON, microseconds a
 tick by part. `wait` is the time in the inbox, `encode` that of making its part and of publishing, `decode` that of
-reading what came, `rest` what is left of the tick: sensing, editing, assigning, assembling. Neighbours: `distributed`.
+reading what came, `rest` what is left of the tick: sensing, editing, assigning, assembling.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from unittest import mock
 from bench.meter import Meter, metered_engine
 from foosim.node import main as node_main
 from foosim.node.core import NodeCore
-from foosim.node.solver import Solver
-from foosim.node.step import Work
+from foosim.node.engines_pool import Solver
+from foosim.node.tick import Work
 from foosim.protocol.channels import Channel
-from foosim.protocol.inbox import Inbox, Item
-from foosim.protocol.loop import Loop
+from foosim.runtime.loop import Loop
+from foosim.runtime.transport.inbox import Inbox, Item
 
 PARTS: Final = ("load", "command", "step", "read", "encode", "decode", "wait")
 WARM_TICKS: Final = 50

@@ -5,7 +5,6 @@ over links that delay and lose; some are said twice, some are no messages, now a
 inbox takes. A robot is down and the fourth client away for a while. Now and then the vHub dies, behind a closing or
 amid a tick, and another one goes on from its journal; clients send again what it does not know. What they sent is
 counted here, by number, and compared with the fates in the closings and with the vHub's account.
-Neighbours: `hub` measures how fast it is, `tests.vhub.test_ledger_machine` has the same account as a property.
 """
 
 from __future__ import annotations
@@ -17,14 +16,13 @@ from typing import Final
 import numpy as np
 
 from bench.runs import TABLE, BenchError
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.frame import Frame
 from foosim.protocol.hub_messages import Proceed
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import (
     Build,
     ClientHello,
@@ -39,14 +37,16 @@ from foosim.protocol.messages import (
     Tempo,
     Up,
 )
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.start import initial_numbers
-from foosim.rehearsal.hub_journal import HubJournal
+from foosim.rehearsal.journals import HubJournal
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep
-from foosim.vhub.packet import IN_FLIGHT
+from foosim.vhub.network.packet import IN_FLIGHT
+from foosim.vhub.recording.queue import Keep
 from foosim.vhub.records import Closing
 from foosim.vhub.state import OUTBOX_SHIFT
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import RobotPacket
 
 RUN: Final = "packets"
 CLIENTS: Final = ("client-1", "client-2", "client-3")

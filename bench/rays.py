@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from math import cos, sin, tau
 from typing import Final
 
-from foosim.protocol.layout import Layout
-from foosim.protocol.scene import Body, Box, Cylinder, Link, Scene, Shape, Vector, turn
-from foosim.vhub.geometry import Geometry, Sight
+from foosim.vhub.line_of_sight.occlusion import Geometry, Sight
+from foosim.world.layout import Layout
+from foosim.world.scene import Body, Box, Cylinder, Link, Scene, Shape, Vector, turn
 
 SHELVES: Final = 50
 VEHICLES: Final = 20

@@ -2,7 +2,7 @@
 
 Drift is how much the wall clock gained on simulated time between the first and the last quarter of the run, each by the
 median of its looks. To the time until the first tick comes that of the command's own start, which other benches and
-this one leave out by calling its functions. Neighbours: `runs`.
+this one leave out by calling its functions.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from statistics import median
 
 from bench.distributed import cost_text, memory_text
 from bench.runs import BenchError, ProcessCost, Watched, watch
-from foosim.supervisor.children import script
+from foosim.runtime.children import script
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,6 @@
 """Runs of real processes, as `foosim-supervisor up` makes them, watched from here.
 
 The watch stands where the display stands: it sees each status, and at the same time reads what every child has used.
-Neighbours: `distributed`, `realtime` and `echo` measure by it.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from bench.machine import Use, children, free_ports, use_of
-from foosim.supervisor.display import Display
-from foosim.supervisor.plan import make_plan
-from foosim.supervisor.run_options import RunOptions
-from foosim.supervisor.up import Up
+from foosim.launcher.display import Display
+from foosim.launcher.plan import make_plan
+from foosim.launcher.run_options import RunOptions
+from foosim.launcher.up import Up
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 TABLE: Final = ROOT / "deploy" / "table.yaml"

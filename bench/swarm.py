@@ -1,6 +1,6 @@
 """How many seeds of the swarm one core flies in a second: rehearsals under random faults, with every law watched.
 
-Counted is processor time, so that a busy machine tells the same. Neighbours: `rehearsal.swarm`.
+Counted is processor time, so that a busy machine tells the same.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from bench.runs import BenchError
-from foosim.rehearsal.swarm import Flown, fly
+from foosim.rehearsal.swarm.campaign import Flown, fly
 
 TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 SEEDS: Final = 40

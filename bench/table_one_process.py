@@ -2,7 +2,6 @@
 
 Each engine runs bare for the figure, the median of some runs, then metered for where the tick goes. The meter stands in
 the engine and around each process's turns, and costs some microseconds of its own.
-Neighbours: `meter`, `foosim.rehearsal`.
 """
 
 from __future__ import annotations
@@ -19,11 +18,11 @@ from foosim.client.core import ClientCore
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.channels import Channel
-from foosim.protocol.frame import Frame
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.vhub.core import HubCore
+from foosim.world.frame import Frame
 
 WARM_TICKS: Final = 200
 

@@ -2,7 +2,7 @@
 
 A client asks nine robots for more than their links to it carry; what it gets in a second of its own clock is compared
 with the rate. The vHub releases each packet at its time, so the rate is off by as much as the run falls behind the wall
-clock in between. Neighbours: `lateness` (how late single packets are), `runs`, `echo_client`.
+clock in between.
 """
 
 from __future__ import annotations

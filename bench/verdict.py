@@ -5,7 +5,6 @@ frame is another one at each tick, so nothing about places is remembered longer 
 arrival, the row and its JSON are in the time. `rovers` are the 20 of the warehouse, among its shelves, each on a circle
 of its own: no line of sight is that of the tick before. The last two lines send the same packets among 200 endpoints,
 with 40,000 possible links: cost follows the traffic.
-Neighbours: `foosim.vhub.fabric`, `hub` (the whole core with journal and capture).
 """
 
 from __future__ import annotations
@@ -24,15 +23,15 @@ import numpy as np
 import yaml
 
 from bench.runs import ROOT, TABLE
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
-from foosim.protocol.loop import GC_THRESHOLDS
-from foosim.protocol.start import initial_numbers
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
-from foosim.vhub.to_rows import packet_row
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.runtime.loop import GC_THRESHOLDS
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.recording.rows_of_closing import packet_row
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import build_layout
 
 WAREHOUSE: Final = ROOT / "deploy" / "warehouse.yaml"
 TICK_NS: Final = 2_000_000

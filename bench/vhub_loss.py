@@ -1,7 +1,7 @@
 """How long a run stands still when its vHub is killed: from kill -9 until the next commit, all that comes between.
 
 A run in real time with both players and a capture; its vHub is killed twice (the launcher starts it again at once as
-often), each time when the run has gone on for a while. Neighbours: `runs`.
+often), each time when the run has gone on for a while.
 """
 
 from __future__ import annotations

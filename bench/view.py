@@ -2,7 +2,6 @@
 
 The turns are of one run. One that is looked at and one that is not follow each other and are a pair, since the load of
 a shared machine drifts; the figure is the median of their ratios. The reader's own process counts as well.
-Neighbours: `runs`, `viewer` (looks).
 """
 
 from __future__ import annotations

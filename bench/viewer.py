@@ -1,7 +1,7 @@
 """One who looks at a run and looks away again, by turns, and prints how far the run came in each turn.
 
 `python -m bench.viewer ADDRESS HZ TURN_S`: JSON of [whether it looked, ticks a second, frames a second] of each turn,
-when the run has ended. Neighbours: `view` starts it beside a run.
+when the run has ended.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import sys
 import time
 from typing import Final
 
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.session import ConnectError
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import ConnectError
 from foosim.supervisor.control import Control, NoAnswer
 
 ORDER: Final = (False, True, True, False)

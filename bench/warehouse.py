@@ -2,7 +2,7 @@
 
 The figure is the median of the runs' ratios to real time. Beside it stands what each process costs: whether a machine
 is fast enough is a matter of what all cost together over its cores, and of the chain of processes that a tick goes
-through. Neighbours: `runs`, `distributed` (the same of the table).
+through.
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 Rehearsals make the captures. That of the table goes through its own network, which has to change nothing, and through
 one that loses and delays more. That of the warehouse, over radio, has the frame of every tick once, and every tenth
 once: then its world is simulated again.
-Neighbours: `foosim.rehearsal.whatif`, `verdict` (what of it judging takes).
 """
 
 from __future__ import annotations
@@ -16,10 +15,10 @@ from pathlib import Path
 from typing import Final
 
 from bench.runs import ROOT, TABLE, BenchError
-from foosim.protocol.deployment_file import load_deployment, with_network
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.whatif import what_if
-from foosim.vhub.capture_reader import open_capture
+from foosim.capture.reader import open_capture
+from foosim.deployment.loader import load_deployment, with_network
+from foosim.rehearsal.run import rehearse
+from foosim.replay.what_if import what_if
 
 WAREHOUSE: Final = ROOT / "deploy" / "warehouse.yaml"
 WORSE: Final = ("network.links.everything.loss=5 %", "network.links.everything.delay=4 ms")

@@ -3,7 +3,6 @@
 A module of somebody's own may print, raise, exit, crash or hang when it is imported. So a fork of this process imports
 it: it has the interpreter and what this one has imported already, which costs milliseconds, and whatever happens in it
 stays there. What it prints goes to standard error. Classes of foosim are imported here.
-Neighbours: `loading` finds a class, `supervisor.plan` and `supervisor.doctor` ask.
 """
 
 from __future__ import annotations
@@ -20,10 +19,10 @@ from math import inf
 from typing import Final, NamedTuple
 
 from foosim.client.loading import ClassPathError, load_player
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.finding import Finding
-from foosim.protocol.process import STACK_SIGNAL, end_with, end_with_stack
-from foosim.protocol.references import quoted
+from foosim.common.finding import Finding
+from foosim.deployment.checks import quoted
+from foosim.deployment.schema import Deployment
+from foosim.runtime.process import STACK_SIGNAL, end_with, end_with_stack
 
 OURS: Final = "foosim."
 LOOK_S: Final = 0.02

@@ -11,7 +11,6 @@ The name is one that the deployment declares under `clients`. In `lockstep` the 
 until the loop's body is done; after `listen` it goes on by itself. Everything travels as packets through the emulated
 network: what arrives is late, and some is lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
 frame (origin on the floor in the middle of the table, x towards blue's goal, z up). A client belongs to one thread.
-Neighbours: `core` decides, `payloads` has the values, `protocol.loop` carries; it is imported with the first `connect`.
 """
 
 from __future__ import annotations
@@ -30,20 +29,21 @@ from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
 from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, PacketError, RunEnded
 from foosim.client.packets import Outgoing, check_packet, check_subscription
-from foosim.client.payloads import Command, Drive, Value, command_channels, decode_payload, encode_command
 from foosim.client.player import NS_PER_S, Newest, Sample
-from foosim.protocol import channels, limits
-from foosim.protocol.channel_kinds import channel_kind
+from foosim.common import limits
+from foosim.common.errors import BadValue, Malformed, UnknownName
+from foosim.common.names import CHANNEL_DRIVE, CHANNEL_POSITION, is_name
+from foosim.deployment.channel_kinds import channel_kind
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.channels import VHUB, Plane
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import BadValue, Malformed, UnknownName
-from foosim.protocol.inbox import Inbox
 from foosim.protocol.messages import Received
-from foosim.protocol.names import CHANNEL_DRIVE, CHANNEL_POSITION, is_name
-from foosim.protocol.process import new_boot
+from foosim.runtime.process import new_boot
+from foosim.runtime.transport.inbox import Inbox
+from foosim.world.payloads import Command, Drive, Value, command_channels, decode_payload, encode_command
 
 if TYPE_CHECKING:
-    from foosim.protocol.session import Session
+    from foosim.runtime.transport.session import Session
 
 CONNECT_S: Final = 10.0
 _LOG: Final = logging.getLogger("foosim.client")
@@ -153,7 +153,7 @@ class Link:
     """The client's way to the vHub: its core on a session, driven by whoever waits for something."""
 
     def __init__(self, core: ClientCore, session: Session) -> None:
-        from foosim.protocol.loop import Loop, Wire
+        from foosim.runtime.loop import Loop, Wire
 
         self.core: Final = core
         self.locator: Final = session.locator
@@ -456,9 +456,9 @@ def connect(
     """
     if not is_name(name):
         raise BadValue("not a name for a client", name)
-    from foosim.protocol.certificates import load_credentials
-    from foosim.protocol.session import ConnectError, Session
-    from foosim.protocol.session_settings import Security
+    from foosim.runtime.transport.certificates import load_credentials
+    from foosim.runtime.transport.session import ConnectError, Session
+    from foosim.runtime.transport.settings import Security
 
     credentials = load_credentials(None if pki is None else Path(pki), f"client.{name}", password)
     security = None if credentials is None else Security(credentials)

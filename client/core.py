@@ -6,7 +6,6 @@ gets the same bytes again. A free-running client takes `arrivals` and sends when
 the vHub has recorded it. Downlinks are numbered: repeats are dropped, gaps counted. When the vHub is gone (`hub_gone`)
 all starts again with hello, and goes on where it was; or where the run does, if that has lost its last ticks and goes
 on as a branch from before them.
-Neighbours: `player` and `client` drive it, `packets` says what it may send; `vhub.sessions` is the other side.
 """
 
 from __future__ import annotations
@@ -20,13 +19,14 @@ from msgspec import structs
 
 from foosim.client.errors import PacketError
 from foosim.client.packets import Outgoing, check_packet, check_subscription, split
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import DeploymentError, Malformed
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.messages import (
     ClientHello,
     ClientRefusal,
@@ -42,7 +42,7 @@ from foosim.protocol.messages import (
     Subscription,
     Up,
 )
-from foosim.protocol.refusals import Refusals
+from foosim.protocol.rejects import Refusals
 
 AGAIN_NS: Final = 200_000_000
 """After how long hello is said again; a Join's wait doubles from there, up to a second."""

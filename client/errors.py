@@ -1,11 +1,8 @@
-"""What can be wrong on a client's side, as typed errors whose text names the valid choices.
-
-Neighbours: `protocol.errors` has their base; the command turns them into exit codes.
-"""
+"""What can be wrong on a client's side, as typed errors whose text names the valid choices."""
 
 from __future__ import annotations
 
-from foosim.protocol.errors import Failed, Refused
+from foosim.common.errors import Failed, Refused
 
 
 class PacketError(Refused):

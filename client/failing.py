@@ -1,7 +1,4 @@
-"""What is said of a player whose own code raised: who, when, what, and where in the user's own files.
-
-Neighbours: `player` calls that code, `loading` imports it, `main` and the rehearsal end the process.
-"""
+"""What is said of a player whose own code raised: who, when, what, and where in the user's own files."""
 
 from __future__ import annotations
 

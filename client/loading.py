@@ -1,7 +1,4 @@
-"""Finds the class that a deployment names as `module:Class`, and says what is wrong with it without calling it.
-
-Neighbours: `player` loads with it and runs what it finds, `class_check` looks before a run begins.
-"""
+"""Finds the class that a deployment names as `module:Class`, and says what is wrong with it without calling it."""
 
 from __future__ import annotations
 
@@ -15,9 +12,15 @@ from typing import Any, Final
 
 from foosim.client.errors import PlayerError
 from foosim.client.failing import Unanswered, describe, in_library, place_of
-from foosim.protocol.errors import CHOICES_MAX
-from foosim.protocol.names import class_path_of, nearest_name
+from foosim.common.errors import CHOICES_MAX
+from foosim.common.names import class_path_of, nearest_name
 
+MOVED: Final = {
+    "foosim.client.players": "foosim.players.football",
+    "foosim.client.patrol": "foosim.players.warehouse_rover",
+    "foosim.client.dispatch": "foosim.players.warehouse_base",
+}
+"""Modules of players that deployments of earlier versions name, and where their classes are."""
 MADE_WITH: Final = ("deployment", "parameters")
 CALLED_WITH: Final = ("tick", "samples")
 SHOWN_MAX: Final = 100
@@ -37,6 +40,10 @@ def load_player(path: str) -> Callable[..., Any]:
     module_name, colon, class_name = path.partition(":")
     if not (module_name and colon and class_name):
         raise ClassPathError(path, "not of the form module:Class", class_path_of(path))
+    if module_name in MOVED:
+        raise ClassPathError(
+            path, f"the module has moved to {MOVED[module_name]}", f"{MOVED[module_name]}:{class_name}"
+        )
     module = _import(path, module_name)
     made: Any = getattr(module, class_name, None)
     if made is None:

@@ -2,8 +2,7 @@
 
 One address is all that it needs: class, rate, robots and parameters come with the welcome. Several players in a process
 have a presence each, and are to the run what they would be alone. They share a session, a loop and a thread; those with
-certificates, which are of one name each, have their own. Neighbours: `crew`, `core`, `player` (the loop that the
-rehearsal shares), `protocol.loop`.
+certificates, which are of one name each, have their own.
 """
 
 from __future__ import annotations
@@ -18,21 +17,22 @@ from typing import Annotated
 import typer
 
 from foosim.client.core import ClientCore
-from foosim.client.crew import Crew
 from foosim.client.errors import PlayerError
-from foosim.protocol import channels, identity, limits
-from foosim.protocol.admission import Admission
-from foosim.protocol.certificates import Credentials, load_credentials, warn_of_end
+from foosim.client.process_group import Crew
+from foosim.common import limits
+from foosim.common.errors import BadValue
+from foosim.common.names import is_name
+from foosim.protocol import channels, identity
 from foosim.protocol.channels import VHUB, Plane
-from foosim.protocol.command import DONE, PkiOption, VersionOption, new_app, run_app
-from foosim.protocol.errors import BadValue
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.names import is_name
-from foosim.protocol.probe import ProgressOption
-from foosim.protocol.process import Stop, die_with_parent, end_with_stack, new_boot, start_log
-from foosim.protocol.session import Session, use_client_runtime
-from foosim.protocol.session_settings import Security
+from foosim.runtime.command import DONE, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.health import ProgressOption
+from foosim.runtime.loop import Loop, Wire
+from foosim.runtime.process import Stop, die_with_parent, end_with_stack, new_boot, start_log
+from foosim.runtime.transport.admission import Admission
+from foosim.runtime.transport.certificates import Credentials, load_credentials, warn_of_end
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session, use_client_runtime
+from foosim.runtime.transport.settings import Security
 
 CONNECT_S = 60.0
 

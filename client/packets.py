@@ -1,7 +1,6 @@
 """What a client may send and hear, as far as the deployment tells: checked before it leaves.
 
-The vHub refuses and counts what does not fit; here the sender is told. Neighbours: `core` numbers and sends packets,
-`payloads` has what is in them.
+The vHub refuses and counts what does not fit; here the sender is told.
 """
 
 from __future__ import annotations
@@ -10,11 +9,11 @@ from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
 from foosim.client.errors import PacketError
-from foosim.protocol import limits
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import UnknownName
+from foosim.common import limits
+from foosim.common.errors import UnknownName
+from foosim.common.names import CHANNEL_ECHO
+from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
-from foosim.protocol.names import CHANNEL_ECHO
 
 PACKET_OVERHEAD_BYTES: Final = 128
 """No packet takes more in a message beside its payload: two names and two numbers."""

@@ -2,8 +2,7 @@
 
 A player is a class with `act(tick, samples) -> commands`; the deployment names it as `module:Class`, with a rate, the
 robots it may command and hear, and parameters. The loop turns each Go into samples, calls `act`, and answers. The
-process `foosim-player` and the rehearsal run this same loop. Neighbours: `core`, `payloads`, `loading`
-(finds the class); `players` has a team.
+process `foosim-player` and the rehearsal run this same loop.
 """
 
 from __future__ import annotations
@@ -17,12 +16,12 @@ from foosim.client.errors import PacketError, PlayerError
 from foosim.client.failing import Unanswered, failed
 from foosim.client.loading import load_player
 from foosim.client.packets import Outgoing, check_packet
-from foosim.client.payloads import Command, Drive, Value, command_channel, decode_payload, encode_command
-from foosim.protocol.channel_kinds import channel_kind
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment import Player as Declaration
-from foosim.protocol.errors import Malformed, Refused, UnknownName
+from foosim.common.errors import Malformed, Refused, UnknownName
+from foosim.deployment.channel_kinds import channel_kind
+from foosim.deployment.schema import Deployment
+from foosim.deployment.schema import Player as Declaration
 from foosim.protocol.messages import Received
+from foosim.world.payloads import Command, Drive, Value, command_channel, decode_payload, encode_command
 
 NS_PER_S: Final = 1_000_000_000
 

@@ -1,8 +1,4 @@
-"""The command `foosim-console`: a page in the browser to see and touch a run that is live.
-
-Neighbours: `live` (the run as a source), `second` (what follows it), `serving` (serves both), `supervisor.up` (starts
-this with `--console`).
-"""
+"""The command `foosim-console`: a page in the browser to see and touch a run that is live."""
 
 from __future__ import annotations
 
@@ -14,20 +10,20 @@ from typing import Annotated
 
 import typer
 
+from foosim.capture.mcap.checks import CaptureError
+from foosim.common.addresses import LOOPBACK
+from foosim.common.errors import BadValue
+from foosim.console.clock.leading import Leader
 from foosim.console.live.live_source import LiveSource
 from foosim.console.live.presence import how_ended
-from foosim.console.recorded.leading import Leader
 from foosim.console.recorded.second import OffsetOption, SecondOption, compared_text, open_follower, read_offset
 from foosim.console.server.serving import ServeOptions, serve_sources
 from foosim.console.shown.source import Source
-from foosim.protocol.addresses import LOOPBACK
-from foosim.protocol.command import VersionOption, new_app, run_app
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import BadValue
-from foosim.protocol.process import die_with_parent
+from foosim.deployment.loader import load_deployment
+from foosim.runtime.command import VersionOption, new_app, run_app
+from foosim.runtime.process import die_with_parent
+from foosim.runtime.run_folder import find_run, open_run
 from foosim.supervisor.control import Control, connect
-from foosim.supervisor.run_folder import find_run, open_run
-from foosim.vhub.mcap_checks import CaptureError
 
 app = new_app()
 

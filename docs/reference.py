@@ -15,22 +15,22 @@ from typing import Any, Final
 
 import typer.main
 
+from foosim.capture.rows import ROW_TYPES, row_schema
+from foosim.cli.doctor import app as doctor_app
+from foosim.cli.guard import app as guard_app
+from foosim.cli.net import app as net_app
+from foosim.cli.pki import app as pki_app
+from foosim.cli.rehearse import app as rehearse_app
+from foosim.cli.replay import app as replay_app
+from foosim.cli.supervisor import app as supervisor_app
 from foosim.client.main import app as player_app
+from foosim.common import limits, units
 from foosim.console.main import app as console_app
+from foosim.deployment.schema import deployment_schema, deployment_schema_text
 from foosim.node.main import app as node_app
-from foosim.protocol import limits, units
 from foosim.protocol.channels import CHANNELS
-from foosim.protocol.deployment import deployment_schema, deployment_schema_text
-from foosim.protocol.probe import app as probe_app
-from foosim.rehearsal.rehearse_command import app as rehearse_app
-from foosim.rehearsal.replay_command import app as replay_app
-from foosim.supervisor.cli import app as supervisor_app
-from foosim.supervisor.doctor_command import app as doctor_app
-from foosim.supervisor.guard import app as guard_app
-from foosim.supervisor.net_command import app as net_app
-from foosim.supervisor.pki_command import app as pki_app
+from foosim.runtime.health import app as probe_app
 from foosim.vhub.main import app as vhub_app
-from foosim.vhub.rows import ROW_TYPES, row_schema
 
 DOCS: Final = Path(__file__).parent
 COMMANDS: Final[Mapping[str, Any]] = {
@@ -75,55 +75,61 @@ DEADLINES: Final[Mapping[str, tuple[str, str]]] = {
 }
 """Who waits how long for what: the deadlines of a deployment."""
 CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
-    ("protocol.session_settings", "LEASE_MS"): ("every process", "a word on a connection; then it is closed"),
-    ("protocol.session_settings", "BLOCK_US"): (
+    ("runtime.transport.settings", "LEASE_MS"): ("every process", "a word on a connection; then it is closed"),
+    ("runtime.transport.settings", "BLOCK_US"): (
         "every process",
         "a reader that takes nothing; its connection is closed",
     ),
-    ("protocol.inbox", "ALARM_S"): ("every process", "its own time-keeping thread to end; then it ends without it"),
-    ("protocol.standstill", "STOOD_NS"): ("every process", "its own loop; what is longer is its own standstill"),
-    ("protocol.standstill", "TOLD_NS"): (
+    ("runtime.transport.inbox", "ALARM_S"): (
+        "every process",
+        "its own time-keeping thread to end; then it ends without it",
+    ),
+    ("runtime.standstill", "STOOD_NS"): ("every process", "its own loop; what is longer is its own standstill"),
+    ("runtime.standstill", "TOLD_NS"): (
         "supervisor, vHub",
         "their own loop; one that stood still for longer says so, and takes no closed connection for a loss",
     ),
-    ("protocol.orphan", "UNKNOWN_NS"): ("nodes, vHub", "a supervisor that went before it told the deployment"),
-    ("supervisor.watch", "DOUBT_NS"): (
+    ("runtime.supervisor_timeout", "UNKNOWN_NS"): (
+        "nodes, vHub",
+        "a supervisor that went before it told the deployment",
+    ),
+    ("supervisor.progress", "DOUBT_NS"): (
         "supervisor",
         "connections that close behind a standstill of its own: their processes have `heartbeat` to be heard again",
     ),
-    ("supervisor.watch", "CUT_SEEN_NS"): (
+    ("supervisor.progress", "CUT_SEEN_NS"): (
         "supervisor",
         "the end of the vHub's connection, before nodes are lost whose samples it lacks though they have sent them",
     ),
-    ("supervisor.absence", "SAID_NS"): ("supervisor", "what a process said before its connection closed"),
-    ("supervisor.take_over", "REJOIN_NS"): (
+    ("supervisor.vhub_loss", "SAID_NS"): ("supervisor", "what a process said before its connection closed"),
+    ("supervisor.failover", "REJOIN_NS"): (
         "supervisor",
         "nodes that have to find one that was started again, beside `heartbeat`; then it goes on without them",
     ),
-    ("supervisor.liveness", "QUESTION_S"): (
+    ("launcher.liveness", "QUESTION_S"): (
         "`up`",
         "the supervisor's answer; after five in a row that do not come it is killed, and started again",
     ),
-    ("supervisor.liveness", "STALLED_S"): ("`up`", "a lost process that lives to be taken back; then it is killed"),
-    ("supervisor.liveness", "CUT_OFF_S"): ("`up`", "the same on another machine"),
-    ("supervisor.liveness", "LOOK_S_MAX"): ("`up`", "its own loop; what is longer is its own standstill"),
-    ("supervisor.restarts", "WAITS_S"): ("`up`", "before a process that ended is started again, once more each time"),
-    ("supervisor.restarts", "AWAY_S"): ("`up`", "the same where the machine could not be reached"),
-    ("supervisor.restarts", "WINDOW_S"): ("`up`", "in which as many ends and one more give a process up"),
-    ("supervisor.up", "LOST_S"): ("`up`", "the supervisor to notice that a process has ended; then the run is ended"),
-    ("supervisor.up", "END_S"): ("`up`", "a supervisor that was told to end and does not answer; then all are ended"),
-    ("supervisor.up", "LEAVE_S"): ("`up`", "the others to end once the supervisor has; then they are ended"),
-    ("supervisor.up", "AWAY_S"): ("`up`", "the same on other machines"),
-    ("supervisor.console_child", "LEAVE_S"): ("`up`", "the console to tell its pages that the run has ended"),
-    ("supervisor.children", "GRACE_S"): ("`up`, `foosim-guard`", "a process that was told to end; then it is killed"),
-    ("supervisor.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the guard of the process before to end"),
+    ("launcher.liveness", "STALLED_S"): ("`up`", "a lost process that lives to be taken back; then it is killed"),
+    ("launcher.liveness", "CUT_OFF_S"): ("`up`", "the same on another machine"),
+    ("launcher.liveness", "LOOK_S_MAX"): ("`up`", "its own loop; what is longer is its own standstill"),
+    ("launcher.restarts", "WAITS_S"): ("`up`", "before a process that ended is started again, once more each time"),
+    ("launcher.restarts", "AWAY_S"): ("`up`", "the same where the machine could not be reached"),
+    ("launcher.restarts", "WINDOW_S"): ("`up`", "in which as many ends and one more give a process up"),
+    ("launcher.up", "LOST_S"): ("`up`", "the supervisor to notice that a process has ended; then the run is ended"),
+    ("launcher.up", "END_S"): ("`up`", "a supervisor that was told to end and does not answer; then all are ended"),
+    ("launcher.up", "LEAVE_S"): ("`up`", "the others to end once the supervisor has; then they are ended"),
+    ("launcher.up", "AWAY_S"): ("`up`", "the same on other machines"),
+    ("launcher.console_child", "LEAVE_S"): ("`up`", "the console to tell its pages that the run has ended"),
+    ("runtime.children", "GRACE_S"): ("`up`, `foosim-guard`", "a process that was told to end; then it is killed"),
+    ("cli.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the guard of the process before to end"),
     ("supervisor.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
     ("supervisor.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),
     ("vhub.main", "CONNECT_S"): ("vHub", "a supervisor to connect to; then it fails"),
     ("node.main", "CONNECT_S"): ("nodes", "the same"),
     ("client.main", "CONNECT_S"): ("players", "a vHub to connect to; then they fail"),
     ("client.client", "CONNECT_S"): ("`connect` in a program", "the same, unless it says another time"),
-    ("protocol.admission", "ADMISSION_NS"): (
+    ("runtime.transport.admission", "ADMISSION_NS"): (
         "every process",
         "with certificates, to be let in; then the log says so",
     ),

@@ -2,8 +2,7 @@
 
 A tick reads: sense, edit, assign, solve, part, collect (design, section 4). The core owns no engine: it hands out
 `work`, the shell solves it and calls `solved`. It runs ahead of commit, by at most what deliveries allow; everything
-else in the system sees committed frames only. Neighbours: `step` (the pure parts), `protocol.member` (handshake),
-`protocol.barrier`, `protocol.assign`.
+else in the system sees committed frames only.
 """
 
 from __future__ import annotations
@@ -15,21 +14,19 @@ from typing import Any
 import numpy as np
 from mypy_extensions import mypyc_attr
 
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.common.json_text import encode_json
+from foosim.deployment.schema import Deployment
 from foosim.node.held import Held
 from foosim.node.inputs import Inputs, check_near
-from foosim.node.step import Stepper, Work, moved_counters
-from foosim.protocol import channels, limits
+from foosim.node.tick import Stepper, Work, moved_counters
+from foosim.protocol import channels
 from foosim.protocol.actions import Action, Publish, Say
-from foosim.protocol.assign import Assignment, Share, reach_of
 from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, frame_from_bytes
-from foosim.protocol.json_text import encode_json
-from foosim.protocol.layout import Entity, Layout, build_layout
-from foosim.protocol.member import Member
+from foosim.protocol.handshake import Member
 from foosim.protocol.messages import (
     Build,
     Commit,
@@ -45,10 +42,13 @@ from foosim.protocol.messages import (
     Samples,
     Want,
 )
-from foosim.protocol.patience import Patience
-from foosim.protocol.refusals import Refusals
-from foosim.protocol.robot_packets import Outbox
-from foosim.protocol.start import AddedEntity, initial_frame
+from foosim.protocol.rejects import Refusals
+from foosim.protocol.retry import Patience
+from foosim.world.frame import Frame, frame_from_bytes
+from foosim.world.initial_state import AddedEntity, initial_frame
+from foosim.world.islands import Assignment, Share, reach_of
+from foosim.world.layout import Entity, Layout, build_layout
+from foosim.world.robot_packets import Outbox
 
 
 @dataclass(frozen=True, slots=True)

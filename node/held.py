@@ -1,12 +1,12 @@
 """What came of an epoch that a node does not know yet, until that begins.
 
 Each thing is held once, however often it is said: who asks for what is not there yet asks many times. Where there is
-too much, since others go on without this node, the oldest goes. Neighbours: `core` holds, and takes back.
+too much, since others go on without this node, the oldest goes.
 """
 
 from __future__ import annotations
 
-from foosim.protocol import limits
+from foosim.common import limits
 from foosim.protocol.channels import Channel
 
 

@@ -1,16 +1,16 @@
 """What a node has been told for its ticks: orders and deliveries, each by tick.
 
 Both may be about several ticks at once. Deliveries are final within a branch: those of another one do not count.
-Neighbours: `core` computes when it has both.
 """
 
 from __future__ import annotations
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.protocol import channels
 from foosim.protocol.codec import encode
-from foosim.protocol.edits import Edit, check_edits
-from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import Commit, Deliveries, Epoch, Order
+from foosim.world.edits import Edit, check_edits
 
 
 class Inputs:

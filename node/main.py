@@ -1,7 +1,6 @@
 """The process `foosim-node`: a node's core between the simulation plane and its physics engine.
 
-One address is all that it needs: deployment and models come with the handshake. Neighbours: `core` decides, `solver`
-has the engines, `protocol.loop` is the loop.
+One address is all that it needs: deployment and models come with the handshake.
 """
 
 from __future__ import annotations
@@ -12,25 +11,26 @@ from typing import Annotated
 
 import typer
 
+from foosim.common import limits
+from foosim.common.errors import BadValue
+from foosim.common.names import is_name
 from foosim.node.core import NodeCore
-from foosim.node.solver import Solver
-from foosim.protocol import channels, identity, limits
+from foosim.node.engines_pool import Solver
+from foosim.protocol import channels, identity
 from foosim.protocol.actions import Say
-from foosim.protocol.admission import Admission
-from foosim.protocol.certificates import Credentials, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
-from foosim.protocol.errors import BadValue
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.names import is_name
-from foosim.protocol.notify import Notify
-from foosim.protocol.orphan import Orphan
-from foosim.protocol.probe import ProgressOption
-from foosim.protocol.process import Stop, die_with_parent, new_boot, start_log
-from foosim.protocol.session import Session, use_client_runtime
-from foosim.protocol.session_settings import Security
+from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.health import ProgressOption
+from foosim.runtime.loop import Loop, Wire
+from foosim.runtime.process import Stop, die_with_parent, new_boot, start_log
+from foosim.runtime.supervisor_timeout import Orphan
+from foosim.runtime.systemd import Notify
+from foosim.runtime.transport.admission import Admission
+from foosim.runtime.transport.certificates import Credentials, load_credentials, warn_of_end
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session, use_client_runtime
+from foosim.runtime.transport.settings import Security
 
 CONNECT_S = 60.0
 

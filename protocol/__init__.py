@@ -1,1 +1,1 @@
-"""What all processes share: messages, wire format, deployment, frame and its rules. Imports no other package."""
+"""The agreement between processes: messages, codec, channels, handshake, barrier, access."""

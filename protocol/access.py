@@ -5,7 +5,7 @@ A node writes and hears what nodes do, under its own name; a client writes its o
 receive key; an operator writes requests and hears their answers, looks at the run, and hears replays; a viewer looks at
 the run. What is not granted is denied.
 The routers of the planes enforce it, each for those who connect to it, so it says nothing of a router's own messages.
-Zenoh tells nobody what it denies. Neighbours: `identity`, `channels`, `session_settings` (hands it to Zenoh).
+Zenoh tells nobody what it denies.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from foosim.deployment.schema import Deployment
 from foosim.protocol import channels, identity
 from foosim.protocol.channels import ALIVE, CHANNELS, REPLAY, SUPERVISOR, VHUB, Channel, Plane
-from foosim.protocol.deployment import Deployment
 
 Reads = Sequence[tuple[Channel, bool]]
 

@@ -1,7 +1,7 @@
 """What a core asks its shell to do, in order: journal, publish, say.
 
 A core appends actions to its list while it takes a message or the time; the shell performs them in that order, so that
-what must be written before it is spoken is. Neighbours: every `core.py`; the shells and the rehearsal perform them.
+what must be written before it is spoken is.
 """
 
 from __future__ import annotations

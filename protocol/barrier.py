@@ -2,7 +2,6 @@
 
 A part counts if its epoch, its sender and its basis are one's own, and the parts together must hold each slot exactly
 once. Two parts that claim one slot are a bug of ours on the sender's side: both are named, neither is merged silently.
-Neighbours: `assign` decides who writes what, `frame` is the result.
 """
 
 from __future__ import annotations
@@ -16,14 +15,14 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.edits import Edit
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout
 from foosim.protocol.messages import Part
-from foosim.protocol.robot_packets import OutboxPacket
+from foosim.world.edits import Edit
+from foosim.world.frame import Frame
+from foosim.world.layout import Layout
+from foosim.world.robot_packets import OutboxPacket
 
 Indices: TypeAlias = NDArray[np.intp]
 _OUTBOX: Final[Any] = list[OutboxPacket]

@@ -2,7 +2,7 @@
 
 Nothing else in the code spells a key. `{name}` stands for the sender where many write, and for the receiver where one
 is addressed; a message that names its sender must come on that sender's key. Who may write and read what is derived
-from here, too. Neighbours: `messages`, `session`, `access`.
+from here, too.
 """
 
 from __future__ import annotations
@@ -11,14 +11,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, get_args
 
-from foosim.protocol import (
-    hub_messages,
-    limits,
-    messages,
-    replay_messages,
-)
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.protocol import hub_messages, messages, replay_messages
 from foosim.protocol.codec import decode
-from foosim.protocol.errors import Malformed
 
 
 class Plane(Enum):
@@ -95,9 +91,7 @@ _SMALL: Final = limits.SMALL_MESSAGE_BYTES_MAX
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL)
 RECALL: Final = _simulation("recall", messages.Recall, "supervisor", "node, vhub", "an unknown heartbeat", named=False)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
-FETCH: Final = _simulation(
-    "fetch", messages.Fetch, "node, vhub, operator, viewer", "supervisor", "a piece of a file"
-)
+FETCH: Final = _simulation("fetch", messages.Fetch, "node, vhub, operator, viewer", "supervisor", "a piece of a file")
 PIECE: Final = _simulation("piece", messages.Piece, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation(

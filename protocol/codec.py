@@ -2,7 +2,7 @@
 
 Decoding consumes all bytes, respects the channel's size limit, checks the version in the tag and the whole schema, and
 raises one typed error, `Malformed`. If the rule about trailing bytes were relaxed, two readers could see two messages
-in one payload. Neighbours: `messages` has the schema, `channels` which type a key carries.
+in one payload.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from foosim.protocol import limits
-from foosim.protocol.errors import Malformed
-from foosim.protocol.message_types import VERSION_SUFFIX
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.common.struct_types import VERSION_SUFFIX
 
 T = TypeVar("T")
 

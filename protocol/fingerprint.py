@@ -12,7 +12,7 @@ import struct
 from functools import cache
 from hashlib import blake2b
 
-from foosim.protocol import draws
+from foosim.common import keyed_random
 
 
 @cache
@@ -31,4 +31,4 @@ def library_fingerprint() -> bytes:
 
 def is_compiled() -> bool:
     """Whether the hot path runs compiled (setup.py) on this machine: it computes the same bits, sooner."""
-    return not draws.__file__.endswith(".py")
+    return not keyed_random.__file__.endswith(".py")

@@ -1,12 +1,9 @@
-"""The messages by which a vHub that was started again and the supervisor agree on where the run stands.
-
-Neighbours: `messages` has what they share, `supervisor.branches` decides, `vhub.footing` waits for that.
-"""
+"""The messages by which a vHub that was started again and the supervisor agree on where the run stands."""
 
 from __future__ import annotations
 
-from foosim.protocol.message_types import Counter, Digest, Message, Name, Numbers
-from foosim.protocol.start import Added
+from foosim.common.struct_types import Counter, Digest, Message, Name, Numbers
+from foosim.world.initial_state import Added
 
 
 class Standing(Message, frozen=True):

@@ -1,18 +1,17 @@
 """Identities: what a certificate says that its holder is. `supervisor`, `vhub`, `node.NAME`, `client.NAME` (players
 too), `operator.NAME` (a person or a script that controls the run), `viewer.NAME` (one that only looks at it).
 
-An identity is the common name of a certificate and the stem of its files. Neighbours: `certificates` checks whether
-somebody is who he says, `access` what each may do.
+An identity is the common name of a certificate and the stem of its files.
 """
 
 from __future__ import annotations
 
 from typing import Final
 
+from foosim.common.errors import BadValue
+from foosim.common.names import is_name
+from foosim.deployment.schema import Deployment
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import BadValue
-from foosim.protocol.names import is_name
 
 ROLES: Final = ("node", "client", "operator", "viewer")
 """Roles of which there are several, told apart by name."""

@@ -4,7 +4,6 @@ On the wire each is a MessagePack array: the tag (`part.1`: name and protocol ve
 Hello and refusal are the same in every version and have none in their tags, so that both sides can name a mismatch.
 Decoding validates: unknown fields, negative counters, oversized lists and bytes are refused. Number arrays travel as
 raw little-endian float64 bytes. Floats are checked to be finite where they are used, since msgspec does not.
-Neighbours: `codec` encodes and decodes, `channels` says which message travels where.
 """
 
 from __future__ import annotations
@@ -13,11 +12,11 @@ from typing import Annotated, Final
 
 from msgspec import Meta, field
 
-from foosim.protocol import limits
-from foosim.protocol.edits import Edits
-from foosim.protocol.message_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text
-from foosim.protocol.robot_packets import Delivered, Outboxes, RobotPacket
-from foosim.protocol.start import Added, Origin
+from foosim.common import limits
+from foosim.common.struct_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text
+from foosim.world.edits import Edits
+from foosim.world.initial_state import Added, Origin
+from foosim.world.robot_packets import Delivered, Outboxes, RobotPacket
 
 # --- simulation plane: the tick --------------------------------------------------------------------------------------
 

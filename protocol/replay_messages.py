@@ -1,7 +1,7 @@
 """The messages of a replay: what a capture is played as, to whoever listens on the replay plane.
 
 Times are the capture's simulated ns. All of it travels on one channel, whose keys end in what it is (`STREAMS`): who
-reads them all has one order. Requests and answers are those of `messages`. Neighbours: `channels`, `message_types`.
+reads them all has one order. Requests and answers are those of `messages`.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from typing import Annotated, Final
 
 from msgspec import Meta
 
-from foosim.protocol import limits
-from foosim.protocol.message_types import Counter, Item, Message, Name, Numbers, Payload, Text, Vector
+from foosim.common import limits
+from foosim.common.struct_types import Counter, Item, Message, Name, Numbers, Payload, Text, Vector
 
 PACKETS, POSES, SCENE, LOG, ROWS, CLOCK = "packets", "poses", "scene", "log", "rows", "clock"
 STREAMS: Final = (PACKETS, POSES, SCENE, LOG, ROWS, CLOCK)

@@ -3,8 +3,7 @@
 A player that does not return is interrupted by a signal, as a person's Ctrl-C would: its stack is logged, and the run
 ends in order. Where that does not help, since it is in C code or catches whatever is raised, `on_stuck` is called from
 the thread. C code that keeps the interpreter's lock stops this thread, too: then a timer of faulthandler's, which this
-thread winds up again and again, ends the process. It rests while a Ctrl-Z has stopped all. Neighbours: `onlooker`
-decides, `rehearse` starts it.
+thread winds up again and again, ends the process. It rests while a Ctrl-Z has stopped all.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The in-memory bus of a rehearsal: messages by virtual time, routed by the table of channels.
 
 What the processes put on Zenoh goes here, the same bytes on the same keys. Delivery can be delayed, reordered and lost
-by seed; without such settings it takes no time and keeps order. Neighbours: `system` has the processes at its ends.
+by seed; without such settings it takes no time and keeps order.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.protocol.channels import Channel
-from foosim.protocol.draws import draw_key, draw_words, unit_interval
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """The clocks of a rehearsal's processes: each has a monotonic one of its own, as machines have.
 
-They differ in where they began and a little in their speed; no two processes may compare them. Neighbours: `system`
-gives each core the time of its own clock.
+They differ in where they began and a little in their speed; no two processes may compare them.
 """
 
 from __future__ import annotations

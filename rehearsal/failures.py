@@ -1,6 +1,6 @@
 """How a rehearsal fails, for a fault of ours.
 
-They are apart from who raises them, since a compiled module has no classes of assertions. Neighbours: `laws`, `system`.
+They are apart from who raises them, since a compiled module has no classes of assertions.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Ctrl-C in a rehearsal: the first one ends it in order, a second one at once.
-
-Neighbours: `rehearse_command` uses it, `system` takes the end between two turns.
-"""
+"""Ctrl-C in a rehearsal: the first one ends it in order, a second one at once."""
 
 from __future__ import annotations
 

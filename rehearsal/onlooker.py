@@ -1,7 +1,7 @@
 """What one sees who looks on a rehearsal: a line of progress each second, and a player that does not return.
 
 A rehearsal is one process on virtual time, so who has the turn is who is waited for, and no deadline of its cores can
-pass meanwhile. Pure: the caller tells what time it is. Neighbours: `attendant` looks, from a thread of its own.
+pass meanwhile. Pure: the caller tells what time it is.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections import Counter
 from typing import Final
 
-from foosim.protocol.frame import Frame
-from foosim.protocol.names import TEAMS
+from foosim.common.names import TEAMS
 from foosim.rehearsal.settings import AtWork
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.status import score_text
+from foosim.world.frame import Frame
 
 LINE_S: Final = 1.0
 LOOK_S: Final = 0.05

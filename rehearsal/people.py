@@ -1,17 +1,14 @@
-"""Who asks the supervisor of a rehearsal for something, once or again until it is answered.
-
-Neighbours: `system` brings the answers, `bus` carries both.
-"""
+"""Who asks the supervisor of a rehearsal for something, once or again until it is answered."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, Final
 
+from foosim.common.json_text import encode_json
 from foosim.protocol import channels
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.rehearsal.bus import Bus
 

@@ -1,7 +1,4 @@
-"""How to rehearse, and what a rehearsal knows of each of its processes.
-
-Neighbours: `system` runs them.
-"""
+"""How to rehearse, and what a rehearsal knows of each of its processes."""
 
 from __future__ import annotations
 
@@ -13,14 +10,14 @@ from typing import Any
 from foosim.client.core import ClientCore
 from foosim.node.core import NodeCore
 from foosim.node.engines.interface import EngineFactory
-from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Epoch
-from foosim.protocol.standstill import Standstill
 from foosim.rehearsal.bus import CALM, Message, Observer, Weather
 from foosim.rehearsal.clock import Clock
+from foosim.runtime.standstill import Standstill
 from foosim.supervisor.core import SupervisorCore
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import Closing
+from foosim.world.frame import Frame
 
 
 @dataclass

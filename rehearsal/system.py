@@ -1,8 +1,7 @@
 """The whole system in one process on virtual time: the same cores, table of channels and codec as the processes.
 
 Supervisor, vHub, nodes and players take turns by what the bus brings and by their deadlines. A process may be slow on
-the virtual clock (`slow_ns`), may have its engines rebuilt, may be asked something at a tick. Neighbours: `bus`,
-`rehearse` (the command), `verify` (the same without players).
+the virtual clock (`slow_ns`), may have its engines rebuilt, may be asked something at a tick.
 """
 
 from __future__ import annotations
@@ -19,23 +18,24 @@ from foosim.client.errors import PlayerError
 from foosim.client.failing import Unanswered, tell_failure
 from foosim.client.loading import load_player
 from foosim.client.player import PlayerLoop
-from foosim.node.solver import Solver
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.node.engines_pool import Solver
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.frame import Frame
 from foosim.rehearsal.bus import Bus, Message, Traced
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Stuck
-from foosim.rehearsal.hub_journal import Ending, HubJournal
+from foosim.rehearsal.journals import Ending, HubJournal
 from foosim.rehearsal.people import OPERATOR, People
 from foosim.rehearsal.settings import AtWork, Process, Settings
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.recording.queue import Keep, KeepEpoch
+from foosim.world.frame import Frame
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
 
@@ -95,9 +95,7 @@ class System:
         self._enter_clients()
         self._hub_back_ns = HUB_BACK_NS
 
-    def enter(
-        self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]
-    ) -> None:
+    def enter(self, name: str, core: Any, turn: Callable[[int], None], reads: tuple[tuple[Channel, bool], ...]) -> None:
         """Let a process in, which takes part from now on."""
         self.bus.subscribe(name, reads)
         process = self.processes[name] = Process(name, core, turn, self.settings.slow_ns.get(name, 0))

@@ -1,7 +1,6 @@
 """The account of a run: who solved what, and who was lost and came back.
 
-What a run's result says of its nodes, of the ball's way between them and of its recoveries. Neighbours: `core` counts
-every committed frame, `recovery` notes losses, `records` keeps both in the journal, `status` shows them.
+What a run's result says of its nodes, of the ball's way between them and of its recoveries.
 """
 
 from __future__ import annotations
@@ -9,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from foosim.protocol import limits, messages
+from foosim.common import limits
+from foosim.protocol import messages
 
 
 @dataclass(slots=True)

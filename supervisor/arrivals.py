@@ -1,15 +1,12 @@
-"""What has come for the ticks that are not committed: parts of nodes, deliveries of the vHub.
-
-Neighbours: `core` commits a frame when both are complete.
-"""
+"""What has come for the ticks that are not committed: parts of nodes, deliveries of the vHub."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
 from foosim.protocol.codec import encode
-from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import Deliveries, Part
 
 

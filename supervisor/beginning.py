@@ -3,13 +3,12 @@
 All processes of such a run are started at about the same time, some of them slowly. A supervisor that alone was started
 again finds processes that live: they say heartbeats before a hello, and the deadlines of a running world hold for them.
 A run that is resumed and does not come to a commit is abandoned, not ended: its journals and its capture stay as they
-are, so that it can be resumed once more. Pure. Neighbours: `watch`, `absence` and `take_over` ask for deadlines, `core`
-asks whether a run that cannot go on has ended.
+are, so that it can be resumed once more. Pure.
 """
 
 from __future__ import annotations
 
-from foosim.protocol.deployment import Deployment
+from foosim.deployment.schema import Deployment
 
 
 class Beginning:

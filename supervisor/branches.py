@@ -4,24 +4,23 @@ What the vHub closed last is the last that it knows: nobody can give it the inpu
 stands where the vHub does, as it does when it takes the later commit of the two, and all that was behind is void:
 commits, arrivals, orders, deliveries. A branch has a number, that of the first epoch in it; deliveries and what is said
 to clients and by them name it, so that nothing that is void and still on its way counts. Requests keep their ids, ticks
-and answers, and what they change is ordered again at their ticks. Neighbours: `vhub.footing` waits for the decision,
-`take_over` and `core` hear the vHub, `head` writes it as one record.
+and answers, and what they change is ordered again at their ticks.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from foosim.common.errors import Malformed
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, frame_from_bytes
 from foosim.protocol.hub_messages import Proceed, Standing
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit
 from foosim.supervisor.account import Recovered, close_outages, tell_again
-from foosim.supervisor.head import stand_at
+from foosim.supervisor.state import stand_at
+from foosim.world.frame import Frame, frame_from_bytes
+from foosim.world.layout import build_layout
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore

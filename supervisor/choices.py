@@ -1,14 +1,11 @@
-"""A name that somebody asks for, among those that there are.
-
-Neighbours: `requests` and `viewing` check what is asked.
-"""
+"""A name that somebody asks for, among those that there are."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from foosim.protocol.errors import Refused, show
-from foosim.protocol.names import nearest_name
+from foosim.common.errors import Refused, show
+from foosim.common.names import nearest_name
 
 
 def chosen(what: str, name: str, choices: Sequence[str]) -> str:

@@ -1,8 +1,7 @@
 """Talking to a running system from another process: requests by id, said again until they are answered.
 
 Each function finds the newest live run (or the one named), asks its supervisor, and returns the answer, which names the
-tick at which the request takes effect; what is refused raises `RequestRefused`. Neighbours: `requests` is the other
-side, `run_folder` says where it is, `cli` shows the answers.
+tick at which the request takes effect; what is refused raises `RequestRefused`.
 """
 
 from __future__ import annotations
@@ -16,23 +15,23 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Literal, Self, TypeVar
 
+from foosim.common.errors import BadValue, Failed, Malformed, Refused
+from foosim.common.json_text import decode_json, encode_json
+from foosim.common.struct_types import Vector
+from foosim.common.units import parse_pace
+from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
-from foosim.protocol.certificates import Credentials, operator_credentials, viewer_credentials
+from foosim.protocol.asset_transfer import Fetching
 from foosim.protocol.channels import Channel, Plane
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.command import PKI_VARIABLE
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import BadValue, Failed, Malformed, Refused
-from foosim.protocol.fetching import Fetching
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.json_text import decode_json, encode_json
-from foosim.protocol.loop import Wire
-from foosim.protocol.message_types import Vector
 from foosim.protocol.messages import Answer, Fetch, Inquiry, Request
-from foosim.protocol.session import Session
-from foosim.protocol.session_settings import Security
-from foosim.protocol.units import parse_pace
-from foosim.supervisor.run_folder import RunInfo, find_run
+from foosim.runtime.command import PKI_VARIABLE
+from foosim.runtime.loop import Wire
+from foosim.runtime.run_folder import RunInfo, find_run
+from foosim.runtime.transport.certificates import Credentials, operator_credentials, viewer_credentials
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session
+from foosim.runtime.transport.settings import Security
 
 ANSWER_S: Final = 30.0
 """How long an answer is waited for: adding waits until every node has built an engine."""

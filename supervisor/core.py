@@ -11,17 +11,14 @@ from typing import Any, Final
 
 from mypy_extensions import mypyc_attr
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
 from foosim.protocol.channels import Channel
-from foosim.protocol.closed import closed
 from foosim.protocol.codec import encode
-from foosim.protocol.edits import Edit, layout_after
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.hub_messages import Standing
-from foosim.protocol.layout import Layout
 from foosim.protocol.messages import (
     Commit,
     Deliveries,
@@ -40,28 +37,32 @@ from foosim.protocol.messages import (
     Tempo,
     Want,
 )
-from foosim.protocol.patience import Patience
-from foosim.protocol.refusals import Refusals
-from foosim.protocol.start import AddedEntity, added_to, first_chain, first_frame
-from foosim.supervisor.absence import Absence
+from foosim.protocol.rejects import Refusals
+from foosim.protocol.retry import Patience
+from foosim.runtime.closed import closed
 from foosim.supervisor.account import Account, Recovered
 from foosim.supervisor.arrivals import Arrivals
-from foosim.supervisor.balance import Balancer
 from foosim.supervisor.beginning import Beginning
 from foosim.supervisor.branches import Branches
 from foosim.supervisor.closing import Closing
+from foosim.supervisor.failover import TakeOver
 from foosim.supervisor.handshake import Handshake
-from foosim.supervisor.head import control_of, head_of
+from foosim.supervisor.load_balancing import Balancer
+from foosim.supervisor.node_loss import Recovery
 from foosim.supervisor.pacing import Pacer
+from foosim.supervisor.progress import Watch, losses
 from foosim.supervisor.records import CommitRecord, Control, History, RunRecord, Solved, solved_by
-from foosim.supervisor.recovery import Recovery
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.settings import RunSettings
+from foosim.supervisor.state import control_of, head_of
 from foosim.supervisor.status import SupervisorStatistics
-from foosim.supervisor.take_over import TakeOver
+from foosim.supervisor.vhub_loss import Absence
 from foosim.supervisor.viewing import Viewing
-from foosim.supervisor.watch import Watch, losses
+from foosim.world.edits import Edit, layout_after
+from foosim.world.frame import Frame, chain_next
+from foosim.world.initial_state import AddedEntity, added_to, first_chain, first_frame
+from foosim.world.layout import Layout
 
 PREPARE_NS: Final = 200_000_000
 """How often a layout that nodes have not built yet is asked for again."""

@@ -1,8 +1,7 @@
 """Players whose process was lost: the vHub waits for them or goes on without them, and the account says so.
 
 The vHub tells in its heartbeats who is away, and what is over of it, numbered; one that is started again tells from its
-journal what the one before did. Neighbours: `vhub.absences` tells, `recovery` has the account, `absence` is the same of
-the vHub itself.
+journal what the one before did.
 """
 
 from __future__ import annotations

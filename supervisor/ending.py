@@ -1,7 +1,4 @@
-"""How a process of a run ended, in words, and whether another one may take its place. Pure.
-
-Neighbours: `launcher` knows exit codes and logs, `restarts` says when another one is started.
-"""
+"""How a process of a run ended, in words, and whether another one may take its place. Pure."""
 
 from __future__ import annotations
 
@@ -9,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from foosim.protocol.command import REFUSED
-from foosim.supervisor.children import BY_SIGNAL
+from foosim.runtime.children import BY_SIGNAL
+from foosim.runtime.command import REFUSED
 
 NO_MEMORY: Final = (
     *("MemoryError", "can't start new thread", "Cannot allocate memory", "failed to map segment"),

@@ -1,20 +1,16 @@
-"""The supervisor's side of the handshake: hello, ready, heartbeat and farewell of nodes and the vHub.
-
-Neighbours: `roster` checks and keeps who is here, `recovery` takes nodes in that come to a running world, `core` opens
-the first epoch; `protocol.member` is the other side.
-"""
+"""The supervisor's side of the handshake: hello, ready, heartbeat and farewell of nodes and the vHub."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from foosim.common.json_text import decode_json
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
+from foosim.protocol.asset_transfer import piece_of
 from foosim.protocol.codec import encode
-from foosim.protocol.fetching import piece_of
-from foosim.protocol.json_text import decode_json
 from foosim.protocol.messages import Build, Farewell, Fetch, Heartbeat, Hello, Ready, Recall, Refusal
-from foosim.supervisor.absence import SAID_NS
+from foosim.supervisor.vhub_loss import SAID_NS
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore

@@ -1,15 +1,14 @@
 """What was ordered beside the plain permission to compute, by tick: what a branch orders again.
 
-Bounded: of a long run with many requests the last are known. Neighbours: `requests` adds, `branches` orders again,
-`records` has it in the journal.
+Bounded: of a long run with many requests the last are known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from foosim.protocol import limits
-from foosim.protocol.edits import Edit
+from foosim.common import limits
+from foosim.world.edits import Edit
 
 
 class Issued:

@@ -1,14 +1,11 @@
-"""Looks after the room that the supervisor's journal has: a run ends in order while its end can still be written.
-
-Neighbours: `main` asks it, `protocol.disk`; `vhub.room_watch` is the vHub's.
-"""
+"""Looks after the room that the supervisor's journal has: a run ends in order while its end can still be written."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Final
 
-from foosim.protocol.disk import Level, room_on_disk
+from foosim.runtime.disk import Level, room_on_disk
 from foosim.supervisor.core import SupervisorCore
 
 LOOK_NS: Final = 1_000_000_000

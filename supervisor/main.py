@@ -2,7 +2,7 @@
 
 It holds the run's folder: the run file says where the run listens, the journal has what was decided, and at the end
 `result.json` has how it ended. Started again in the folder of a run that has not ended, it listens where it listened
-and goes on from the journal. Neighbours: `core` decides, `up` starts it with everything else, `run_folder`.
+and goes on from the journal.
 """
 
 from __future__ import annotations
@@ -14,31 +14,32 @@ from pathlib import Path
 
 import msgspec
 
-from foosim.protocol import channels, limits, wall
+from foosim.capture.parts import is_complete
+from foosim.common import limits, wall_clock
+from foosim.common.addresses import Address, parse_address
+from foosim.common.errors import Malformed, Refused
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.access import access_to
 from foosim.protocol.actions import Say
-from foosim.protocol.addresses import Address, parse_address
-from foosim.protocol.certificates import check_host, load_credentials, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
-from foosim.protocol.command import DONE, FAILED, REFUSED
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Malformed, Refused
-from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, JournalError, journal_files, remove_journal
-from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.notify import Notify
-from foosim.protocol.process import Stop, clock_name, die_with_parent, new_boot, start_log
-from foosim.protocol.session import Session
-from foosim.protocol.session_settings import Security
+from foosim.runtime.command import DONE, FAILED, REFUSED
+from foosim.runtime.journal import Journal, JournalError, journal_files, remove_journal
+from foosim.runtime.loop import Loop, Wire
+from foosim.runtime.process import Stop, clock_name, die_with_parent, new_boot, start_log
+from foosim.runtime.run_folder import RESULT_FILE, RunFolder, RunInfo
+from foosim.runtime.systemd import Notify
+from foosim.runtime.transport.certificates import check_host, load_credentials, warn_of_end
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.open_plane_warning import Exposure
+from foosim.runtime.transport.session import Session
+from foosim.runtime.transport.settings import Security
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.journal_room import JournalRoom
 from foosim.supervisor.records import History, fold
-from foosim.supervisor.run_folder import RESULT_FILE, RunFolder, RunInfo
 from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import result
-from foosim.vhub.capture_parts import is_complete
 
 
 class SupervisorProcess:
@@ -65,7 +66,7 @@ class SupervisorProcess:
             self.core.deployment.world,
             str(Path(settings.deployment_name).absolute()),
             os.getpid(),
-            wall.now_text(),
+            wall_clock.now_text(),
             session.locator,
             pki="" if pki is None else str(pki.absolute()),
         )

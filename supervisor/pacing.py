@@ -2,14 +2,14 @@
 
 Order k is the permission to compute tick k. It is released once tick k - W is committed; in realtime also not before
 wall time k T (scaled by the factor), so that no command waits behind ticks that ran ahead of the clock; while paused,
-not at all, but for the ticks that `step` granted. Neighbours: `core` publishes the orders.
+not at all, but for the ticks that `step` granted.
 """
 
 from __future__ import annotations
 
-from foosim.protocol import limits
-from foosim.protocol.lags import Lags
-from foosim.protocol.units import Pace
+from foosim.common import limits
+from foosim.common.histogram import Lags
+from foosim.common.units import Pace
 
 
 class Pacer:

@@ -2,8 +2,7 @@
 
 A fold gives everything that a supervisor needs which was started again: the last committed frames, the epoch, the edits
 of ticks that are not committed, answers, pace, and the account of the run. What belongs together is one record, so that
-a journal never ends between a request and what it did. Neighbours: `core` writes, `take_over` goes on from a fold,
-`protocol.journal` frames the records in files.
+a journal never ends between a request and what it did.
 """
 
 from __future__ import annotations
@@ -14,19 +13,19 @@ from typing import Final
 
 import msgspec
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.common.histogram import Lags
+from foosim.deployment.schema import Deployment
 from foosim.protocol.barrier import Barrier
 from foosim.protocol.codec import decode, decode_any
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.edits import Edit, layout_after
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
-from foosim.protocol.lags import Lags
-from foosim.protocol.layout import BALL, Layout, build_layout
 from foosim.protocol.messages import Answer, Commit, End, Epoch
-from foosim.protocol.start import AddedEntity, Start, first_chain, first_frame
 from foosim.supervisor.account import Account, Recovered, close_outages
 from foosim.supervisor.issued import Issued
+from foosim.world.edits import Edit, layout_after
+from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
+from foosim.world.initial_state import AddedEntity, Start, first_chain, first_frame
+from foosim.world.layout import BALL, Layout, build_layout
 
 
 class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_unknown_fields=True):

@@ -4,8 +4,7 @@ network, stop and start (a node), down; status, describe, watch.
 A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push at the
 first tick not yet released, network with what is sent at the one behind it, add and remove at the first not yet
 released when all nodes are ready for it, a move at the last commit, with its epoch. It is journalled when its tick is
-chosen, then answered; what only reads is neither journalled nor kept. To add a verb: a method and a row. Neighbours:
-`core`, `status` (what `status` answers), `viewing` (`describe`, `watch`).
+chosen, then answered; what only reads is neither journalled nor kept. To add a verb: a method and a row.
 """
 
 from __future__ import annotations
@@ -16,23 +15,24 @@ from dataclasses import dataclass
 from math import hypot
 from typing import TYPE_CHECKING, Any, Final
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import Malformed, Refused, show
+from foosim.common.json_text import decode_json, encode_json
+from foosim.common.names import NAME_RULE, is_name
+from foosim.common.units import parse_pace
+from foosim.deployment.event_requests import event_text, told
+from foosim.deployment.network.rules import EVENTS_MAX, event_of
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import encode
-from foosim.protocol.edits import Add, Disrupt, Edit, Push, Remove, layout_after
-from foosim.protocol.errors import Malformed, Refused, show
-from foosim.protocol.json_text import decode_json, encode_json
-from foosim.protocol.layout import BALL, Layout
 from foosim.protocol.messages import Answer, Inquiry, Request
-from foosim.protocol.names import NAME_RULE, is_name
-from foosim.protocol.network import EVENTS_MAX, event_of
-from foosim.protocol.network_request import event_text, told
-from foosim.protocol.units import parse_pace
-from foosim.supervisor.balance import WORTH, loads_of, shifts_at_once
 from foosim.supervisor.choices import chosen
 from foosim.supervisor.issued import Issued
+from foosim.supervisor.load_balancing import WORTH, loads_of, shifts_at_once
 from foosim.supervisor.records import ASKED_KEPT, Asked, OrderedRecord, RequestRecord, asked
 from foosim.supervisor.status import status
+from foosim.world.edits import Add, Disrupt, Edit, Push, Remove, layout_after
+from foosim.world.layout import BALL, Layout
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore

@@ -1,7 +1,7 @@
 """Who takes part: the handshake as the supervisor sees it, and who is heard of.
 
 A hello is checked (protocol version, world, a free and declared name, the arithmetic fingerprint) and answered with a
-build or a refusal that says why. Neighbours: `protocol.member` is the other side, `core` opens epochs.
+build or a refusal that says why.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.errors import show
+from foosim.common.names import nearest_name
+from foosim.deployment.schema import Deployment
 from foosim.protocol.channels import VHUB
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import show
 from foosim.protocol.messages import Heartbeat, Hello, Ready
-from foosim.protocol.names import nearest_name
 
 SILENT_NS: Final = 3 * limits.HEARTBEAT_NS
 """A process that lives is not silent for so long, unless its machine or its loop stands."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.start import Origin, Start
-from foosim.protocol.units import Pace
+from foosim.common.units import Pace
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.initial_state import Origin, Start
 
 
 @dataclass(frozen=True, slots=True)

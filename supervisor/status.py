@@ -1,7 +1,4 @@
-"""What the supervisor knows of a run, as JSON: for `status`, for the display, and the result at its end.
-
-Neighbours: `requests` answers with it, `display` shows it, `up` prints the result.
-"""
+"""What the supervisor knows of a run, as JSON: for `status`, for the display, and the result at its end."""
 
 from __future__ import annotations
 
@@ -10,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from msgspec.structs import asdict
 
+from foosim.common.json_text import decode_json
+from foosim.common.names import TEAMS
+from foosim.deployment.schema import places
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.deployment import places
-from foosim.protocol.frame import Frame
-from foosim.protocol.json_text import decode_json
-from foosim.protocol.layout import BALL
-from foosim.protocol.names import TEAMS
+from foosim.world.frame import Frame
+from foosim.world.layout import BALL
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore

@@ -3,8 +3,7 @@
 `watch` begins or renews a lease of the one who asks, `describe` says what one has to know to read frames. A frame goes
 out on `view` as the bytes that were journalled, at the highest rate that a lease asks for on the wall, one whose edits
 change the layout at once, and what is behind them at the next wake: of a world that is paused the last frame was shown.
-Leases are in no journal: after a loss of the supervisor they are asked for again. Neighbours: `core` commits,
-`requests` has the verbs.
+Leases are in no journal: after a loss of the supervisor they are asked for again.
 """
 
 from __future__ import annotations
@@ -14,14 +13,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import Refused, show
+from foosim.common.json_text import encode_json
+from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import encode
-from foosim.protocol.edits import Add, Edit, Remove
-from foosim.protocol.errors import Refused, show
-from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer, Heartbeat, Request, Watched
 from foosim.supervisor.choices import chosen
+from foosim.world.edits import Add, Edit, Remove
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore

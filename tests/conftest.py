@@ -17,9 +17,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
-from foosim.protocol.deployment_file import apply_sets
-from foosim.protocol.loop import GC_THRESHOLDS
-from foosim.protocol.yaml_tree import locate_in, plain, read_tree, write_yaml
+from foosim.deployment.loader import apply_sets
+from foosim.deployment.yaml import locate_in, plain, read_tree, write_yaml
+from foosim.runtime.loop import GC_THRESHOLDS
 from tests.meter import Burden, Meter
 
 settings.register_profile(

@@ -20,18 +20,36 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.client.payloads import Command, decode_payload
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.yaml_tree import locate_in, plain, read_tree
-from foosim.rehearsal.rehearse import rehearse
+from foosim.capture.reader import open_capture
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.yaml import locate_in, plain, read_tree
+from foosim.launcher.plan import make_plan
+from foosim.launcher.run_options import RunOptions
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import System
-from foosim.supervisor.plan import make_plan
-from foosim.supervisor.run_options import RunOptions
-from foosim.vhub.capture_reader import open_capture
+from foosim.world.payloads import Command, decode_payload
 
 ROOT: Final = Path(__file__).parents[1]
 PAGES: Final = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-PACKAGES: Final = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES: Final = (
+    "analysis",
+    "capture",
+    "cli",
+    "client",
+    "common",
+    "console",
+    "deployment",
+    "launcher",
+    "node",
+    "players",
+    "protocol",
+    "rehearsal",
+    "replay",
+    "runtime",
+    "supervisor",
+    "vhub",
+    "world",
+)
 OTHER_OPTIONS: Final = {"--help", "--version", "--strict", "--hypothesis-profile", "--only", "--slow-start", "--load"}
 """Options that belong to no command of ours, or to all."""
 

@@ -12,7 +12,25 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = ("client", "console", "node", "protocol", "rehearsal", "supervisor", "vhub")
+PACKAGES = (
+    "analysis",
+    "capture",
+    "cli",
+    "client",
+    "common",
+    "console",
+    "deployment",
+    "launcher",
+    "node",
+    "players",
+    "protocol",
+    "rehearsal",
+    "replay",
+    "runtime",
+    "supervisor",
+    "vhub",
+    "world",
+)
 INTERPRETED = Path(sys.executable).parent
 HAS_COMPILER = any(map(shutil.which, ("cc", "gcc", "clang")))
 AIR = "radios: {air: {preset: wifi_5_indoor}}, robots: {'*': [air]}, places: {'*': [0 m, 0 m, 1 m]}"
@@ -138,7 +156,7 @@ def test_without_a_c_compiler_the_source_is_installed_alone(tmp_path: Path) -> N
     source = tmp_path / "source"
     copy_source(source)
     setup = source / "setup.py"
-    few = 'COMPILED = {"protocol/draws": ""}\n'
+    few = 'COMPILED = {"common/keyed_random": ""}\n'
     text, count = re.subn(r"(?s)COMPILED: Final = \{.*?\n\}\n", few, setup.read_text())
     assert count == 1
     setup.write_text(text)

@@ -5,7 +5,7 @@ set -eu
 cd "$(dirname "$0")/.."
 unset PYTHONPATH PYTHONHOME
 python=$PWD/.venv/bin/python
-folders="client console node protocol rehearsal supervisor vhub"
+folders="analysis capture cli client common console deployment launcher node players protocol rehearsal replay runtime supervisor vhub world"
 files="setup.py pyproject.toml README.md LICENSE"
 
 key() {

@@ -1,8 +1,7 @@
 """Players that were away and came back, or left the run: what the vHub tells the supervisor for its account.
 
 It is told in every heartbeat, with a number each, since heartbeats may be lost, and is in the journal before that:
-a vHub that is started again tells it once more. Neighbours: `door` notes it, `report` tells it, `records` has it,
-`supervisor.departures` takes it.
+a vHub that is started again tells it once more.
 """
 
 from __future__ import annotations

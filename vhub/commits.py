@@ -1,20 +1,19 @@
 """The commits that the vHub has: frames in order, and what came before its turn.
 
 A layout is what the commits before say, so they are read in order; one that comes early waits for those before it.
-What is committed last is what a supervisor that takes over may have lost. Neighbours: `core` closes the ticks of these
-frames.
+What is committed last is what a supervisor that takes over may have lost.
 """
 
 from __future__ import annotations
 
-from foosim.protocol import limits
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.edits import layout_after
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, chain_next, frame_from_bytes
-from foosim.protocol.layout import Layout
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Commit
-from foosim.protocol.start import AddedEntity, added_to
+from foosim.world.edits import layout_after
+from foosim.world.frame import Frame, chain_next, frame_from_bytes
+from foosim.world.initial_state import AddedEntity, added_to
+from foosim.world.layout import Layout
 
 Committed = tuple[bytes, Commit, Frame]
 """A commit as it came, read, and its frame."""

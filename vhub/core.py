@@ -3,8 +3,6 @@
 It sees committed frames only. Closing tick k waits for Commit(k) and the samples of every robot (world phase), then for
 the Dones of the lockstep clients that are due (clients phase); the record is written before the deliveries are spoken.
 `Go` alone may be spoken before: it is a function of what is already written, commit and samples.
-Neighbours: `state` (what a closing does), `door` and `sessions` (clients), `records` (journal), `resume` (what a vHub
-that is started again goes on from), `protocol.member` (handshake).
 """
 
 from __future__ import annotations
@@ -13,15 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import Malformed, Refused
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Malformed, Refused
-from foosim.protocol.frame import Frame
+from foosim.protocol.handshake import Member
 from foosim.protocol.hub_messages import Proceed
-from foosim.protocol.member import Member
 from foosim.protocol.messages import (
     DONE_OF,
     JOIN_OF,
@@ -46,24 +44,25 @@ from foosim.protocol.messages import (
     Want,
     Watched,
 )
-from foosim.protocol.orphan import Orphan
-from foosim.protocol.patience import Patience
-from foosim.protocol.refusals import Refusals
-from foosim.protocol.start import first_chain
+from foosim.protocol.rejects import Refusals
+from foosim.protocol.retry import Patience
+from foosim.runtime.supervisor_timeout import Orphan
 from foosim.vhub.commits import Commits
-from foosim.vhub.door import Door
 from foosim.vhub.footing import Footing
 from foosim.vhub.head import head_of
-from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closings
-from foosim.vhub.packet import Flight, received
+from foosim.vhub.join import Door
+from foosim.vhub.network.packet import Flight, received
+from foosim.vhub.paced_release import Releases
+from foosim.vhub.recording.queue import Keep, KeepEpoch, Keeping, last_closings
 from foosim.vhub.records import Closing, closing_of, missing_robots, tick_record, world_packets
-from foosim.vhub.release import Releases
-from foosim.vhub.report import HubStatistics, LinksTold, report, statistics
 from foosim.vhub.resume import Past
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
-from foosim.vhub.waits import Waits
+from foosim.vhub.status import HubStatistics, LinksTold, report, statistics
+from foosim.vhub.wait_times import Waits
 from foosim.vhub.watching import Watching
+from foosim.world.frame import Frame
+from foosim.world.initial_state import first_chain
 
 HubAction = Action | Keep | KeepEpoch
 

@@ -1,7 +1,6 @@
 """What was said to clients outside of lockstep, numbered and kept: who comes back gets what it has not received.
 
-Kept for as long as a client may be away, and never more than `DOWNLINKS_KEPT_MAX` for one. Neighbours: `sessions` says
-them, `resume` makes those of a vHub that is gone again.
+Kept for as long as a client may be away, and never more than `DOWNLINKS_KEPT_MAX` for one.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-from foosim.protocol import limits
+from foosim.common import limits
 from foosim.protocol.messages import Down
 from foosim.vhub.naming import in_branch
 

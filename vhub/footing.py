@@ -3,14 +3,14 @@
 Its journal may have lost its end with the machine. So it tells the supervisor how far it has come, and closes nothing,
 takes no commit and lets nobody in until it hears that it may proceed. Where others had come further, the run goes on as
 a branch: what was said before is named anew, so that nothing of what is void can be taken for it.
-Neighbours: `core` goes on, `resume` reads the journal, `supervisor.branches` decides.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.codec import encode
 from foosim.protocol.hub_messages import Proceed, Standing

@@ -1,15 +1,12 @@
-"""What the vHub's core stands on, as the record that begins a file of its journal.
-
-Neighbours: `records` has the record and the fold, `core` writes heads, `resume` goes on from a fold.
-"""
+"""What the vHub's core stands on, as the record that begins a file of its journal."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from foosim.protocol.codec import encode
-from foosim.protocol.start import added_to
 from foosim.vhub.records import HeadRecord
+from foosim.world.initial_state import added_to
 
 if TYPE_CHECKING:
     from foosim.vhub.core import HubCore

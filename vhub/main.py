@@ -1,8 +1,7 @@
 """The process `foosim-vhub`: the vHub's core between both planes, its journal and the capture.
 
 It is a client of the simulation plane and the router of the radio plane. Nothing bridges the two but the core. What the
-core writes goes to the journal before it is spoken; the capture follows behind, from a thread of its own. Neighbours:
-`core` decides, `capture_writer`, `protocol.journal`, `protocol.loop`.
+core writes goes to the journal before it is spoken; the capture follows behind, from a thread of its own.
 """
 
 from __future__ import annotations
@@ -19,22 +18,23 @@ from typing import Annotated
 import typer
 from msgspec.structs import replace
 
-from foosim.protocol import channels, limits, wall
+from foosim.capture.contents import check_new, ending_metadata, origin_metadata
+from foosim.capture.parts import first_there
+from foosim.common import limits, wall_clock
+from foosim.common.addresses import LOOPBACK, Address, check_listen, parse_address
+from foosim.common.errors import BadValue, DeploymentError, Refused
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.access import access_to
 from foosim.protocol.actions import Publish, Say
-from foosim.protocol.addresses import LOOPBACK, Address, check_listen, parse_address
-from foosim.protocol.admission import Admission
-from foosim.protocol.certificates import Credentials, check_host, load_credentials, passwords_file, warn_of_end
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
-from foosim.protocol.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.disk import Level
-from foosim.protocol.errors import BadValue, DeploymentError, Refused
-from foosim.protocol.exposure import Exposure
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import (
+from foosim.protocol.messages import CAPTURE, Build
+from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.disk import Level
+from foosim.runtime.health import ProgressOption
+from foosim.runtime.journal import (
     Journal,
     JournalDamaged,
     JournalError,
@@ -43,25 +43,31 @@ from foosim.protocol.journal import (
     read_whole,
     remove_journal,
 )
-from foosim.protocol.loop import Loop, Wire
-from foosim.protocol.messages import CAPTURE, Build
-from foosim.protocol.notify import Notify
-from foosim.protocol.probe import ProgressOption
-from foosim.protocol.process import Stop, die_with_parent, machine_start, new_boot, start_log
-from foosim.protocol.session import Session
-from foosim.protocol.session_settings import Security
-from foosim.vhub.capture_contents import check_new, ending_metadata, origin_metadata
-from foosim.vhub.capture_parts import first_there
-from foosim.vhub.capture_writer import CaptureWriter
+from foosim.runtime.loop import Loop, Wire
+from foosim.runtime.process import Stop, die_with_parent, machine_start, new_boot, start_log
+from foosim.runtime.systemd import Notify
+from foosim.runtime.transport.admission import Admission
+from foosim.runtime.transport.certificates import (
+    Credentials,
+    check_host,
+    load_credentials,
+    passwords_file,
+    warn_of_end,
+)
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.open_plane_warning import Exposure
+from foosim.runtime.transport.session import Session
+from foosim.runtime.transport.settings import Security
 from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
-from foosim.vhub.link_models import check_link_models
-from foosim.vhub.lint import meanings
-from foosim.vhub.lint_text import start_lines
+from foosim.vhub.links.summary import meanings
+from foosim.vhub.links.summary_text import start_lines
+from foosim.vhub.network.custom_models import check_link_models
+from foosim.vhub.recording.disk_watch import RoomWatch
+from foosim.vhub.recording.queue import Keep, KeepEpoch
+from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.records import Closing, first_head
 from foosim.vhub.resume import Captured, end_of, first_tick_of, last_tick_of, recall, was_captured
-from foosim.vhub.room_watch import RoomWatch
 
 CONNECT_S = 60.0
 SWITCH_S = 0.0001
@@ -188,7 +194,7 @@ class HubProcess:
             self._is_closing, closing = True, ClosingCore(self.core)
             self._loop.core, self._loop.deadline_ns = closing, lambda now_ns: closing.deadline_ns()
             capture.on_end = self._inbox.wake
-            capture.begin_finish({**ending_metadata(ended), "ended": wall.now_text()})
+            capture.begin_finish({**ending_metadata(ended), "ended": wall_clock.now_text()})
         return capture.has_ended
 
     @property
@@ -297,7 +303,7 @@ class HubProcess:
 
     def _refusal(self, build: Build, records: list[bytes], damaged: JournalDamaged) -> Refused:
         """Return why nobody goes on over a damaged journal, and what helps."""
-        from foosim.vhub.branching import branch_command  # reads captures: not what a vHub starts with
+        from foosim.capture.start_frame import branch_command  # reads captures: not what a vHub starts with
 
         before = was_captured(records)
         capture = self._options.capture if before is None else Path(before) if before else None
@@ -310,7 +316,7 @@ class HubProcess:
         if not (options.keeps if before is None else before):
             return None
         path = Path(before) if before else options.capture
-        path = path or Path("captures") / f"{deployment.world}-{wall.now_stamp()}.mcap"
+        path = path or Path("captures") / f"{deployment.world}-{wall_clock.now_stamp()}.mcap"
         self.core.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         if before is None:  # who is killed before the capture is there finds here that what is found is its own
             check_new(path, is_split=deployment.capture.is_split)
@@ -318,7 +324,7 @@ class HubProcess:
             self._journal.append(first_head(build, deployment, self.core.capture_file))
         metadata = {
             "run": build.run,
-            "started": wall.now_text(),
+            "started": wall_clock.now_text(),
             "pace": build.pace,
             "fingerprint": library_fingerprint().hex(),
             **origin_metadata(build.origin),

@@ -1,7 +1,4 @@
-"""A client that takes part, as the vHub's state knows it: in ticks and numbers, without its session.
-
-Neighbours: `state`, which holds them; `sessions` is about their processes.
-"""
+"""A client that takes part, as the vHub's state knows it: in ticks and numbers, without its session."""
 
 from __future__ import annotations
 
@@ -9,9 +6,9 @@ from collections.abc import Mapping
 
 from msgspec import convert
 
-from foosim.protocol.deployment import Deployment
-from foosim.vhub.memory import Joining, MemberState
-from foosim.vhub.packet import Flight
+from foosim.deployment.schema import Deployment
+from foosim.vhub.network.memory import Joining, MemberState
+from foosim.vhub.network.packet import Flight
 
 
 def may_lockstep(deployment: Deployment, name: str) -> bool:

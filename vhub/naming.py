@@ -1,7 +1,4 @@
-"""What the vHub had said before a branch, as it is said in it: the same, with the number of the branch.
-
-Neighbours: `footing` and `downlinks` say it again, `resume` makes it from a journal.
-"""
+"""What the vHub had said before a branch, as it is said in it: the same, with the number of the branch."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 A fold of the records through the same state gives frames, fates, what is in flight and the next deliveries again, byte
 for byte. The first record of a file holds the whole state, so that older files can go; such a head also stands between
 the ticks now and then, so that a fold need not begin far back. Beside them are the epochs, and who joins and leaves at
-a tick whose Go is said before its record is written; and which players are away. Neighbours: `state`, `core`, `resume`.
+a tick whose Go is said before its record is written; and which players are away.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from typing import Final
 
 import msgspec
 
+from foosim.common.errors import Malformed
+from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.edits import Edit, layout_after
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Build, Commit, Epoch, Recovered, Samples, Sent
-from foosim.protocol.robot_packets import Delivered, RobotPacket
-from foosim.protocol.sampling import Sampling
-from foosim.protocol.start import first_chain
-from foosim.vhub.memory import Age, Joining
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.memory import Age, Joining
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.state import HubState
+from foosim.world.edits import Edit, layout_after
+from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
+from foosim.world.initial_state import first_chain
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import Delivered, RobotPacket
+from foosim.world.sampling import Sampling
 
 
 class AbsencesRecord(msgspec.Struct, frozen=True, array_like=True, tag="absences", forbid_unknown_fields=True):

@@ -2,7 +2,7 @@
 
 A fold of the journal gives the state behind the last closed tick; on the way it gives what others may still ask for
 (deliveries, numbered downlinks) and what the capture lacks. Pure: the shell reads the journal and knows how far the
-capture is. Neighbours: `records` (the fold), `core` goes on from here.
+capture is.
 """
 
 from __future__ import annotations
@@ -10,18 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.deployment.schema import Deployment
 from foosim.protocol.actions import Action, Say
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, frame_from_bytes
-from foosim.protocol.layout import Layout
 from foosim.protocol.messages import Commit, Deliveries, Down, Epoch
 from foosim.vhub.commits import Committed
-from foosim.vhub.keeping import Keep, KeepEpoch
 from foosim.vhub.naming import in_branch
-from foosim.vhub.packet import received
+from foosim.vhub.network.packet import received
+from foosim.vhub.recording.queue import Keep, KeepEpoch
 from foosim.vhub.records import (
     NONE_AWAY,
     AbsencesRecord,
@@ -34,6 +32,8 @@ from foosim.vhub.records import (
     TickRecord,
 )
 from foosim.vhub.state import HubState
+from foosim.world.frame import CHAIN_START, Frame, frame_from_bytes
+from foosim.world.layout import Layout
 
 
 @dataclass(frozen=True, slots=True)

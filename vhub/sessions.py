@@ -6,7 +6,7 @@ world must remember of a client is in `state`.
 
 A hello reserves a name, a Join takes it. A hello may come late, of a process whose end this vHub has not seen: it was
 away, or its news came first. Where that can be, a reservation keeps nobody out: all are welcomed, and the first that
-joins has the name. Neighbours: `core`, `door` (what clients say), `downlinks`.
+joins has the name.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeVar
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.names import nearest_name
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Action, Publish
-from foosim.protocol.closed import CLOSED, closed
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import (
     Build,
     ClientHello,
@@ -32,10 +33,10 @@ from foosim.protocol.messages import (
     Join,
     Sent,
 )
-from foosim.protocol.names import nearest_name
+from foosim.runtime.closed import CLOSED, closed
 from foosim.vhub.downlinks import Downlinks
 from foosim.vhub.members import may_lockstep, may_restart
-from foosim.vhub.memory import Joining
+from foosim.vhub.network.memory import Joining
 from foosim.vhub.state import HubState
 
 T = TypeVar("T")

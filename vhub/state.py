@@ -3,7 +3,7 @@
 Closing tick k has two phases. *World*: what robots sent at k is judged; the clients due get what has reached them.
 *Clients*: what clients sent is judged; the deliveries of tick k+1 are final. Fates know frames, times and draws, never
 nodes. The journal holds the inputs of every closing, so a fold of it through this same class gives the state again,
-byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `records`.
+byte for byte.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from operator import attrgetter
 
 import msgspec
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode_any
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.edits import Disrupt, Edit
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Deliveries, Epoch, Sent
-from foosim.protocol.robot_packets import Delivered, RobotPacket
-from foosim.protocol.sampling import Sampling, are_answered
-from foosim.vhub.ages import Ages
-from foosim.vhub.fabric import Fabric, Link
+from foosim.vhub.in_flight_limit import TRANSIT_FULL, Transit
+from foosim.vhub.links.fabric import Fabric, Link
 from foosim.vhub.members import Here, Member
-from foosim.vhub.memory import Age, Joining, Snapshot
-from foosim.vhub.packet import Flight, Packets, content_of, flight_of, order_of, state_of
-from foosim.vhub.room import Room
-from foosim.vhub.sendings import Sendings
+from foosim.vhub.network.ages import Ages
+from foosim.vhub.network.memory import Age, Joining, Snapshot
+from foosim.vhub.network.packet import Flight, Packets, content_of, flight_of, order_of, state_of
+from foosim.vhub.receive_limit import Room
+from foosim.vhub.send_order import Sendings
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
-from foosim.vhub.transit import TRANSIT_FULL, Transit
+from foosim.world.edits import Disrupt, Edit
+from foosim.world.frame import Frame
+from foosim.world.robot_packets import Delivered, RobotPacket
+from foosim.world.sampling import Sampling, are_answered
 
 OUTBOX_SHIFT = 16
 """A robot's sequence number is tick x 2^16 + index."""

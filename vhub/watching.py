@@ -1,8 +1,7 @@
 """What the vHub keeps for people of links and readings that they look at: the last drops, the last readings.
 
 Nothing is kept of what nobody looks at, and nothing of it is in the state, the journal or the capture: a run is the
-same whoever looks. Neighbours: `core` closes ticks, `report` sends what is kept, `supervisor.viewing` says what is
-looked at, `supervisor.drops_shown` tells of the drops.
+same whoever looks.
 """
 
 from __future__ import annotations
@@ -14,12 +13,12 @@ from typing import Any, Final
 
 import msgspec
 
-from foosim.protocol.json_text import encode_json
+from foosim.common.json_text import encode_json
 from foosim.protocol.messages import Watched
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.vhub.packet import IN_FLIGHT, Flight
+from foosim.vhub.network.packet import IN_FLIGHT, Flight
+from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.vhub.state import HubState
-from foosim.vhub.to_rows import packet_row
+from foosim.world.robot_packets import RobotPacket
 
 DROPS_KEPT: Final = 8
 """Of each link."""

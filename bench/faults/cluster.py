@@ -1,8 +1,7 @@
 """A run of the football table as processes of this one, each of which can be killed, stopped, cut off, started again.
 
 Every process has its fixed command, and dials through a proxy of its own. What ends by itself is started again at once,
-as a service manager would; what was taken down on purpose stays down until it is started. Neighbours: `kinds` has the
-faults, `tests.wire.proxy` the links.
+as a service manager would; what was taken down on purpose stays down until it is started.
 """
 
 from __future__ import annotations
@@ -20,15 +19,15 @@ from typing import Any, Final, Self, TypeVar
 
 import numpy as np
 
+from foosim.capture.reader import open_capture
+from foosim.common.units import parse_pace
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.launcher.processes import Child, Launcher
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.units import parse_pace
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.verify import verify_capture
+from foosim.rehearsal.run import rehearse
+from foosim.replay.verify import verify_capture
+from foosim.runtime.run_folder import RunFolder, open_run, run_exists
 from foosim.supervisor.control import Control, NoAnswer
-from foosim.supervisor.launcher import Child, Launcher
-from foosim.supervisor.run_folder import RunFolder, open_run, run_exists
-from foosim.vhub.capture_reader import open_capture
 from tests.wire.proxy import Proxy, Weather
 
 TABLE: Final = Path(__file__).resolve().parents[2] / "deploy" / "table.yaml"

@@ -1,7 +1,7 @@
 """The digest test under faults: a minute of the table, disturbed all the time, is the minute that would have been.
 
 Its run goes as fast as it can, and every kind of fault comes at least five times in random order; at the end the chain
-of digests is compared with that of an undisturbed rehearsal. Neighbours: `kinds` has the faults, `cluster` compares.
+of digests is compared with that of an undisturbed rehearsal.
 """
 
 from __future__ import annotations

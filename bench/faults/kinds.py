@@ -2,7 +2,7 @@
 
 A new kind is a function and a row. The function gets a running cluster and returns its figures; it raises FaultError
 when something does not hold that must hold however slow the machine is. Figures are in ms unless their name says what
-else they count. Neighbours: `cluster` is what they are done to, `__main__` repeats them.
+else they count.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from bench.faults.cluster import LIMIT_S, Cluster, FaultError
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.supervisor.children import script
+from foosim.runtime.children import script
 from tests.wire.proxy import BOTH, Direction
 
 Figures = dict[str, float]

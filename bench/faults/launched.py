@@ -1,7 +1,4 @@
-"""Faults of a whole run as `foosim-supervisor up` starts it: what its launcher leaves behind, and how it ends.
-
-Neighbours: `kinds` has those of single processes, `__main__` repeats both.
-"""
+"""Faults of a whole run as `foosim-supervisor up` starts it: what its launcher leaves behind, and how it ends."""
 
 from __future__ import annotations
 
@@ -18,10 +15,10 @@ from typing import Final
 
 from bench.faults.cluster import LIMIT_S, POLL_S, TABLE, FaultError
 from bench.faults.kinds import CALM_S, Figures
-from foosim.protocol.errors import Refused
-from foosim.rehearsal.rehearse import rehearse
+from foosim.common.errors import Refused
+from foosim.rehearsal.run import rehearse
+from foosim.runtime.children import script
 from foosim.supervisor import control
-from foosim.supervisor.children import script
 
 END_MS: Final = 5000.0
 GONE_MS: Final = 1000.0

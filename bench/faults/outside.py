@@ -2,7 +2,6 @@
 
 What others do must cost a run nothing but what it counts; the world that comes of it is computed again from its
 capture.
-Neighbours: `kinds` has the faults of processes and links, `__main__` repeats both.
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ from bench.faults.cluster import Cluster, FaultError
 from bench.faults.kinds import Figures, Kind, Trial
 from foosim.client.client import Client, connect
 from foosim.client.errors import ConnectionRefused
-from foosim.protocol import limits
-from foosim.protocol.names import CHANNEL_ECHO, CHANNEL_POSITION
+from foosim.common import limits
+from foosim.common.names import CHANNEL_ECHO, CHANNEL_POSITION
 from foosim.supervisor.control import RequestRefused
 
 CLIENT: Final = "flooder"

@@ -2,7 +2,7 @@
 
 That a thousand seeds find nothing proves something only if they find these. To add one: a function in `node`,
 `supervisor`, `vhub` or `branch` that swaps what has to be swapped, with the rule that it breaks and the seed that finds
-it. Neighbours: `planting` (how they are planted), `bench.gate` (finds the first seed of each), `rehearsal.swarm`.
+it.
 """
 
 from __future__ import annotations

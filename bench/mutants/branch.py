@@ -1,7 +1,4 @@
-"""Bugs of a run that goes on as a branch: what is void counts, or what is not is forgotten.
-
-Neighbours: `planting`.
-"""
+"""Bugs of a run that goes on as a branch: what is void counts, or what is not is forgotten."""
 
 from __future__ import annotations
 

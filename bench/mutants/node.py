@@ -1,7 +1,4 @@
-"""Bugs of nodes, of what they share with their peers, and of clients.
-
-Neighbours: `planting`.
-"""
+"""Bugs of nodes, of what they share with their peers, and of clients."""
 
 from __future__ import annotations
 
@@ -10,15 +7,15 @@ from typing import Any, Final
 
 from bench.mutants.planting import Mutant, Planting, Register
 from foosim.client.core import ClientCore
-from foosim.node import step
+from foosim.node import tick as step
 from foosim.node.core import NodeCore
 from foosim.node.inputs import Inputs
-from foosim.node.sensors import encoder
-from foosim.node.step import Stepper
-from foosim.node.table_world import TableWorld
+from foosim.node.tick import Stepper
 from foosim.protocol import channels
-from foosim.protocol.assign import Assignment
-from foosim.protocol.member import Member
+from foosim.protocol.handshake import Member
+from foosim.world.islands import Assignment
+from foosim.world.scenes.table_world import TableWorld
+from foosim.world.sensors import encoder
 
 register = Register()
 

@@ -1,7 +1,4 @@
-"""How a bug is planted: attributes of classes and modules are swapped for a while and put back.
-
-Neighbours: `node`, `supervisor` and `vhub` have the bugs.
-"""
+"""How a bug is planted: attributes of classes and modules are swapped for a while and put back."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from foosim.rehearsal.swarm import undisturbed
+from foosim.rehearsal.swarm.campaign import undisturbed
 
 
 class Planting:

@@ -1,21 +1,19 @@
-"""Bugs of the supervisor: epochs, orders, commits, requests, and its start after its end.
-
-Neighbours: `planting`.
-"""
+"""Bugs of the supervisor: epochs, orders, commits, requests, and its start after its end."""
 
 from __future__ import annotations
 
 from typing import Any, Final
 
 from bench.mutants.planting import Mutant, Planting, Register
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
-from foosim.supervisor import core, records, take_over
+from foosim.supervisor import core, failover, records
 from foosim.supervisor.arrivals import Arrivals
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.handshake import Handshake
+from foosim.supervisor.node_loss import Recovery
 from foosim.supervisor.pacing import Pacer
-from foosim.supervisor.recovery import Recovery
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 
@@ -181,8 +179,8 @@ def _volatile(planting: Planting) -> None:
         before(core, history)
         core.epoch = 0
 
-    before: Any = planting.swap(take_over, "stand_on", stand_on)
-    planting.swap(take_over.TakeOver, "standing", _standing_without_epoch)
+    before: Any = planting.swap(failover, "stand_on", stand_on)
+    planting.swap(failover.TakeOver, "standing", _standing_without_epoch)
 
 
 def _standing_without_epoch(self: Any, standing: Any, now_ns: int) -> bool:
@@ -263,9 +261,7 @@ def _lost_commit(planting: Planting) -> None:
 
 @register("a loss is told twice", "a commit tells of what is over by it, once", 1)
 def _told_twice(planting: Planting) -> None:
-    before: Any = planting.swap(
-        Recovery, "committed", lambda self, *when: before(self, *when) and self.recovered[-2:]
-    )
+    before: Any = planting.swap(Recovery, "committed", lambda self, *when: before(self, *when) and self.recovered[-2:])
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

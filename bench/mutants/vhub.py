@@ -1,7 +1,4 @@
-"""Bugs of the vHub: closing of ticks, account, deliveries, clients, fold.
-
-Neighbours: `planting`.
-"""
+"""Bugs of the vHub: closing of ticks, account, deliveries, clients, fold."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from foosim.protocol.messages import Deliveries
 from foosim.vhub import core, records, state
 from foosim.vhub.commits import Commits
 from foosim.vhub.core import HubCore
-from foosim.vhub.door import Door
+from foosim.vhub.join import Door
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
 

@@ -1,7 +1,6 @@
 """What becomes of what arrives from a running system: frames as moments, statuses as messages, requests as marks.
 
-Pure. Neighbours: `live_source` (moves the bytes),
-`drawing` (one layout), `links`, `status_marks`, `history`.
+Pure.
 """
 
 from __future__ import annotations
@@ -12,6 +11,8 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
+from foosim.analysis.settings_text import event_text
+from foosim.common.errors import Malformed
 from foosim.console.live.history import History
 from foosim.console.live.status_marks import StatusMarks
 from foosim.console.live.watched import Watched
@@ -19,16 +20,14 @@ from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Links
 from foosim.console.shown.source import About, Curve, Moment, Wanted
 from foosim.console.shown.timeline import NETWORK, Mark, WorldEvents
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.network.rules import Event
+from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame, frame_from_bytes
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit
-from foosim.protocol.network import Event
-from foosim.protocol.start import initial_frame
-from foosim.vhub.settings_text import event_text
+from foosim.world.frame import Frame, frame_from_bytes
+from foosim.world.initial_state import initial_frame
+from foosim.world.layout import build_layout
 
 ASKERS_KEPT: Final = 256
 LINKS_EVERY: Final = 2

@@ -2,7 +2,6 @@
 
 Numbers of frames, values of the status, figures of links and readings that were plotted: of each the last rows, some
 time apart, of at most so many bytes. Nobody is asked for anything because of it: it keeps what is heard anyway. Pure.
-Neighbours: `following` (which hears it), `curves` (the points behind what is kept).
 """
 
 from __future__ import annotations
@@ -17,8 +16,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from foosim.console.shown.curves import link_figure
 from foosim.console.shown.source import FIGURES, Curve, Link, Reading, Wanted
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout
+from foosim.world.frame import Frame
+from foosim.world.layout import Layout
 
 WINDOW_NS: Final = 300_000_000_000
 """How far back is kept at least, simulated time, where there is room."""
@@ -183,9 +182,7 @@ class History:
             return self._statuses.reader(lambda places: places.get(curve.status))
         if curve.link is not None:
             link, figure = curve.link, FIGURES.index(curve.figure)
-            return self._links.reader(
-                lambda places: places[link] * len(FIGURES) + figure if link in places else None
-            )
+            return self._links.reader(lambda places: places[link] * len(FIGURES) + figure if link in places else None)
         rows = None if curve.reading is None else self._readings.get(curve.reading)
         return list if rows is None else rows.reader(lambda reading: curve.index)
 

@@ -4,7 +4,6 @@ Looking on costs the run what its leases say: they are renewed only while a brow
 asked for each second. A supervisor that dies is looked for again under the run's name, and what was seen stays in sight
 meanwhile; of a run that has ended pages are told how. Asking waits in threads, one connection each, so that nobody
 waits for another's answer.
-Neighbours: `following` (what becomes of what arrives), `presence`, `supervisor.control`.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, Final, TypeVar
 
+from foosim.common.errors import BadValue, Refused
 from foosim.console.live.following import Following, World
 from foosim.console.live.presence import HERE, away
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
-from foosim.protocol.errors import BadValue, Refused
-from foosim.protocol.inbox import Inbox, Item
+from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.supervisor.control import Control, NoAnswer, RequestRefused
 
 VERBS: Final = (

@@ -1,7 +1,6 @@
 """Whether a run is there, as pages say it: here, away (its supervisor is looked for), or ended, how, with its capture.
 
-How it ended is in its folder, where its supervisor writes the result and `up` what it knows better. Neighbours:
-`live_source` tells it, `supervisor.outcome` has the result with the capture.
+How it ended is in its folder, where its supervisor writes the result and `up` what it knows better.
 """
 
 from __future__ import annotations
@@ -10,9 +9,9 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from foosim.supervisor.outcome import ended_outcome
-from foosim.supervisor.run_folder import RunFolder
-from foosim.vhub.capture_parts import is_complete
+from foosim.capture.parts import is_complete
+from foosim.launcher.outcome import ended_outcome
+from foosim.runtime.run_folder import RunFolder
 
 HERE = {"type": "presence", "state": "here", "text": ""}
 

@@ -1,6 +1,6 @@
 """What is marked on the time line of a running system out of its statuses: losses and returns, requests.
 
-Pure. Neighbours: `following` feeds it, `supervisor.display` has the words, `timeline` reads frames.
+Pure.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from foosim.supervisor.display import recovery_text
+from foosim.launcher.display import recovery_text
 
 
 class StatusMarks:

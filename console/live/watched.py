@@ -1,8 +1,6 @@
 """What people watch closely: the last drops of a link, explained, and a sensor's readings, as the vHub reports them.
 
 Pure; explaining takes milliseconds a packet, so it is done where it holds up nobody, and once for each packet.
-Neighbours: `following` (feeds it with statuses), `vhub.watching` (what is reported),
-`supervisor.drops_shown`.
 """
 
 from __future__ import annotations
@@ -11,14 +9,14 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from foosim.analysis.drops_shown import Reported, explain_drops
+from foosim.analysis.explain import Explained
+from foosim.capture.rows import PacketRow
+from foosim.common.errors import Refused
 from foosim.console.shown.rule_text import RuleTexts
 from foosim.console.shown.source import Link
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Refused
-from foosim.protocol.frame import Frame
-from foosim.supervisor.drops_shown import Reported, explain_drops
-from foosim.vhub.explain import Explained
-from foosim.vhub.rows import PacketRow
+from foosim.deployment.schema import Deployment
+from foosim.world.frame import Frame
 
 FRAMES_KEPT: Final = 64
 """Frames that were shown, for what stood between the ends of a packet that was dropped."""

@@ -1,7 +1,4 @@
-"""The command that begins a run with the frame that is seen: what `foosim-supervisor up --from` accepts.
-
-Neighbours: `vhub.branching` reads it, `capture_source` answers with it.
-"""
+"""The command that begins a run with the frame that is seen: what `foosim-supervisor up --from` accepts."""
 
 from __future__ import annotations
 
@@ -9,12 +6,12 @@ import os
 import shlex
 from pathlib import Path
 
+from foosim.capture.rows import FRAME
+from foosim.common.errors import BadValue, Refused
+from foosim.common.units import format_ns
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.source import Answered
-from foosim.protocol.deployment_file import load_deployment, read_deployment_text
-from foosim.protocol.errors import BadValue, Refused
-from foosim.protocol.units import format_ns
-from foosim.vhub.rows import FRAME
+from foosim.deployment.loader import load_deployment, read_deployment_text
 
 
 def branch_answer(recording: Recording, tick: int) -> Answered:

@@ -1,7 +1,4 @@
-"""Curves over a captured run: numbers of frames, figures of links, values of the status, readings of sensors.
-
-Neighbours: `capture_history` (whose thread this runs in), `curves` (names and units, and how a path is followed).
-"""
+"""Curves over a captured run: numbers of frames, figures of links, values of the status, readings of sensors."""
 
 from __future__ import annotations
 
@@ -9,15 +6,15 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from typing import Any, Final
 
-from foosim.client.payloads import decode_payload
+from foosim.capture.rows import FRAME, PACKETS
+from foosim.common.errors import Malformed, UnknownName
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.capture_status import status_at
 from foosim.console.recorded.link_history import PACKET_MARKS
 from foosim.console.shown.curves import link_figure, value_at
 from foosim.console.shown.source import Curve
-from foosim.protocol.channel_kinds import channel_kind
-from foosim.protocol.errors import Malformed, UnknownName
-from foosim.vhub.rows import FRAME, PACKETS
+from foosim.deployment.channel_kinds import channel_kind
+from foosim.world.payloads import decode_payload
 
 POINTS: Final = 600
 STATUS_POINTS: Final = 200

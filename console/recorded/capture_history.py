@@ -2,7 +2,6 @@
 
 The rows are read topic by topic, the few ones first; of a capture that grows, from where the last pass ended. All of it
 belongs to one thread, and so does the `Recording` that it reads. Pure: the caller says how much a slice is.
-Neighbours: `timeline` (marks), `link_history` (windows), `capture_source` (runs it in a thread of its own).
 """
 
 from __future__ import annotations
@@ -10,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from foosim.analysis.explain import Explained, explain_row, network_events
+from foosim.capture.reader import TICK_MARKS
+from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, PACKETS, RECOVERIES, TICK, ClientRow, PacketRow
 from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.rule_text import RuleTexts
 from foosim.console.shown.timeline import Mark, Timeline
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame
-from foosim.vhub.capture_reader import TICK_MARKS
-from foosim.vhub.explain import Explained, explain_row, network_events
-from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, PACKETS, RECOVERIES, TICK, ClientRow, PacketRow
+from foosim.deployment.schema import Deployment
+from foosim.world.frame import Frame
 
 SLICE_ROWS: Final = 500
 TOLD_MAX: Final = 1024

@@ -3,7 +3,7 @@
 The index is made of the heads of chunks and their message indexes: no chunk is unpacked for it, but the last of a file
 that was cut within its indexes. A capture that is still being written is looked at again and again (`refresh`), from
 where the last look ended; its files may become more (`capture.split_time`). Unpacked chunks are kept while there is
-room. Neighbours: `vhub.mcap_file` (the container), `vhub.capture_parts` (which files are one capture), `recording`.
+room.
 """
 
 from __future__ import annotations
@@ -25,9 +25,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from foosim.vhub.capture_parts import files_from
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.mcap_file import (
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.mcap.format import (
     CHUNK_BYTES_MAX,
     CHUNK_FIELDS,
     INDEX_FIELDS,
@@ -38,6 +37,7 @@ from foosim.vhub.mcap_file import (
     chunk_records,
     unpack_chunk,
 )
+from foosim.capture.parts import files_from
 
 CACHE_BYTES: Final = 64 * 1024 * 1024
 """Of unpacked chunks that are kept; the one that is read last always is."""

@@ -2,7 +2,6 @@
 
 Two threads read: one what is seen, so that the slider does not wait, one what happened, in slices. Each has the capture
 open by itself. A capture that is still being written is looked at again every second.
-Neighbours: `recording` (the world at a tick), `capture_history` (what happened), `deck` (where one is), `branching`.
 """
 
 from __future__ import annotations
@@ -15,24 +14,24 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.reader import CapturedTick
+from foosim.capture.rows import CLIENTS, PACKETS
+from foosim.common.errors import Refused
+from foosim.console.clock.comparing import Compare, compared
+from foosim.console.clock.deck import ARGUMENTS, VERBS, Clock, Deck, checked
+from foosim.console.clock.playhead import Playhead
 from foosim.console.recorded.branch_text import branch_answer
 from foosim.console.recorded.capture_curves import curve_points, reading_points
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.capture_status import status_at
-from foosim.console.recorded.comparing import Compare, compared
-from foosim.console.recorded.deck import ARGUMENTS, VERBS, Clock, Deck, checked
-from foosim.console.recorded.playhead import Playhead
 from foosim.console.recorded.recording import Look, Recording
 from foosim.console.recorded.whereabouts import Whereabouts
 from foosim.console.shown.compare import Where
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.links import Links, lost_where
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
-from foosim.protocol.errors import Refused
-from foosim.protocol.frame import Frame
-from foosim.vhub.capture_reader import CapturedTick
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.rows import CLIENTS, PACKETS
+from foosim.world.frame import Frame
 
 T = TypeVar("T")
 Recompute = Callable[[Frame, Iterable[CapturedTick]], Frame | None]

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from foosim.common.names import TEAMS
 from foosim.console.recorded.recording import Look, Recording
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import BALL
-from foosim.protocol.names import TEAMS
+from foosim.world.frame import Frame
+from foosim.world.layout import BALL
 
 
 def status_at(recording: Recording, account: Mapping[str, Any], tick: int, look: Look | None) -> dict[str, Any]:

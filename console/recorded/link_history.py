@@ -16,10 +16,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.protocol.message_types import Counter as Number
-from foosim.vhub.fabric import link_name
-from foosim.vhub.packet import DELIVERED, DROPPED
-from foosim.vhub.rows import CounterOrNone, Fate
+from foosim.capture.rows import CounterOrNone, Fate
+from foosim.common.struct_types import Counter as Number
+from foosim.vhub.links.fabric import link_name
+from foosim.vhub.network.packet import DELIVERED, DROPPED
 
 LINKS_MAX: Final = 4096
 """Links that are told apart; packets of further ones are counted in `others`."""

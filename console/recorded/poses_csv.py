@@ -12,7 +12,7 @@ with `#` are passed by. What `foosim-replay export CAPTURE --what poses` writes 
 | `yaw` or `yaw_deg`, in their place | turn about the vertical axis, counter-clockwise from x | rad, or degrees |
 
 Without an orientation all are upright. Further columns are passed by. Times of one entity ascend. Pure: the caller
-gives the lines. Neighbours: `tracks`, `poses_source`.
+gives the lines.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from typing import Final
 
 import numpy as np
 
+from foosim.common.errors import Refused, describe
+from foosim.common.names import nearest_name
 from foosim.console.shown.tracks import Track
-from foosim.protocol.errors import Refused, describe
-from foosim.protocol.names import nearest_name
 
 TIMES: Final = {"time": 10**9, "time_s": 10**9, "time_ms": 10**6, "time_us": 10**3, "time_ns": 1}
 """ns in the unit of each."""

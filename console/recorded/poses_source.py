@@ -1,7 +1,6 @@
 """Recorded poses as a source of the page: a recorded reality, beside or as a ghost in what a capture has.
 
 What has the name of a link or an entity of the other source is drawn as that; all else is a small ball.
-Neighbours: `poses_csv` (the table), `tracks` (what is known between its lines), `deck`, `comparing`.
 """
 
 from __future__ import annotations
@@ -14,16 +13,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from foosim.console.recorded.comparing import Compare, compared
-from foosim.console.recorded.deck import VERBS, Clock, Deck
-from foosim.console.recorded.playhead import Playhead
+from foosim.console.clock.comparing import Compare, compared
+from foosim.console.clock.deck import VERBS, Clock, Deck
+from foosim.console.clock.playhead import Playhead
 from foosim.console.recorded.poses_csv import BadPoses, read_tracks
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, NotAsked, Wanted
 from foosim.console.shown.tracks import Pose, Track
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.layout import build_layout
-from foosim.protocol.scenes import build_scene
+from foosim.deployment.schema import Deployment
+from foosim.world.layout import build_layout
+from foosim.world.scenes.build import build_scene
 
 TICK_NS: Final = 1_000_000
 """Of a table that is looked at by itself."""

@@ -1,8 +1,7 @@
 """A capture as something to look at: the world at any tick, as exactly as the capture has it.
 
 At a tick there may be a captured frame, which is the world to the last bit, or captured poses alone; else what was
-captured last before it holds. `Look.kind` says which. Neighbours: `capture_index` (where rows stand), `capture_source`
-(shows it), `capture_history` (what happened).
+captured last before it holds. `Look.kind` says which.
 """
 
 from __future__ import annotations
@@ -18,25 +17,18 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.capture.columns import frames_of
+from foosim.capture.foxglove import POSES
+from foosim.capture.foxglove_reader import read_poses
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.mcap.format import Message
+from foosim.capture.reader import DECODERS, CapturedTick, captured_tick, deployment_of, layout_of, read_about
+from foosim.capture.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
 from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.shown.drawing import Drawing
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout
-from foosim.vhub.capture_columns import frames_of
-from foosim.vhub.capture_reader import (
-    DECODERS,
-    CapturedTick,
-    captured_tick,
-    deployment_of,
-    layout_of,
-    read_about,
-)
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
-from foosim.vhub.transforms import read_poses
-from foosim.vhub.viewing import POSES
+from foosim.deployment.schema import Deployment
+from foosim.world.frame import Frame
+from foosim.world.layout import Layout
 
 TOPICS: Final = (EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, POSES)
 Kind = Literal["frame", "poses", "computed", "held"]

@@ -2,7 +2,6 @@
 
 Its connection belongs to a thread, which hears and asks; what it hears is told in the event loop. Poses come with names
 of links, so the scene is that of the captured deployment with what these names say was added.
-Neighbours: `client.replay` (the connection), `drawing`, `deck` (the same requests, of a file).
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from foosim.client.replay import Replay, ReplayedLine, ReplayedPoses, ReplayedRow, ReplayGone, ReplayTime
-from foosim.console.recorded.deck import Known, checked, needed
+from foosim.client.replay_listener import Replay, ReplayedLine, ReplayedPoses, ReplayedRow, ReplayGone, ReplayTime
+from foosim.common.errors import Malformed, Refused
+from foosim.console.clock.deck import Known, checked, needed
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Malformed, Refused
-from foosim.protocol.layout import ADDABLE, build_layout
+from foosim.deployment.schema import Deployment
+from foosim.world.layout import ADDABLE, build_layout
 
 ARGUMENTS: Final[Known] = {
     "play": {},

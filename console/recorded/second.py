@@ -1,8 +1,4 @@
-"""What follows a first source: another capture or a table of poses, on its clock, with the distance to it.
-
-Neighbours: `leading` (a first source with a clock of its own), `capture_source`, `poses_source`; `console.main` and
-`rehearsal.view_command` open it.
-"""
+"""What follows a first source: another capture or a table of poses, on its clock, with the distance to it."""
 
 from __future__ import annotations
 
@@ -12,14 +8,14 @@ from typing import Annotated, Final
 
 import typer
 
+from foosim.common.errors import BadValue, read_at, show
+from foosim.common.units import parse_offset_ns
+from foosim.console.clock.leading import Leader
 from foosim.console.recorded.capture_source import FileSource, Recompute
-from foosim.console.recorded.leading import Leader
 from foosim.console.recorded.poses_source import PosesSource
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import BadValue, read_at, show
-from foosim.protocol.layout import build_layout
-from foosim.protocol.scenes import build_scene
-from foosim.protocol.units import parse_offset_ns
+from foosim.deployment.schema import Deployment
+from foosim.world.layout import build_layout
+from foosim.world.scenes.build import build_scene
 
 SecondOption = Annotated[
     Path | None,

@@ -1,7 +1,7 @@
 """Where the entities of a capture are at any time, also between what it has: for a comparison with another source.
 
 What was captured at the time itself is taken as it is; between two captured moments that are close a position is
-interpolated, but not over a jump. Neighbours: `recording`, `tracks` (how), `compare`.
+interpolated, but not over a jump.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """What the console knows: what each source has last told, who looks at what, and who gets what of it.
 
 A browser that joins is told the sources, their scenes, the last moment and the last of each message, so that it draws
-at once. Pure: time is given by `clock`, bytes leave through each reader's outbox. Neighbours: `source` (tells it),
-`reader`, `page_messages` (what pages say), `server` (moves the bytes).
+at once. Pure: time is given by `clock`, bytes leave through each reader's outbox.
 """
 
 from __future__ import annotations
@@ -11,12 +10,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final, Protocol
 
+from foosim.common.errors import Malformed
+from foosim.common.json_text import encode_json
 from foosim.console.server.page_messages import Plot, Show, Watch
 from foosim.console.server.reader import Follows, Reader, Shown, TooSlow
 from foosim.console.shown.curves import points_of
 from foosim.console.shown.source import About, Curve, Link, Moment, Source, Wanted
-from foosim.protocol.errors import Malformed
-from foosim.protocol.json_text import encode_json
 
 MARKS_MAX: Final = 4096
 """Of one source: the last so many."""

@@ -1,6 +1,6 @@
 """What is served beside the WebSocket: the page's files, held in memory, and what a browser is told to allow them.
 
-Nothing outside of this list is served, whatever the path says. Neighbours: `server`, the folder `www`.
+Nothing outside of this list is served, whatever the path says.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What a page says to the console: JSON, checked whole, bounded.
 
-What is not one of these ends the connection with a reason. Neighbours: `board` (acts on them), `server` (reads them).
+What is not one of these ends the connection with a reason.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from typing import Annotated, Any, Final, Literal
 import msgspec
 from msgspec import Meta
 
+from foosim.common.errors import Malformed
 from foosim.console.shown.source import Curve
-from foosim.protocol.errors import Malformed
 
 MESSAGE_BYTES_MAX: Final = 64 * 1024
 CURVES_MAX: Final = 64

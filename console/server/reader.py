@@ -2,7 +2,7 @@
 
 Of what is replaced by something newer (moments, status, figures of links) only the newest waits: a browser that reads
 slowly, or not at all, costs no more than one message of each kind. Answers, marks and notes wait in their order; who
-has let too many of them wait is cut off. Pure: `server` moves the bytes. Neighbours: `board` (fills it), `poses`.
+has let too many of them wait is cut off. Pure: `server` moves the bytes.
 """
 
 from __future__ import annotations

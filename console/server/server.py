@@ -1,8 +1,7 @@
 """The console's server: the page's files over HTTP, and a WebSocket for each browser, in one event loop.
 
 A browser has to come from this page (Origin), to know a token (first message), to keep to the messages of a page, and
-is one of so many; who does not is told why and cut off, and nobody else notices. Neighbours: `board` (what is told to
-whom), `reader` (the outbox that each connection empties), `page_files`, `main`.
+is one of so many; who does not is told why and cut off, and nobody else notices.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
+from foosim.common.errors import Malformed, Refused
+from foosim.common.json_text import encode_json
 from foosim.console.server.board import Board, Onlooker
 from foosim.console.server.page_files import HEADERS, page_files
 from foosim.console.server.page_messages import MESSAGE_BYTES_MAX, Ask, Hello, read_message
 from foosim.console.server.reader import Reader, Role, TooSlow
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import Answered, Curve, NotAsked, Source
-from foosim.protocol.errors import Malformed, Refused
-from foosim.protocol.json_text import encode_json
 
 READERS_MAX: Final = 64
 """Browsers at once."""

@@ -1,7 +1,7 @@
 """Serves sources until the process is told to end: what `foosim-console` and `foosim-replay view` have in common.
 
 By default only this machine reaches the page. Another address takes a certificate, which browsers have to trust: a
-token that travels in the open is known to everybody on the way. Neighbours: `server`, `main`.
+token that travels in the open is known to everybody on the way.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from foosim.common.addresses import LOOPBACK, Address, Insecure, parse_address
+from foosim.common.errors import BadValue, Failed
+from foosim.common.json_text import encode_json
 from foosim.console.server.board import Onlooker
 from foosim.console.server.server import ConsoleServer, Tokens, new_tokens
 from foosim.console.shown.source import Source
-from foosim.protocol.addresses import LOOPBACK, Address, Insecure, parse_address
-from foosim.protocol.errors import BadValue, Failed
-from foosim.protocol.json_text import encode_json
-from foosim.protocol.process import Stop
+from foosim.runtime.process import Stop
 
 MakeSources = Callable[[], tuple[Sequence[Source], Sequence[Onlooker]]]
 """Makes sources, and who looks at all of them; called in the event loop."""

@@ -1,14 +1,11 @@
-"""What people asked of a run's world, in words: balls and robots that were added, removed, pushed, moved.
-
-Neighbours: `timeline` marks it, `rehearsal.report` lists it among the events.
-"""
+"""What people asked of a run's world, in words: balls and robots that were added, removed, pushed, moved."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from foosim.vhub.rows import EditRow, EpochRow
+from foosim.capture.rows import EditRow, EpochRow
 
 
 def edit_text(edit: EditRow) -> str:

@@ -1,7 +1,4 @@
-"""The points of plotted curves that are not numbers of the frame: figures of links, values of the status, readings.
-
-Neighbours: `board` (sends them), `source.Curve`.
-"""
+"""The points of plotted curves that are not numbers of the frame: figures of links, values of the status, readings."""
 
 from __future__ import annotations
 

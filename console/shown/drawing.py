@@ -1,6 +1,6 @@
 """The frames of one layout as what pages draw: scene, moments, overlays, links with their ends and walls.
 
-Every source whose world is a deployment's uses it. Neighbours: `scene_json`, `poses`, `overlays`.
+Every source whose world is a deployment's uses it.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from foosim.console.shown.overlays import Overlays
 from foosim.console.shown.poses import Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import Moment
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout
-from foosim.protocol.scenes import build_scene
+from foosim.deployment.schema import Deployment
+from foosim.world.frame import Frame
+from foosim.world.layout import Layout
+from foosim.world.scenes.build import build_scene
 
 
 class Drawing:

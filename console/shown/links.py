@@ -2,8 +2,7 @@
 between.
 
 The vHub counts from the start; a window is the difference of two counts, of which the older one is at most so many
-seconds of simulated time old. Pure. Neighbours: `live_source` feeds it, `vhub.world` (antennas and lines of
-sight), `vhub.profiles` (which links go by radio).
+seconds of simulated time old. Pure.
 """
 
 from __future__ import annotations
@@ -16,12 +15,12 @@ from itertools import islice
 from math import dist
 from typing import Any, Final
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.scene import ORIGIN, Scene, Vector
-from foosim.vhub.fabric import name_of
-from foosim.vhub.profiles import Profiles
-from foosim.vhub.world import World
+from foosim.deployment.schema import Deployment
+from foosim.vhub.line_of_sight.placement import World
+from foosim.vhub.links.fabric import name_of
+from foosim.vhub.network.link_settings import Profiles
+from foosim.world.frame import Frame
+from foosim.world.scene import ORIGIN, Scene, Vector
 
 WINDOW_S: Final = 5.0
 SIGHTS_MAX: Final = 48

@@ -1,7 +1,4 @@
-"""What is drawn over a world on request: contacts, and what proximity sensors see.
-
-Neighbours: `drawing` (asks for it), `node.sensors.proximity` (the one way rays are cast).
-"""
+"""What is drawn over a world on request: contacts, and what proximity sensors see."""
 
 from __future__ import annotations
 
@@ -10,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from foosim.node.sensors.fitting import Fitting
-from foosim.node.sensors.proximity import Proximity, ways_of
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout
-from foosim.protocol.rovers import ProximitySensor, RoverRobot
+from foosim.deployment.schema import Deployment
+from foosim.world.frame import Frame
+from foosim.world.layout import Layout
+from foosim.world.robots.rover import ProximitySensor, RoverRobot
+from foosim.world.sensors.fitting import Fitting
+from foosim.world.sensors.proximity import Proximity, ways_of
 
 
 class Overlays:

@@ -2,7 +2,7 @@
 
 The poses are those of `protocol.scene.forward_kinematics`. A link that stands on the world by nothing but fixed
 joints, or by one free joint, needs no arithmetic: its pose is constant, or seven numbers of the frame, which are taken
-for all such links at once. Neighbours: `scene_json` (the order of links), `reader` (sends it), `source.Moment`.
+for all such links at once.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.console.shown.source import Moment
-from foosim.protocol.kinematics import forward_kinematics
-from foosim.protocol.layout import Entity, Layout
-from foosim.protocol.scene import Body, Scene
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import Entity, Layout
+from foosim.world.scene import Body, Scene
 
 POSES_KIND: Final = 1
 HEAD: Final = struct.Struct("<BBBBIdII")

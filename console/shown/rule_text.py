@@ -1,7 +1,5 @@
 """The rule of a link as people read it: whose packets it is for, what it says, over which radio, what events of the
 network have made of it at a time, and what that amounts to.
-
-Neighbours: `vhub.settings_text` (settings in words), `vhub.events` (what events do), `vhub.lint` (what it amounts to).
 """
 
 from __future__ import annotations
@@ -11,14 +9,14 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Refused
-from foosim.protocol.network import LinkRule, event_of
-from foosim.vhub.events import FOREVER_NS, Cut, Hold, Settings, Timeline
-from foosim.vhub.lint import Use, meaning_of
-from foosim.vhub.lint_text import meaning_line
-from foosim.vhub.profiles import NO_RADIO, ON_BOARD, Profile, Profiles, over
-from foosim.vhub.settings_text import impairments_text, radio_text, rule_ends
+from foosim.analysis.settings_text import impairments_text, radio_text, rule_ends
+from foosim.common.errors import Refused
+from foosim.deployment.network.rules import LinkRule, event_of
+from foosim.deployment.schema import Deployment
+from foosim.vhub.links.summary import Use, meaning_of
+from foosim.vhub.links.summary_text import meaning_line
+from foosim.vhub.network.link_settings import NO_RADIO, ON_BOARD, Profile, Profiles, over
+from foosim.vhub.network.timeline import FOREVER_NS, Cut, Hold, Settings, Timeline
 
 TEXTS_KEPT: Final = 256
 

@@ -1,7 +1,5 @@
 """A world as a page draws it, in JSON, said once for each layout: links with their shapes, scenery, bodies, what can be
 plotted and added.
-
-Neighbours: `protocol.scene` (what a scene is), `poses` (where its links are, in the same order), `board` (sends it).
 """
 
 from __future__ import annotations
@@ -12,13 +10,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from foosim.client.payloads import COMMANDS
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.layout import ADDABLE, BALL, Layout
-from foosim.protocol.mesh import Mesh
-from foosim.protocol.scene import Box, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
-from foosim.protocol.start import kickoff_spot
-from foosim.protocol.world_spec import Sensor
+from foosim.deployment.schema import Deployment
+from foosim.world.initial_state import kickoff_spot
+from foosim.world.layout import ADDABLE, BALL, Layout
+from foosim.world.mesh import Mesh
+from foosim.world.payloads import COMMANDS
+from foosim.world.scene import Box, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
+from foosim.world.spec import Sensor
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "position": ("m",),

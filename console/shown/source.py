@@ -3,7 +3,7 @@
 A `Source` runs inside the console's event loop and tells a `Feed` of its world: which scene it has, what there is to
 see at a moment, and messages in the form that pages read (docs/console.md lists them). It knows no browser; what all
 browsers together look at it is told by `want`. Whatever takes longer than a millisecond or waits goes into a thread of
-its own. Neighbours: `board` (the feed), `scene_json`, `poses`, `live.live_source`.
+its own.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, Final, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.protocol.errors import Refused
+from foosim.common.errors import Refused
 
 Kind = Literal["live", "capture", "replay", "poses"]
 Link = tuple[str, str]

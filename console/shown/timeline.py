@@ -1,8 +1,7 @@
 """What happened in a run, as marks on its time line: what the world's rules did, what was asked for, who was lost.
 
 The rules leave their memory in frames, so their events are read from these, to the tick, also where only every tenth
-frame is there. Pure, and bounded whatever the length of the run. Neighbours: `capture_history` feeds it, `asked`
-(what people asked for, in words), `node.rules` (whose memory it reads).
+frame is there. Pure, and bounded whatever the length of the run.
 """
 
 from __future__ import annotations
@@ -14,16 +13,16 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from foosim.analysis.settings_text import event_text
+from foosim.capture.rows import EditRow, EpochRow, RecoveryRow
+from foosim.common.errors import Refused
+from foosim.common.names import TEAMS
 from foosim.console.shown.asked import edit_text, moves
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Refused
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import WORLD, Entity
-from foosim.protocol.names import TEAMS
-from foosim.protocol.network import event_of
-from foosim.protocol.start import kickoff_ticks
-from foosim.vhub.rows import EditRow, EpochRow, RecoveryRow
-from foosim.vhub.settings_text import event_text
+from foosim.deployment.network.rules import event_of
+from foosim.deployment.schema import Deployment
+from foosim.world.frame import Frame
+from foosim.world.initial_state import kickoff_ticks
+from foosim.world.layout import WORLD, Entity
 
 MARKS_MAX: Final = 400
 """Marks of one kind; those that come later are counted."""

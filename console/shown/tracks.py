@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.protocol.scene import Quaternion, Vector
+from foosim.world.scene import Quaternion, Vector
 
 GAP_NS: Final = 1_000_000_000
 """Samples that are further apart are not connected."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Generator, Mapping
 from typing import Final
 
+from foosim.deployment.schema import Deployment
 from foosim.node.engines.interface import Engine, EngineFactory
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.layout import Layout
+from foosim.world.layout import Layout
 
 
 def _bullet(deployment: Deployment, layout: Layout) -> Engine:
@@ -21,7 +21,7 @@ def _bullet(deployment: Deployment, layout: Layout) -> Engine:
 
 
 def _pure(deployment: Deployment, layout: Layout) -> Engine:
-    from foosim.node.engines.pure import PureEngine
+    from foosim.node.engines.analytic import PureEngine
 
     return PureEngine(deployment, layout)
 
@@ -32,7 +32,7 @@ ENGINES: Final[Mapping[str, EngineFactory]] = {"bullet": _bullet, "pure": _pure}
 def make_engine(deployment: Deployment, layout: Layout) -> Engine:
     """Return the engine of a deployment's world, built at once; rovers have their own, whichever is named."""
     if deployment.is_hall:
-        from foosim.node.engines.rovers import RoverEngine
+        from foosim.node.engines.planar import RoverEngine
 
         return RoverEngine(deployment, layout)
     return ENGINES[deployment.engine](deployment, layout)

@@ -3,8 +3,7 @@
 Bullet keeps more than positions and velocities: contact points of pairs, search axes, orders of pairs and islands. The
 rules below each undo one of these memories; tests/laws/test_engine_partition.py breaks each in turn and sees law 1
 fail, for which the small methods (`_settings`, `_build_order`, `_make_ball`, `_make_scenery`, `_end_pairs`) are there.
-This is the only file that imports pybullet. Neighbours: `interface` (what an engine does), `protocol.scene` (what is
-built).
+This is the only file that imports pybullet.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from collections.abc import Generator, Iterator, Sequence
 from math import fsum, sqrt
 from typing import Any, Final
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.layout import Entity, Layout
-from foosim.protocol.mesh import Mesh
-from foosim.protocol.quiet import without_lines
-from foosim.protocol.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector, in_pieces
-from foosim.protocol.scenes import build_scene
+from foosim.deployment.schema import Deployment
+from foosim.node.engines.quiet import without_lines
+from foosim.world.layout import Entity, Layout
+from foosim.world.mesh import Mesh
+from foosim.world.scene import UPRIGHT, Body, Box, Cylinder, Shape, Sphere, Vector, in_pieces
+from foosim.world.scenes.build import build_scene
 
 with without_lines(b"pybullet build time:"):
     import pybullet as p

@@ -2,7 +2,7 @@
 
 An engine holds the bodies of one layout and the scenery, and remembers nothing that matters: every tick starts with a
 complete load of what is solved, from the frame. What is not loaded is parked, out of everybody's way. A change of
-layout builds another engine. Neighbours: `bullet` and `pure` are the two engines; `node.solver` calls them in order.
+layout builds another engine.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.layout import Entity, Layout
+from foosim.deployment.schema import Deployment
+from foosim.world.layout import Entity, Layout
 
 
 class Engine(Protocol):

@@ -13,14 +13,13 @@ from hypothesis import strategies as st
 from foosim.client.core import AGAIN_NS, NEVER_NS, ClientCore
 from foosim.client.errors import PacketError
 from foosim.client.packets import Outgoing
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import UnknownName
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
 from foosim.protocol.channels import CLIENT_READS, Plane
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import UnknownName
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import (
     Build,
     ClientRefusal,
@@ -37,9 +36,11 @@ from foosim.protocol.messages import (
     Samples,
     Up,
 )
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.start import initial_numbers
 from foosim.vhub.core import HubCore
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import RobotPacket
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NAME = TABLE.name

@@ -13,15 +13,14 @@ import typer
 
 from foosim.client import main as client_main
 from foosim.client.core import ClientCore
-from foosim.client.crew import Crew
 from foosim.client.errors import PlayerError
 from foosim.client.player import Commands, Samples
+from foosim.client.process_group import Crew
+from foosim.deployment.loader import apply_sets
+from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.command import DONE, FAILED, REFUSED
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets
 from foosim.protocol.messages import (
     ClientHello,
     ClientRefusal,
@@ -33,7 +32,8 @@ from foosim.protocol.messages import (
     Join,
     Subscription,
 )
-from foosim.protocol.process import STACK_SIGNAL
+from foosim.runtime.command import DONE, FAILED, REFUSED
+from foosim.runtime.process import STACK_SIGNAL
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from foosim.cli.rehearse import app
+from foosim.cli.replay import app as replay_app
 from foosim.client.failing import failed
-from foosim.rehearsal.rehearse_command import app
-from foosim.rehearsal.replay_command import app as replay_app
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-SOURCE = '''
+SOURCE = """
 import json
 import sys
 
@@ -45,7 +45,7 @@ class Unmade:
 
     def act(self, tick, samples):
         return {}
-'''
+"""
 LINES = SOURCE.splitlines()
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from foosim.client.errors import PlayerError
 from foosim.client.main import Fleet, run_players
-from foosim.protocol.command import DONE, FAILED, REFUSED
-from foosim.protocol.errors import BadValue
+from foosim.common.errors import BadValue
+from foosim.runtime.command import DONE, FAILED, REFUSED
 
 
 class Plays:

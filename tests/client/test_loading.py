@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from foosim.cli.rehearse import app
 from foosim.client.class_check import class_faults
 from foosim.client.errors import PlayerError
 from foosim.client.loading import load_player
-from foosim.client.players import Team
-from foosim.protocol.errors import DeploymentError
-from foosim.rehearsal.rehearse_command import app
+from foosim.common.errors import DeploymentError
+from foosim.players.football import Team
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 OWN = """
@@ -71,7 +71,10 @@ CASES = [
     ("own_playr:Acts", "there is no module own_playr (is the folder that it is in on PYTHONPATH?),"
      " nearest is 'own_player:Acts'"),
     ("own_player.acts:Acts", "there is no module own_player.acts (own_player is a module, not a package)"),
-    ("foosim.client.plyers:Team", "there is no module foosim.client.plyers, nearest is 'foosim.client.players:Team'"),
+    ("foosim.players.footbal:Team",
+     "there is no module foosim.players.footbal, nearest is 'foosim.players.football:Team'"),
+    ("foosim.client.patrol:Patrol", "the module has moved to foosim.players.warehouse_rover,"
+     " nearest is 'foosim.players.warehouse_rover:Patrol'"),
     ("own_importer:Acts", "importing own_importer failed: ModuleNotFoundError: No module named 'own_missing'"
      " (FOLDER/own_importer.py:1: import own_missing)"),
     ("own_broken:Acts",
@@ -99,7 +102,7 @@ def test_a_class_that_cannot_be_loaded_says_why(modules: Path, path: str, text: 
 
 @pytest.mark.usefixtures("modules")
 def test_a_class_is_found_by_its_path() -> None:
-    assert load_player("foosim.client.players:Team") is Team
+    assert load_player("foosim.players.football:Team") is Team
     assert load_player("own_player:Acts").__name__ == "Acts"
 
 
@@ -110,14 +113,14 @@ def test_whatever_a_module_does_when_it_is_imported_stays_in_the_process_that_tr
     modules: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     paths = ("own_crash:A", "own_exit:A", "own_leaver:A", "own_player:Acts", "own_player:Atcs", "own_player:Sits")
-    faults = class_faults((*paths, "foosim.client.players:Team", "foosim.client.players:Teem"), 60.0)
+    faults = class_faults((*paths, "foosim.players.football:Team", "foosim.players.football:Teem"), 60.0)
     assert {path: fault.problem.partition(" (")[0] for path, fault in faults.items()} == {
         "own_crash:A": "importing it ends the interpreter with SIGSEGV",
         "own_exit:A": "importing it ends the interpreter, code 3",
         "own_leaver:A": "importing own_leaver failed: SystemExit: 0",
         "own_player:Atcs": "there is no class Atcs in own_player",
         "own_player:Sits": "Sits is no class with a method act(tick, samples)",
-        "foosim.client.players:Teem": "there is no class Teem in foosim.client.players",
+        "foosim.players.football:Teem": "there is no class Teem in foosim.players.football",
     }
     assert [name for name in MODULES if name in sys.modules] == [], "nothing of it is imported here"
     printed = capfd.readouterr()

@@ -8,17 +8,17 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.client.beacons import Beacon, decode_beacon, encode_beacon
-from foosim.client.dispatch import Dispatch
-from foosim.client.patrol import Patrol
-from foosim.client.payloads import Pose
 from foosim.client.player import Sample
-from foosim.client.roadmap import roadmap_of
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import BadValue
-from foosim.protocol.frame import Frame
-from foosim.rehearsal.rehearse import rehearse
+from foosim.common.errors import BadValue
+from foosim.deployment.loader import load_deployment
+from foosim.players.beacons import Beacon, decode_beacon, encode_beacon
+from foosim.players.roadmap import roadmap_of
+from foosim.players.warehouse_base import Dispatch
+from foosim.players.warehouse_rover import Patrol
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.world.frame import Frame
+from foosim.world.payloads import Pose
 
 ROVERS: Final = 6
 TICKS: Final = 1000

@@ -10,7 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.client.payloads import (
+from foosim.common.errors import BadValue, Malformed, UnknownName
+from foosim.deployment.channel_kinds import channel_kind
+from foosim.deployment.loader import load_deployment
+from foosim.world.payloads import (
     KINDS,
     BallPosition,
     Battery,
@@ -25,9 +28,6 @@ from foosim.client.payloads import (
     encode_command,
     encode_payload,
 )
-from foosim.protocol.channel_kinds import channel_kind
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import BadValue, Malformed, UnknownName
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)

@@ -12,15 +12,15 @@ import pytest
 from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.packets import Outgoing
-from foosim.client.payloads import BallPosition, Command, RodPosition
 from foosim.client.player import Commands, PlayerLoop, Samples, Turn
+from foosim.common.errors import BadValue
+from foosim.deployment.loader import apply_sets
+from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets
-from foosim.protocol.errors import BadValue
 from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
+from foosim.world.payloads import BallPosition, Command, RodPosition
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

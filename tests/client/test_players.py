@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from foosim.client.payloads import BallPosition, Command, RodPosition
 from foosim.client.player import Commands, Sample
-from foosim.client.players import Team
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import BadValue, UnknownName
-from foosim.protocol.names import LINE_NAMES
-from foosim.rehearsal.rehearse import rehearse
+from foosim.common.errors import BadValue, UnknownName
+from foosim.common.names import LINE_NAMES
+from foosim.deployment.loader import load_deployment
+from foosim.players.football import Team
+from foosim.rehearsal.run import rehearse
+from foosim.world.payloads import BallPosition, Command, RodPosition
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)

@@ -9,7 +9,8 @@ import pytest
 
 from foosim.client.core import AWAY_AGAIN_NS, ClientCore
 from foosim.client.packets import Outgoing
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.channels import Plane
 from foosim.protocol.codec import decode, decode_any, encode

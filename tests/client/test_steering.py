@@ -7,10 +7,10 @@ from math import pi
 
 import pytest
 
-from foosim.client.payloads import Drive, Pose, WheelTravel
-from foosim.client.roadmap import Roadmap, roadmap_of
-from foosim.client.steering import Estimate, Steering, least
-from foosim.protocol.deployment_file import load_deployment
+from foosim.deployment.loader import load_deployment
+from foosim.players.roadmap import Roadmap, roadmap_of
+from foosim.players.steering import Estimate, Steering, least
+from foosim.world.payloads import Drive, Pose, WheelTravel
 
 FAR = (4.0,) * 16
 

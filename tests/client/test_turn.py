@@ -13,15 +13,15 @@ import pytest
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
 from foosim.client.packets import Outgoing
-from foosim.client.payloads import Command
 from foosim.client.player import PlayerLoop, Samples, Turn
+from foosim.deployment.loader import apply_sets
+from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets
 from foosim.protocol.messages import ClientWelcome, Done, Go, Join, Received, Up
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
+from foosim.world.payloads import Command
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NAME = "player-red"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from tests.replay.conftest import SETS, TABLE, TICKS, bad_files, disturb, run
 
 __all__ = ["bad_files", "run", "split_run"]

@@ -13,16 +13,16 @@ from typing import Any
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
+from foosim.common.errors import Refused
 from foosim.console.server.server import ConsoleServer, Tokens
 from foosim.console.shown.poses import HEAD, Poser
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import Refused
-from foosim.protocol.layout import build_layout
-from foosim.protocol.scenes import build_scene
-from foosim.protocol.start import initial_frame
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.initial_state import initial_frame
+from foosim.world.layout import build_layout
+from foosim.world.scenes.build import build_scene
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 TOKENS = Tokens("look", "touch")

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from foosim.capture.start_frame import read_branch
+from foosim.common.errors import BadValue, Refused
 from foosim.console.recorded.capture_source import FileSource
 from foosim.console.recorded.poses_source import NOWHERE, PosesSource
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.source import About, Curve, Moment, Source, Wanted
-from foosim.protocol.errors import BadValue, Refused
-from foosim.rehearsal.between import Between
-from foosim.vhub.branching import read_branch
+from foosim.replay.between import Between
 from tests.replay.conftest import SETS, TABLE, TICK_NS, TICKS, damaged, replay
 
 

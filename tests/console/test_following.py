@@ -11,12 +11,12 @@ import numpy as np
 from foosim.console.live.following import Following, World
 from foosim.console.shown.overlays import Overlays
 from foosim.console.shown.source import About, Wanted
+from foosim.deployment.loader import load_deployment
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit
-from foosim.protocol.start import initial_frame
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame
+from foosim.world.layout import build_layout
 from tests.console.memory import TABLE, table
 
 BALL2 = [["ball2", "ball"]]

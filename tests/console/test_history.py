@@ -9,6 +9,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from foosim.analysis.explain import PacketName, explain_packet
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import CLIENTS, PACKETS, TICK, EditRow, EpochRow, OwnerRow, RecoveryRow
 from foosim.console.recorded.capture_curves import curve_points, reading_points
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory, PacketMark
@@ -16,14 +19,11 @@ from foosim.console.recorded.recording import Recording
 from foosim.console.shown.asked import edit_text
 from foosim.console.shown.source import Curve
 from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import BALL, WORLD
-from foosim.protocol.start import initial_frame, kickoff_ticks
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.explain import PacketName, explain_packet
-from foosim.vhub.rows import CLIENTS, PACKETS, TICK, EditRow, EpochRow, OwnerRow, RecoveryRow
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame, kickoff_ticks
+from foosim.world.layout import BALL, WORLD
 from tests.replay.conftest import TABLE, TICK_NS, TICKS
 
 SECOND_NS = 1_000_000_000

@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from foosim.capture.mcap.checks import CaptureError
+from foosim.common.errors import BadValue, Refused
+from foosim.console.clock.leading import HeardClock, Leader
 from foosim.console.main import app
 from foosim.console.recorded.capture_source import FileSource
-from foosim.console.recorded.leading import HeardClock, Leader
 from foosim.console.recorded.poses_csv import BadPoses
 from foosim.console.recorded.poses_source import NOWHERE, PosesSource
 from foosim.console.recorded.recording import Recording
 from foosim.console.recorded.second import open_follower
 from foosim.console.shown.source import Moment, Wanted
-from foosim.protocol.errors import BadValue, Refused
-from foosim.vhub.mcap_checks import CaptureError
 from tests.console.memory import MemorySource, table
 from tests.console.test_capture_source import running
 from tests.replay.conftest import TICKS, replay

@@ -7,9 +7,9 @@ from foosim.console.recorded.link_history import LinkHistory, PacketMark
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Count, Links, Windows
 from foosim.console.shown.rule_text import RuleTexts, rule_text
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.layout import build_layout
-from foosim.protocol.start import initial_frame
+from foosim.deployment.loader import load_deployment
+from foosim.world.initial_state import initial_frame
+from foosim.world.layout import build_layout
 
 KEY = ("a", "b", "rule")
 

@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
+from foosim.common.errors import BadValue
 from foosim.console.live import live_source
 from foosim.console.live.live_source import LiveSource
 from foosim.console.live.presence import how_ended
 from foosim.console.shown.source import About, Curve, Moment, Wanted
-from foosim.protocol.errors import BadValue
-from foosim.protocol.inbox import Inbox
+from foosim.launcher.outcome import result_without_supervisor
+from foosim.launcher.run_options import RunOptions, launch_of
 from foosim.protocol.messages import Answer
+from foosim.runtime.run_folder import NoRun, create_run
+from foosim.runtime.transport.inbox import Inbox
 from foosim.supervisor.control import Control
-from foosim.supervisor.outcome import result_without_supervisor
-from foosim.supervisor.run_folder import NoRun, create_run
-from foosim.supervisor.run_options import RunOptions, launch_of
 from tests.console.test_following import described, frame_of, status
 from tests.replay.conftest import TABLE
 
@@ -119,13 +119,16 @@ def test_the_end_of_a_run_names_who_stopped_it_and_what_shows_its_capture(
     folder.write_result({**result_without_supervisor({"ticks": 70}, ends), "failed": failed})
     told = how_ended(folder, "browser 3")
     assert told is not None and told["state"] == "ended"
-    assert told["text"] == {
-        "done": "The run has ended at tick 70: done. It has no capture.",
-        "stopped": f"The run has ended at tick 70: stopped by browser 3. Its capture is {run}; "
-        f"this shows it: foosim-replay view {run}",
-        "lost vhub: it was killed": f"The run has failed at tick 70: lost vhub: it was killed."
-        f" Its capture is {run}; this shows it: foosim-replay view {run}",
-    }[ends]
+    assert (
+        told["text"]
+        == {
+            "done": "The run has ended at tick 70: done. It has no capture.",
+            "stopped": f"The run has ended at tick 70: stopped by browser 3. Its capture is {run}; "
+            f"this shows it: foosim-replay view {run}",
+            "lost vhub: it was killed": f"The run has failed at tick 70: lost vhub: it was killed."
+            f" Its capture is {run}; this shows it: foosim-replay view {run}",
+        }[ends]
+    )
 
 
 class Standing(Control):
@@ -141,9 +144,7 @@ class Standing(Control):
         self.asked.append("status")
         return status("running") | {"ticks": 100 * self.asked.count("status")}
 
-    def ask(
-        self, verb: str, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool, **arguments: Any
-    ) -> Answer:
+    def ask(self, verb: str, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool, **arguments: Any) -> Answer:
         self.asked.append(verb)
         return Answer("operator", "1", True, 5, "", b"")
 

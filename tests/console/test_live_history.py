@@ -11,7 +11,7 @@ import pytest
 from foosim.console.live import history as kept
 from foosim.console.live.history import APART_NS, ROWS_MAX, History, Rows
 from foosim.console.shown.source import Curve, Wanted
-from foosim.protocol.layout import build_layout
+from foosim.world.layout import build_layout
 from tests.console.memory import table
 from tests.console.test_following import BALL2, commit, described, following, frame_of, status
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from foosim.console.recorded.playhead import Playhead
-from foosim.protocol.errors import BadValue
+from foosim.common.errors import BadValue
+from foosim.console.clock.playhead import Playhead
 
 TICK_NS = 2_000_000
 SECOND_NS = 1_000_000_000

@@ -6,11 +6,11 @@ import numpy as np
 
 from foosim.console.shown.poses import Poser
 from foosim.console.shown.scene_json import scene_content
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.kinematics import forward_kinematics
-from foosim.protocol.layout import build_layout
-from foosim.protocol.scenes import build_scene
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import build_layout
+from foosim.world.scenes.build import build_scene
 from tests.console.memory import table
 
 

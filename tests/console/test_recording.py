@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from foosim.capture.foxglove import POSES
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.parts import files_from, part_path
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import FRAME, ROW_TYPES
 from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.recorded.recording import TOPICS, Recording
 from foosim.console.shown.poses import Poser
-from foosim.protocol.frame import Frame
-from foosim.rehearsal.between import Between
-from foosim.vhub.capture_parts import files_from, part_path
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.rows import FRAME, ROW_TYPES
-from foosim.vhub.viewing import POSES
+from foosim.replay.between import Between
+from foosim.world.frame import Frame
 from tests.replay.conftest import TICKS, damaged, messages_of, rewritten
 
 

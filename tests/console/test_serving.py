@@ -12,11 +12,11 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosedError
 
+from foosim.common.addresses import Insecure
+from foosim.common.errors import BadValue
 from foosim.console.server.server import ConsoleServer, new_tokens
 from foosim.console.server.serving import ServeOptions, listening_at, write_private
-from foosim.protocol.addresses import Insecure
-from foosim.protocol.errors import BadValue
-from foosim.supervisor import pki
+from foosim.launcher.pki import certificates
 from tests.console.memory import TOKENS, Browser, MemorySource, table
 
 
@@ -56,8 +56,8 @@ def test_nobody_guesses_a_token_and_each_has_its_role() -> None:
 
 def test_a_page_over_https_is_reached_by_its_host_and_opens_from_its_own_origin_alone(tmp_path: Path) -> None:
     folder = tmp_path / "pki"
-    pki.init(folder)
-    certificate, *_ = [path for path in pki.issue(folder, ["vhub"], ["127.0.0.1"]) if path.suffix == ".pem"]
+    certificates.init(folder)
+    certificate, *_ = [path for path in certificates.issue(folder, ["vhub"], ["127.0.0.1"]) if path.suffix == ".pem"]
     key = next(path for path in folder.glob("vhub*") if "key" in path.name)
     _, context = listening_at(ServeOptions("0.0.0.0", certificate, key))
     trusting = ssl.create_default_context(cafile=folder / "ca.pem")

@@ -16,11 +16,11 @@ from typing import Any, Final
 import pytest
 import typer.main
 
+from foosim.cli.supervisor import app as supervisor_app
 from foosim.client.main import app as player_app
+from foosim.deployment.loader import load_deployment
 from foosim.node.main import app as node_app
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.probe import app as probe_app
-from foosim.supervisor.cli import app as supervisor_app
+from foosim.runtime.health import app as probe_app
 from foosim.vhub.main import app as vhub_app
 from tests.deploy.processes import (
     DEPLOY,

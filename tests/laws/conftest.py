@@ -12,15 +12,16 @@ import msgspec
 import pytest
 from msgspec import inspect
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.units import Pace
+from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import encode
-from foosim.protocol.frame import Frame
-from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced
-from foosim.rehearsal.rehearse import Rehearsed, rehearse, with_nodes
+from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.settings import RunSettings
+from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()

@@ -11,24 +11,25 @@ from typing import Final
 import pytest
 
 from foosim.client.core import ClientCore
+from foosim.common import limits
 from foosim.node.inputs import Inputs
-from foosim.protocol import channels, limits
+from foosim.protocol import channels
 from foosim.protocol.codec import decode_any
-from foosim.protocol.edits import Add, Push
 from foosim.protocol.hub_messages import Standing
 from foosim.protocol.messages import ClientWelcome, Epoch
 from foosim.rehearsal.bus import CALM, Weather
 from foosim.rehearsal.failures import Broken
-from foosim.rehearsal.faults import TICKS, Fault, ask
-from foosim.rehearsal.laws import Laws
-from foosim.rehearsal.machines import lose_hub, lose_supervisor
+from foosim.rehearsal.machine_loss import lose_hub, lose_supervisor
 from foosim.rehearsal.settings import Settings
-from foosim.rehearsal.swarm import Flight, Plan
+from foosim.rehearsal.swarm.campaign import Flight, Plan
+from foosim.rehearsal.swarm.faults import TICKS, Fault, ask
+from foosim.rehearsal.swarm.invariants import Laws
 from foosim.rehearsal.system import System
 from foosim.supervisor.records import HeadRecord, Record, fold
 from foosim.supervisor.requests import Requests
 from foosim.vhub.records import Closing
 from foosim.vhub.state import HubState
+from foosim.world.edits import Add, Push
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MS: Final = 1_000_000

@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 OTHERS = ("bench", "build", "docs", "tests")
 """Folders that are no packages."""
-NOW = "wall.now_"
+NOW = "wall_clock.now_"
 DECIDING = (ast.Compare, ast.BinOp, ast.IfExp, ast.If, ast.While, ast.Subscript)
 """Where a wall time would be compared, reckoned with, or looked at."""
 
@@ -63,8 +63,12 @@ def test_no_message_carries_wall_time() -> None:
 
 
 def test_a_comparison_is_found() -> None:
-    for wrong in ("if wall.now_text() > x: pass", "y = wall.now_unix_ns() - x", "z = 1 if wall.now_unix_ns() else 2"):
+    for wrong in (
+        "if wall_clock.now_text() > x: pass",
+        "y = wall_clock.now_unix_ns() - x",
+        "z = 1 if wall_clock.now_unix_ns() else 2",
+    ):
         ((reading, around),) = readings(ast.parse(wrong))
         assert decided_by(around, reading)
-    ((reading, around),) = readings(ast.parse("if x: name = f'{wall.now_stamp()}'"))
+    ((reading, around),) = readings(ast.parse("if x: name = f'{wall_clock.now_stamp()}'"))
     assert decided_by(around, reading) == []

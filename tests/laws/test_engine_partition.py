@@ -14,19 +14,19 @@ from typing import Any
 
 import pytest
 
-from foosim.node.actuators.position import PositionActuator
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.node.engines.analytic import PureEngine
 from foosim.node.engines.bullet import BulletEngine
 from foosim.node.engines.interface import Engine, EngineFactory
-from foosim.node.engines.pure import PureEngine
-from foosim.protocol.assign import Assignment, reach_of
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.draws import draw_key, draw_words, unit_interval
-from foosim.protocol.layout import Entity, Layout, build_layout
-from foosim.protocol.rod import RodRobot
-from foosim.protocol.scene import Body, Shape
-from foosim.protocol.start import initial_numbers, place_ball
-from foosim.protocol.table_scene import figure_ys
+from foosim.world.actuators.joint_position import PositionActuator
+from foosim.world.initial_state import initial_numbers, place_ball
+from foosim.world.islands import Assignment, reach_of
+from foosim.world.layout import Entity, Layout, build_layout
+from foosim.world.robots.foosball_rod import RodRobot
+from foosim.world.scene import Body, Shape
+from foosim.world.scenes.football_table import figure_ys
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 KEY = draw_key(20, "partition")

@@ -18,10 +18,10 @@ from msgspec.structs import replace
 from foosim.protocol import channels
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.edits import Add, Push
 from foosim.protocol.messages import Part
-from foosim.protocol.robot_packets import Outbox
 from foosim.rehearsal.bus import Traced
+from foosim.world.edits import Add, Push
+from foosim.world.robot_packets import Outbox
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed
@@ -124,6 +124,7 @@ def test_a_part_with_another_basis_is_a_node_that_has_diverged_and_is_lost(distu
 
 
 # --- well-formed messages --------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("seed", range(3))
 def test_strangers_on_the_radio_plane_change_nothing(disturbed: Disturbed, seed: int) -> None:

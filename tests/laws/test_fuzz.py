@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
+from foosim.common.errors import Malformed
 from foosim.protocol import channels
 from foosim.protocol.channels import CLIENT_READS, NODE_READS, SUPERVISOR, SUPERVISOR_READS, VHUB, VHUB_READS, Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.errors import Malformed
-from foosim.protocol.refusals import OTHERS
+from foosim.protocol.rejects import OTHERS
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed, Fuzz, Running

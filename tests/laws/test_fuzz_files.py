@@ -16,23 +16,23 @@ from typing import TYPE_CHECKING, Any, Final
 import msgspec
 import pytest
 
+from foosim.capture.damage import damage_of
+from foosim.capture.info import capture_info
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.reader import open_capture
+from foosim.common.errors import DeploymentError, Malformed, Refused
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import DeploymentError, Malformed, Refused
-from foosim.protocol.journal import Journal, read_records
-from foosim.protocol.mesh import AssetError, read_mesh
 from foosim.protocol.messages import Answer, Request
-from foosim.protocol.robot_packets import Delivered
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
-from foosim.supervisor.run_folder import RunFolder, RunInfo
-from foosim.vhub.capture_damage import damage_of
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.mcap_checks import CaptureError
+from foosim.runtime.journal import Journal, read_records
+from foosim.runtime.run_folder import RunFolder, RunInfo
 from foosim.vhub.records import fold
+from foosim.world.mesh import AssetError, read_mesh
+from foosim.world.robot_packets import Delivered
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed, Fuzz, Running

@@ -12,20 +12,21 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol import channels, limits
+from foosim.capture.rows import RECOVERIES
+from foosim.common import limits
+from foosim.deployment.loader import load_deployment
+from foosim.protocol import channels
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.messages import Deliveries, Epoch, Go
-from foosim.rehearsal import hub_journal
+from foosim.rehearsal import journals
 from foosim.rehearsal.bus import Traced, Weather
-from foosim.rehearsal.hub_journal import ENDINGS, Ending
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.journals import ENDINGS, Ending
+from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.status import status
 from foosim.vhub.core import HubCore
+from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import RECOVERIES
-from foosim.vhub.to_rows import packet_entry, plan_of, world_rows
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 240
@@ -151,7 +152,7 @@ def test_with_bullet_it_is_the_same() -> None:
 def test_a_journal_whose_files_began_anew_gives_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """Heads between the ticks: a fold begins at one of them, and older ones go."""
     monkeypatch.setattr(limits, "CHECKPOINT_TICKS", 7)
-    monkeypatch.setattr(hub_journal, "HEADS_KEPT", 22)
+    monkeypatch.setattr(journals, "HEADS_KEPT", 22)
     seen = fly([(100, kill_hub("torn")), (180, kill_hub("unsaid"))], sets=(*SETS, "deadlines.client_back=250 ms"))
     assert_the_same(seen, undisturbed())
 

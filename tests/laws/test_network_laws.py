@@ -11,19 +11,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.frame import Frame
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.rules import Network
 from foosim.protocol.messages import Sent
-from foosim.protocol.network import Network
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.start import initial_frame
 from foosim.rehearsal.bus import Weather
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.vhub.memory import Joining
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.memory import Joining
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.records import Closing
 from foosim.vhub.state import HubState
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame
+from foosim.world.robot_packets import RobotPacket
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT = TABLE.read_text()

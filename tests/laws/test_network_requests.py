@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.edits import Disrupt
-from foosim.protocol.json_text import encode_json
-from foosim.rehearsal.hub_journal import ENDINGS, Ending
-from foosim.rehearsal.rehearse import rehearse
+from foosim.capture.rows import EPOCHS, RECOVERIES
+from foosim.common.json_text import encode_json
+from foosim.deployment.loader import load_deployment
+from foosim.rehearsal.journals import ENDINGS, Ending
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.verify import verify_capture
+from foosim.replay.verify import verify_capture
+from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import EPOCHS, RECOVERIES
-from foosim.vhub.to_rows import packet_entry, plan_of, world_rows
+from foosim.world.edits import Disrupt
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 160

@@ -18,13 +18,14 @@ import pytest
 from msgspec.structs import replace
 
 from foosim.client.core import ClientCore
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.common.json_text import encode_json
+from foosim.common.units import Pace
+from foosim.protocol import channels
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.edits import Edit, Push
-from foosim.protocol.errors import Malformed
 from foosim.protocol.hub_messages import Proceed, Standing
-from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import (
     Build,
     ClientHello,
@@ -55,12 +56,12 @@ from foosim.protocol.messages import (
     Want,
     Watched,
 )
-from foosim.protocol.robot_packets import Delivered, RobotPacket
-from foosim.protocol.start import AddedEntity
-from foosim.protocol.units import Pace
-from foosim.rehearsal.rehearse import with_nodes
+from foosim.rehearsal.run import with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.settings import RunSettings
+from foosim.world.edits import Edit, Push
+from foosim.world.initial_state import AddedEntity
+from foosim.world.robot_packets import Delivered, RobotPacket
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.draws import draw_key, draw_words
-from foosim.protocol.frame import Frame
+from foosim.common.keyed_random import draw_key, draw_words
 from foosim.rehearsal.bus import Weather
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.world.frame import Frame
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SEEDS = settings(max_examples=2, phases=[Phase.explicit, Phase.generate])

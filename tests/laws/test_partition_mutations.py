@@ -13,16 +13,16 @@ from pathlib import Path
 
 import pytest
 
-from foosim.node.engines.pure import PureEngine
-from foosim.node.sensors import encoder
-from foosim.node.step import Stepper, Work
-from foosim.protocol.assign import Assignment, Island, Reach, Share, islands_of, reach_of, touching_of
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
-from foosim.protocol.start import initial_numbers, place_ball
-from foosim.rehearsal.rehearse import rehearse
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.node.engines.analytic import PureEngine
+from foosim.node.tick import Stepper, Work
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers, place_ball
+from foosim.world.islands import Assignment, Island, Reach, Share, islands_of, reach_of, touching_of
+from foosim.world.layout import build_layout
+from foosim.world.sensors import encoder
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS = 250

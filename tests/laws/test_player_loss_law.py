@@ -13,18 +13,18 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import CLIENTS, ClientRow
+from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.units import Pace
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.verify import verify_capture
-from foosim.rehearsal.whatif import what_if
-from foosim.vhub.capture_reader import open_capture
+from foosim.replay.verify import verify_capture
+from foosim.replay.what_if import what_if
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import AbsencesRecord, HubRecord, InputsRecord, TickRecord, fold
-from foosim.vhub.rows import CLIENTS, ClientRow
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -145,6 +145,7 @@ def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_late
 def test_a_vhub_that_dies_before_the_record_gives_the_player_its_time_again(tmp_path: Path) -> None:
     """And one that dies behind it goes on without the player, whose return is as it would have been."""
     for ending in ("torn", "unsaid"):
+
         def also(system: System, ending: Any = ending) -> None:
             system.at_tick(100, lambda: system.later(190 * MS, lambda: system.kill_hub(ending, 50 * MS)))
 

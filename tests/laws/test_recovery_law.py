@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.common.json_text import encode_json
+from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer, Request
-from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced, Weather
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import OPERATOR, Settings, System
-from foosim.supervisor.recovery import Recovery
+from foosim.supervisor.node_loss import Recovery
 from foosim.vhub.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

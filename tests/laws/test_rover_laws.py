@@ -11,17 +11,17 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.client.payloads import Drive
+from foosim.capture.reader import open_capture
 from foosim.client.player import Samples
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.draws import draw_key, draw_words, unit_interval
-from foosim.protocol.frame import Frame
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.deployment.schema import Deployment
 from foosim.rehearsal.bus import Weather
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
-from foosim.rehearsal.swarm import fly
+from foosim.rehearsal.run import Rehearsed, rehearse
+from foosim.rehearsal.swarm.campaign import fly
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.verify import verify_capture
-from foosim.vhub.capture_reader import open_capture
+from foosim.replay.verify import verify_capture
+from foosim.world.frame import Frame
+from foosim.world.payloads import Drive
 
 TICKS: Final = 250
 ROVERS: Final = 6

@@ -19,22 +19,22 @@ import pytest
 from foosim.client.client import Link
 from foosim.client.core import ClientCore
 from foosim.client.main import PlayerProcess
+from foosim.common.units import Pace
+from foosim.launcher.plan import make_plan
+from foosim.launcher.run_options import RunOptions
 from foosim.node.main import NodeProcess
-from foosim.protocol import loop as loops
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal
-from foosim.protocol.orphan import Orphan
-from foosim.protocol.session import Session
-from foosim.protocol.units import Pace
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.runtime import loop as loops
+from foosim.runtime.journal import Journal
+from foosim.runtime.run_folder import RunFolder
+from foosim.runtime.supervisor_timeout import Orphan
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session
 from foosim.supervisor.main import SupervisorProcess
-from foosim.supervisor.plan import make_plan
-from foosim.supervisor.run_folder import RunFolder
-from foosim.supervisor.run_options import RunOptions
-from foosim.supervisor.watch import Watch
-from foosim.vhub.door import Door
+from foosim.supervisor.progress import Watch
+from foosim.vhub.join import Door
 from foosim.vhub.main import HubOptions, HubProcess
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -9,25 +9,26 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.capture.reader import open_capture
 from foosim.client.packets import Outgoing
 from foosim.client.player import Samples, Turn
-from foosim.client.players import Team
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.json_text import encode_json
+from foosim.deployment.loader import apply_sets
+from foosim.deployment.schema import Deployment
+from foosim.players.football import Team
+from foosim.protocol import channels
 from foosim.protocol.codec import decode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets
-from foosim.protocol.edits import Disrupt
-from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Deliveries, Go
-from foosim.rehearsal import hub_journal
+from foosim.rehearsal import journals
 from foosim.rehearsal.bus import Traced
-from foosim.rehearsal.faults import TICKS as SWARM_TICKS
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
-from foosim.rehearsal.swarm import fly as fly_seed
+from foosim.rehearsal.run import Rehearsed, rehearse
+from foosim.rehearsal.swarm.campaign import fly as fly_seed
+from foosim.rehearsal.swarm.faults import TICKS as SWARM_TICKS
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.verify import verify_capture
-from foosim.rehearsal.whatif import what_if
-from foosim.vhub.capture_reader import open_capture
+from foosim.replay.verify import verify_capture
+from foosim.replay.what_if import what_if
+from foosim.world.edits import Disrupt
 from tests.laws.test_hub_recovery_law import SETS, TABLE, Fault, Seen, assert_the_same, fly, kill_hub
 from tests.turns import BY_PERIOD
 
@@ -200,7 +201,7 @@ def test_who_acts_at_arrival_does_so_on_any_number_of_nodes_and_whoever_dies(
     assert usual.run.json["reason"] == "done" and len(usual.run.digests) == TICKS
     assert talk(network, 1).run.digests == talk(network, 3).run.digests == usual.run.digests
     monkeypatch.setattr(limits, "CHECKPOINT_TICKS", 7)
-    monkeypatch.setattr(hub_journal, "HEADS_KEPT", 2)
+    monkeypatch.setattr(journals, "HEADS_KEPT", 2)
     kills = ((22, kill_hub("now")), (38, kill_hub("torn")), (46, kill_hub("unsaid")), (90, kill_hub("now", 5_000_000)))
     assert_the_same(talk(network, 2, True, *kills), usual)
 

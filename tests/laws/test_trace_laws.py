@@ -14,11 +14,9 @@ import pytest
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit, Deliveries, Epoch, Go, Part
 from foosim.rehearsal.bus import Traced
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import CommitRecord
@@ -26,6 +24,8 @@ from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.vhub.core import HubCore
 from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.state import HubState
+from foosim.world.frame import Frame
+from foosim.world.layout import build_layout
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS = 200

@@ -13,19 +13,19 @@ from heapq import heappop, heappush
 from pathlib import Path
 from typing import Final
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.draws import draw_key, draw_words, unit_interval
-from foosim.protocol.edits import Edit
-from foosim.protocol.frame import Frame
+from foosim.common.exact_math import ln
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Deliveries, Sent
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.start import initial_frame
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.memory import Joining
-from foosim.vhub.numbers import ln
-from foosim.vhub.packet import Flight
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.memory import Joining
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.state import HubState
+from foosim.world.edits import Edit
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame
+from foosim.world.robot_packets import RobotPacket
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 ENDS: Final = ("a", "b", "c", "d")

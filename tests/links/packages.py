@@ -8,8 +8,8 @@ from typing import Final
 MODULE: Final = '''
 from math import sqrt
 
-from foosim.protocol.draws import chance_threshold, unit_interval
-from foosim.vhub.link_models import Judged
+from foosim.common.keyed_random import chance_threshold, unit_interval
+from foosim.vhub.network.custom_models import Judged
 
 
 class Fog:

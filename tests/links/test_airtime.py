@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.protocol.radios import Radio
+from foosim.deployment.network.radios import Radio
 from foosim.vhub.radio.airtime import (
     lora_airtime_ns,
     lrwpan_airtime_ns,

@@ -11,8 +11,8 @@ from typing import Final
 
 import pytest
 
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns
 from tests.links.offered import deployment_of, play, poisson_ns
 from tests.links.proof import Proof

@@ -6,8 +6,8 @@ from collections import Counter
 from typing import Final
 
 from foosim.protocol.messages import Sent
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.capacity import EVICTED
 from tests.links.offered import MS, Hub, deployment_of, fabric_of, rule
 from tests.links.proof import Proof

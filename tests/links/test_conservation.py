@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.protocol.messages import Sent
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.packet import Flight
+from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import ENDS, MS, Hub, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
 

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.draws import UNIT, chance_threshold, draw_key, draw_words
+from foosim.common.keyed_random import UNIT, chance_threshold, draw_key, draw_words
+from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.memory import Joining
-from foosim.vhub.packet import Flight
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.memory import Joining
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lrwpan_airtime_ns, wifi_ack_ns, wifi_airtime_ns
 from foosim.vhub.radio.contention import (
     CONTENDERS_MAX,

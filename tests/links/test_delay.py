@@ -12,7 +12,7 @@ from typing import Final
 
 import pytest
 
-from foosim.vhub.jitter import CELLS, quantiles_ns
+from foosim.vhub.network.jitter import CELLS, quantiles_ns
 from tests.links.offered import MS, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, gamma_cdf, ks, mean_and_deviation, normal_cdf

@@ -12,14 +12,14 @@ from typing import Final
 import msgspec
 import pytest
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.edits import Disrupt, Edit
+from foosim.deployment.network.presets import PRESETS
+from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
-from foosim.protocol.presets import PRESETS
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.vhub.state import HubState
-from foosim.vhub.to_rows import packet_row
+from foosim.world.edits import Disrupt, Edit
+from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import ENDS, Hub, deployment_of, rule
 from tests.links.proof import Proof
 

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.radios import Radio
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.lint import SMALL_BYTES, Use, meaning_of
-from foosim.vhub.packet import Flight
+from foosim.deployment.network.radios import Radio
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.links.summary import SMALL_BYTES, Use, meaning_of
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns
 from foosim.vhub.stages.duty import GRAINS, RUNS_MAX
 from tests.links.offered import MS, S, deployment_of, every

@@ -8,11 +8,11 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.protocol.edits import Disrupt
+from foosim.deployment.network.rules import event_of
 from foosim.protocol.messages import Sent
-from foosim.protocol.network import event_of
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
+from foosim.world.edits import Disrupt
 from tests.links.offered import ENDS, MS, Hub, S, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
 from tests.links.statistics import ks

@@ -7,7 +7,7 @@ from math import exp, pi, sqrt
 
 import pytest
 
-from foosim.protocol.draws import draw_key
+from foosim.common.keyed_random import draw_key
 from foosim.vhub.radio.fading import (
     ONE,
     Kind,

@@ -12,7 +12,7 @@ from math import sqrt
 
 import pytest
 
-from foosim.protocol.draws import Slot
+from foosim.common.keyed_random import Slot
 from tests.links.offered import MS, every, fabric_of, fates, poisson_ns, uniforms
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_p, binomial_z, chi_square, contingency

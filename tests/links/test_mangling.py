@@ -9,7 +9,7 @@ from math import comb, expm1, log1p, sqrt
 import pytest
 
 from foosim.protocol.messages import Sent
-from foosim.vhub.packet import Flight, content_of
+from foosim.vhub.network.packet import Flight, content_of
 from tests.links.offered import ENDS, MS, Hub, deployment_of, every, fabric_of, fates, play, rule
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, chi_square

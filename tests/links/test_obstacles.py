@@ -9,15 +9,15 @@ from typing import Final
 import numpy as np
 import pytest
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.radios import Shadowing
-from foosim.protocol.scene import Vector
-from foosim.protocol.start import initial_frame, place_ball
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
-from foosim.vhub.propagation import Place
+from foosim.deployment.network.radios import Shadowing
+from foosim.deployment.schema import Deployment
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.materials import slab_loss_db
+from foosim.vhub.radio.propagation import Place
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame, place_ball
+from foosim.world.scene import Vector
 from tests.links.offered import deployment_of, uniforms
 from tests.links.proof import Proof
 

@@ -7,13 +7,13 @@ from typing import Final
 import numpy as np
 import pytest
 
-from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Sent
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.start import initial_frame
-from foosim.vhub.memory import Joining
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.memory import Joining
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.state import HubState
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame
+from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import deployment_of
 
 ON_BOARD: Final = "clients={a: {on: red.attack}, b: {}}"

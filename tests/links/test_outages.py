@@ -14,10 +14,10 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol.draws import draw_key
-from foosim.protocol.impairments import ParetoDwell
-from foosim.vhub.episodes import Episodes, pareto_with_mean
-from foosim.vhub.packet import Flight
+from foosim.common.keyed_random import draw_key
+from foosim.deployment.network.impairments import ParetoDwell
+from foosim.vhub.network.good_bad_periods import Episodes, pareto_with_mean
+from foosim.vhub.network.packet import Flight
 from tests.links.offered import MS, S, every, fabric_of, fates, uniforms
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, ks, ks_exponential

@@ -11,26 +11,26 @@ from typing import Any, Final
 import msgspec
 import pytest
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.draws import draw_words
-from foosim.protocol.errors import DeploymentError
+from foosim.analysis.explain import PacketName, explain_packet
+from foosim.analysis.settings_text import impairments_text, radio_text
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import PACKETS, PacketRow
+from foosim.cli.net import linted
+from foosim.common.errors import DeploymentError
+from foosim.common.keyed_random import draw_words
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol.messages import Sent
-from foosim.protocol.scene import Vector
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.whatif import what_if
-from foosim.supervisor.net_command import linted
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.explain import PacketName, explain_packet
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.link_models import ModelError, Passage, check_link_models, differing_models, model_versions
-from foosim.vhub.profiles import Profiles
+from foosim.replay.what_if import what_if
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.custom_models import ModelError, Passage, check_link_models, differing_models, model_versions
+from foosim.vhub.network.link_settings import Profiles
+from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import PACKETS, PacketRow
-from foosim.vhub.settings_text import impairments_text, radio_text
-from foosim.vhub.stages.own import MODEL, MODEL_FAILED
+from foosim.vhub.stages.custom_model import MODEL, MODEL_FAILED
 from foosim.vhub.state import HubState
-from foosim.vhub.to_rows import packet_row
+from foosim.world.scene import Vector
 from tests.links.offered import MS, TABLE, Hub, deployment_of, every, fates, rule
 from tests.links.packages import ALL, install
 from tests.links.proof import Proof
@@ -127,9 +127,9 @@ def test_what_a_model_is_given() -> None:
 
 
 def test_the_velocity_of_a_rod_and_of_a_rover() -> None:
-    from foosim.protocol.frame import Frame
-    from foosim.protocol.start import initial_frame
-    from foosim.vhub.world import World
+    from foosim.vhub.line_of_sight.placement import World
+    from foosim.world.frame import Frame
+    from foosim.world.initial_state import initial_frame
 
     def velocity(deployment: Any, name: str, **fields: tuple[float, ...]) -> Vector:
         start = initial_frame(deployment)

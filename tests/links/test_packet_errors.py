@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.protocol.draws import UNIT
+from foosim.common.keyed_random import UNIT
 from foosim.vhub.radio.airtime import wifi_ack_ns, wifi_airtime_ns
 from foosim.vhub.radio.errors import (
     DOT11P_MODES,

@@ -10,7 +10,7 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol.draws import draw_key, draw_words
+from foosim.common.keyed_random import draw_key, draw_words
 from foosim.vhub.radio.materials import MATERIALS, slab_loss_db
 from foosim.vhub.radio.path_loss import (
     ENVIRONMENTS,

@@ -12,20 +12,20 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import DeploymentError
-from foosim.protocol.frame import Frame
-from foosim.protocol.start import initial_frame
-from foosim.rehearsal.rehearse import rehearse
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import PACKETS, PacketRow
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.rehearsal.run import rehearse
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import wifi_airtime_ns
 from foosim.vhub.radio.errors import DOT11N_MODES, LORA_GATEWAY_SENSITIVITY_DBM, LORA_SENSITIVITY_DBM, MODES
 from foosim.vhub.radio.path_loss import ENVIRONMENTS
 from foosim.vhub.radio.timings import WIFI_5, with_category
-from foosim.vhub.rows import PACKETS, PacketRow
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame
 from tests.links.offered import TABLE, deployment_of
 from tests.links.proof import Proof
 

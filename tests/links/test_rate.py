@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.packet import Flight
 from tests.links.offered import MS, S, every, fabric_of, fates, poisson_ns
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z

@@ -9,15 +9,15 @@ from typing import Any, Final
 import msgspec
 import pytest
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.rehearsal.rehearse import rehearse
+from foosim.analysis.explain import PacketName, Step, explain_packet
+from foosim.analysis.explain_stages import STAGE_NAMES
+from foosim.capture.reader import CaptureData, open_capture
+from foosim.capture.rows import PACKETS, PacketRow
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
-from foosim.vhub.capture_reader import CaptureData, open_capture
-from foosim.vhub.explain import PacketName, Step, explain_packet
-from foosim.vhub.explain_stages import STAGE_NAMES
-from foosim.vhub.model_hash import model_hash
-from foosim.vhub.rows import PACKETS, PacketRow
-from foosim.vhub.to_rows import DECIDING
+from foosim.vhub.recording.model_hash import model_hash
+from foosim.vhub.recording.rows_of_closing import DECIDING
 from tests.links.offered import TABLE
 from tests.turns import BY_PERIOD
 
@@ -109,9 +109,7 @@ def test_the_stage_that_drops_is_named(capture: CaptureData, lost: Lost) -> None
 
 def facts_of(capture: CaptureData, rows: list[PacketRow]) -> list[dict[str, Any]]:
     """Return what the stage that dropped each found."""
-    return [
-        next(step.facts for step in steps(capture, row).values() if step.outcome == "dropped") for row in rows[:4]
-    ]
+    return [next(step.facts for step in steps(capture, row).values() if step.outcome == "dropped") for row in rows[:4]]
 
 
 DECIDED: Final[dict[tuple[str, str, str], Callable[[dict[str, Any]], bool]]] = {

@@ -10,11 +10,11 @@ from typing import Final
 import msgspec
 import pytest
 
-from foosim.protocol.units import Pace
-from foosim.rehearsal.rehearse import rehearse
+from foosim.common.units import Pace
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.vhub.records import Closing
-from foosim.vhub.to_rows import packet_row
 from tests.links.offered import TABLE
 from tests.links.proof import Proof
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from foosim.protocol.draws import Slot
-from foosim.vhub.fabric import Fabric
+from foosim.common.keyed_random import Slot
+from foosim.vhub.links.fabric import Fabric
 from tests.links.offered import ENDS, MS, deployment_of, every, fabric_of, fates, rule
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, chi_square, correlation, ks_uniform, normal_cdf

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.frame import Frame
 from foosim.protocol.messages import Sent
-from foosim.vhub.memory import Joining
-from foosim.vhub.packet import Flight, state_of
-from foosim.vhub.sendings import Sendings
+from foosim.vhub.network.memory import Joining
+from foosim.vhub.network.packet import Flight, state_of
+from foosim.vhub.send_order import Sendings
 from foosim.vhub.state import HubState
+from foosim.world.frame import Frame
 from tests.links.offered import ENDS, Hub, deployment_of
 
 WIRED: Final = "{id: wired, from: d, to: red.goal, delay: 3 ms, jitter: {shape: gamma, sd: 2 ms}, loss: 20 %}"

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.protocol.draws import draw_key, draw_words, unit_interval
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.vhub.radio import shadowing
 from foosim.vhub.radio.shadowing import Shadowing
 from tests.links.proof import Proof

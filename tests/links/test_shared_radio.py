@@ -6,8 +6,8 @@ from typing import Final
 
 import pytest
 
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
 from tests.links.offered import deployment_of
 
 PLACES: Final = "network.places={'*': [0 m, 0 m, 1 m], c: [5 m, 0 m, 1 m]}"

@@ -6,7 +6,7 @@ from math import log, sqrt
 
 import pytest
 
-from foosim.protocol.draws import draw_key, draw_words, gaussian, unit_interval
+from foosim.common.keyed_random import draw_key, draw_words, gaussian, unit_interval
 from tests.links.proof import FAILS, SKIPPED, Proof
 from tests.links.statistics import (
     ALPHA,

@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.draws import UNIT
+from foosim.common.keyed_random import UNIT
 from foosim.protocol.messages import Sent
-from foosim.protocol.start import initial_frame
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import wifi_ack_ns
 from foosim.vhub.radio.contention import TURNS_SAVED, contention, wifi_access
 from foosim.vhub.radio.timings import WIFI_5
 from foosim.vhub.state import HubState
+from foosim.world.initial_state import initial_frame
 from tests.links.offered import ENDS, Hub, deployment_of
 
 RADIO: Final = (

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.node.step import Stepper
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.deployment.loader import load_deployment
+from foosim.node.tick import Stepper
 from foosim.protocol.codec import decode_any
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
-from foosim.protocol.robot_packets import Delivered, OutboxPacket, RobotPacket
-from foosim.protocol.start import initial_numbers
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

@@ -9,17 +9,17 @@ from typing import Final
 
 import pytest
 
-from foosim.node.engines.pure import PureEngine
-from foosim.node.solver import FINGERPRINT_TICKS
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.node.engines.analytic import PureEngine
+from foosim.node.engines_pool import FINGERPRINT_TICKS
 from foosim.protocol.channels import PART
 from foosim.protocol.codec import decode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.layout import Entity, Layout, build_layout
 from foosim.protocol.messages import Part
 from foosim.rehearsal.bus import Traced
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
+from foosim.world.layout import Entity, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

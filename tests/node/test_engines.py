@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.engines import ENGINES
 from foosim.node.engines.interface import Engine
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.scene import Vector
-from foosim.protocol.start import initial_numbers, place_ball
+from foosim.world.initial_state import initial_numbers, place_ball
+from foosim.world.layout import Layout, build_layout
+from foosim.world.scene import Vector
 
 TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 TABLE = load_deployment(TEXT, "table.yaml")

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.node.actuators.position import ANGLE_RAD_MAX, PositionActuator
-from foosim.node.step import Stepper
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.layout import build_layout
-from foosim.protocol.robot_packets import Delivered
-from foosim.protocol.start import initial_numbers
+from foosim.deployment.loader import load_deployment
+from foosim.node.tick import Stepper
+from foosim.world.actuators.joint_position import ANGLE_RAD_MAX, PositionActuator
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import Delivered
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

@@ -8,11 +8,11 @@ from typing import Final
 
 import pytest
 
-from foosim.node.engines import probation
-from foosim.node.engines.probation import check_models
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.mesh import AssetError
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.node.engines import mesh_trial
+from foosim.node.engines.mesh_trial import check_models
+from foosim.world.mesh import AssetError
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SHARD: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"
@@ -32,14 +32,14 @@ def broken(statements: str) -> list[str]:
     """A throw-away process in which building the world with the mesh of `z` alone does something else."""
     program = f"""if True:
         import ctypes, os, resource, sys, time
-        from foosim.node.engines import probation
-        real = probation._try
+        from foosim.node.engines import mesh_trial
+        real = mesh_trial._try
         def tried(deployment):
             if "z" in deployment.scenery:
                 {statements}
             real(deployment)
-        probation._try = tried
-        probation.main()
+        mesh_trial._try = tried
+        mesh_trial.main()
     """
     return [sys.executable, "-c", program]
 
@@ -70,6 +70,6 @@ def test_a_mesh_that_fails_is_named_with_the_reason(statements: str, reason: str
 
 
 def test_a_trial_that_never_ends_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(probation, "WALL_S", 0.1)
+    monkeypatch.setattr(mesh_trial, "WALL_S", 0.1)
     with pytest.raises(AssetError, match=r"^t: its scenery failed its trial .* or 0\.1 s$"):
         check_models(deployment(), "t", TEXT, [sys.executable, "-c", "import time; time.sleep(1000)"])

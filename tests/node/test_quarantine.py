@@ -14,17 +14,17 @@ from typing import Final
 
 import pytest
 
-from foosim.node.engines.pure import PureEngine
-from foosim.node.step import Stepper, Work
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Entity, Layout, build_layout
-from foosim.protocol.start import initial_numbers, place_ball
-from foosim.rehearsal.rehearse import Rehearsed, rehearse, with_nodes
-from foosim.rehearsal.replica import Replica
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.node.engines.analytic import PureEngine
+from foosim.node.tick import Stepper, Work
+from foosim.rehearsal.resimulation import Replica
+from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.records import Closing
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers, place_ball
+from foosim.world.layout import Entity, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.node.actuators.drive import DriveActuator
-from foosim.node.sensors import make_sensor, sample_all
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.start import initial_numbers
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.actuators.differential_drive import DriveActuator
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import Layout, build_layout
+from foosim.world.sensors import make_sensor, sample_all
 
 PLACED: Final = (
     "robots.rover01.x=2 m",

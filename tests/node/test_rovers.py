@@ -9,16 +9,16 @@ from typing import Final
 import numpy as np
 import pytest
 
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.node.engines import ENGINES, make_engine
-from foosim.node.engines.rovers import RoverEngine, wheel_slips
-from foosim.node.step import Stepper, Work
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.draws import draw_key, draw_words, unit_interval
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Entity, Layout, build_layout
-from foosim.protocol.start import initial_numbers
-from foosim.rehearsal.world_bounds import strays
+from foosim.node.engines.planar import RoverEngine, wheel_slips
+from foosim.node.tick import Stepper, Work
+from foosim.rehearsal.swarm.world_bounds import strays
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import Entity, Layout, build_layout
 
 EMPTY: Final = (
     "scenery={}",

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.node.rules import TableRules
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.layout import Entity, Layout, build_layout
-from foosim.protocol.start import initial_numbers, kickoff_ticks, place_ball
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.initial_state import initial_numbers, kickoff_ticks, place_ball
+from foosim.world.layout import Entity, Layout, build_layout
+from foosim.world.rules.football import TableRules
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 DEPLOYMENT: Final = load_deployment(TEXT, "table.yaml")

@@ -11,16 +11,16 @@ from typing import Final
 import numpy as np
 import pytest
 
-from foosim.node.sensors import SENSORS, make_sensor
-from foosim.node.step import Stepper
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.draws import draw_key, draw_words, gaussian
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.rod import RodSensor
-from foosim.protocol.start import initial_numbers
+from foosim.common.keyed_random import draw_key, draw_words, gaussian
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.node.tick import Stepper
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import RobotPacket
+from foosim.world.robots.foosball_rod import RodSensor
+from foosim.world.sensors import SENSORS, make_sensor
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 DEPLOYMENT: Final = load_deployment(TEXT, "table.yaml")

@@ -5,17 +5,17 @@ from typing import Any
 
 import pytest
 
+from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.node.engines.bullet import BulletEngine
-from foosim.node.solver import ENGINES_KEPT, Solver, engine_fingerprint
-from foosim.node.step import Stepper, Work
+from foosim.node.engines_pool import ENGINES_KEPT, Solver, engine_fingerprint
+from foosim.node.tick import Stepper, Work
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Build, Prepare, Ready
-from foosim.protocol.start import AddedEntity, initial_numbers
+from foosim.world.initial_state import AddedEntity, initial_numbers
+from foosim.world.layout import Layout, build_layout
 
 TEXT = (Path(__file__).parent.parent.parent / "deploy" / "table.yaml").read_text()
 DEPLOYMENT = load_deployment(TEXT, "table.yaml")

@@ -10,15 +10,15 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
+from foosim.common.errors import Malformed
+from foosim.deployment.loader import load_deployment
 from foosim.node.engines import ENGINES
-from foosim.node.step import Stepper, Work
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.edits import Add, Edit, Push, Remove, check_edits
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.robot_packets import Delivered
-from foosim.protocol.start import initial_frame, initial_numbers, place_ball
+from foosim.node.tick import Stepper, Work
+from foosim.world.edits import Add, Edit, Push, Remove, check_edits
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame, initial_numbers, place_ball
+from foosim.world.layout import Layout, build_layout
+from foosim.world.robot_packets import Delivered
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.engines import ENGINES
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.layout import Entity, build_layout
-from foosim.protocol.scene import Vector
-from foosim.protocol.scenes import build_scene
-from foosim.protocol.start import initial_numbers, place_ball
-from foosim.protocol.table_scene import spin_inertia
+from foosim.world.initial_state import initial_numbers, place_ball
+from foosim.world.layout import Entity, build_layout
+from foosim.world.scene import Vector
+from foosim.world.scenes.build import build_scene
+from foosim.world.scenes.football_table import spin_inertia
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 Motors = tuple[tuple[float, float], tuple[float, float]]

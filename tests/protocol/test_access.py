@@ -11,12 +11,12 @@ import zenoh
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.schema import Deployment
 from foosim.protocol.access import access_control, access_to
 from foosim.protocol.channels import ALIVE, CHANNELS, Plane
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment, read_deployment_text
 from foosim.protocol.identity import ROLES, identities_of
-from foosim.protocol.session_settings import holds
+from foosim.runtime.transport.settings import holds
 from tests.granted import may_be_present, may_hear, may_put, may_watch
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -83,9 +83,7 @@ def test_rules_say_what_the_predicate_says(
     names = [*nodes, *clients, *fixed, *(f"{name}.x1" for name in [*operators, *viewers, *nodes])]
     for plane in Plane:
         control = access_control(access_to(plane, made))
-        here = {Plane.RADIO: "client.", Plane.REPLAY: "operator."}.get(
-            plane, ("vhub", "node.", "operator.", "viewer.")
-        )
+        here = {Plane.RADIO: "client.", Plane.REPLAY: "operator."}.get(plane, ("vhub", "node.", "operator.", "viewer."))
         for identity in [*identities_of(made), *(f"{role}.nobody" for role in ROLES)]:
             is_known = identity.startswith(here) and not identity.endswith("nobody")
             passes = Allowed(control, identity)

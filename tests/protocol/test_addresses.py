@@ -2,8 +2,8 @@
 
 import pytest
 
-from foosim.protocol.addresses import Address, Insecure, check_listen, parse_address, reachable
-from foosim.protocol.errors import BadValue
+from foosim.common.addresses import Address, Insecure, check_listen, parse_address, reachable
+from foosim.common.errors import BadValue
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.addresses import parse_address
-from foosim.protocol.admission import ADMISSION_NS, Admission
-from foosim.protocol.certificates import Credentials, NotAuthorised
-from foosim.protocol.exposure import EVERY_NS, Exposure
+from foosim.common.addresses import parse_address
+from foosim.runtime.transport.admission import ADMISSION_NS, Admission
+from foosim.runtime.transport.certificates import Credentials, NotAuthorised
+from foosim.runtime.transport.open_plane_warning import EVERY_NS, Exposure
 
 WHO = Credentials("node.green", Path("ca.pem"))
 

@@ -11,14 +11,14 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol import limits
-from foosim.protocol.assets import pin_assets, read_files
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import DeploymentError
-from foosim.protocol.mesh import AssetError, digest_of
-from foosim.protocol.scene import Box
-from foosim.protocol.scenery import path_problem
+from foosim.common import limits
+from foosim.common.errors import DeploymentError
+from foosim.deployment.assets import pin_assets, read_files
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.mesh import AssetError, digest_of
+from foosim.world.scene import Box
+from foosim.world.scenery import path_problem
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
@@ -185,8 +185,8 @@ def test_the_pure_engine_says_that_it_has_no_meshes() -> None:
 AUDIT: Final = """
 import os, sys
 from pathlib import Path
-from foosim.protocol.assets import pin_assets
-from foosim.protocol.mesh import AssetError
+from foosim.deployment.assets import pin_assets
+from foosim.world.mesh import AssetError
 folder, opened, text = Path(sys.argv[1]), [], sys.stdin.read()
 def watch(event, given):
     if event == "open":

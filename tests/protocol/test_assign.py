@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.assign import Assignment, islands_of, reach_of, touching_of
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.rod import RodRobot
-from foosim.protocol.start import initial_numbers
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.initial_state import initial_numbers
+from foosim.world.islands import Assignment, islands_of, reach_of, touching_of
+from foosim.world.layout import Layout, build_layout
+from foosim.world.robots.foosball_rod import RodRobot
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

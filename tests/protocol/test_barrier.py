@@ -13,15 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.deployment.loader import load_deployment
 from foosim.protocol.barrier import BadParts, Barrier, Slots
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Part
-from foosim.protocol.robot_packets import Outbox, OutboxPacket
+from foosim.world.frame import Frame
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import Outbox, OutboxPacket
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 LAYOUT: Final = build_layout(load_deployment(TABLE.read_text(), TABLE.name))

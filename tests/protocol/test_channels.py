@@ -11,11 +11,12 @@ from typing import Any, Final, get_args
 import pytest
 
 from foosim.client.core import ClientCore
+from foosim.common import limits
+from foosim.common.units import Pace
 from foosim.node.core import NodeCore
-from foosim.protocol import channels, limits
+from foosim.protocol import channels
 from foosim.protocol.channels import CHANNELS, Channel, Plane
-from foosim.protocol.loop import channel_of
-from foosim.protocol.units import Pace
+from foosim.runtime.loop import channel_of
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore

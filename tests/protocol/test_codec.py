@@ -17,15 +17,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import inspect
 
-from foosim.protocol import codec, limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.common.json_text import decode_json, encode_json
+from foosim.protocol import codec
 from foosim.protocol.channels import CHANNELS, Channel
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.edits import Add, Edit, Freeze, Push, Remove, Thaw
-from foosim.protocol.errors import Malformed
-from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.messages import Commit, Deliveries, Done, End, Epoch, Hello, Order, Part, Request, Sent, Up, Want
-from foosim.protocol.robot_packets import Delivered
-from foosim.protocol.start import AddedEntity
+from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw
+from foosim.world.initial_state import AddedEntity
+from foosim.world.robot_packets import Delivered
 
 LONG: Final = 5
 """How long lists, texts and bytes of an example are at most; limits have tests of their own."""

@@ -11,14 +11,14 @@ import pytest
 from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
-from foosim.protocol.camera import CameraRobot
-from foosim.protocol.deployment import Deployment, deployment_schema_text
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.impairments import GammaJitter
-from foosim.protocol.names import LINE_NAMES, TEAMS
-from foosim.protocol.rod import RodRobot
-from foosim.protocol.units import Pace
-from foosim.protocol.yaml_tree import locate_in, plain, read_tree
+from foosim.common.names import LINE_NAMES, TEAMS
+from foosim.common.units import Pace
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.impairments import GammaJitter
+from foosim.deployment.schema import Deployment, deployment_schema_text
+from foosim.deployment.yaml import locate_in, plain, read_tree
+from foosim.world.robots.foosball_rod import RodRobot
+from foosim.world.robots.overhead_camera import CameraRobot
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
@@ -52,7 +52,7 @@ def test_the_table_has_eight_rods_a_camera_two_nodes_and_two_players(table: Depl
     assert table.endpoints() == sorted([*rods, "camera", "player-red", "player-blue"])
     for team in TEAMS:
         player = table.players[f"player-{team}"]
-        assert (player.class_, player.rate_hz, player.lockstep) == ("foosim.client.players:Team", Fraction(50), True)
+        assert (player.class_, player.rate_hz, player.lockstep) == ("foosim.players.football:Team", Fraction(50), True)
         assert (player.act, player.arrivals) == ("arrival", {"camera": ["ball"]})
         assert player.robots == {f"{team}.{line}": ["encoder"] for line in LINE_NAMES} | {"camera": ["ball"]}
         assert player.parameters == {"team": team}

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.protocol.deployment_file import PROBLEMS_MAX, apply_sets, load_deployment, read_deployment_text
-from foosim.protocol.errors import DeploymentError
-from foosim.protocol.yaml_tree import locate_in, plain, read_tree
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import PROBLEMS_MAX, apply_sets, load_deployment, read_deployment_text
+from foosim.deployment.yaml import locate_in, plain, read_tree
 
 CASES = Path(__file__).with_name("deployment_problems.txt")
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
@@ -57,7 +57,7 @@ nodes:
     robots: [red.goal, camera]
 players:
   keeper:
-    class: foosim.client.players:Team
+    class: foosim.players.football:Team
     rate: 100 Hz
     robots:
       red.goal: [encoder]

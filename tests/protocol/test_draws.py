@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words, gaussian, unit_interval
+from foosim.common.keyed_random import Slot, chance_threshold, draw_key, draw_words, gaussian, unit_interval
 
 COUNT: Final = 20_000
 KEY: Final = draw_key(1, "link", "player-red", "red.goal")

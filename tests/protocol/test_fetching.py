@@ -9,15 +9,16 @@ from typing import Final
 import pytest
 from msgspec.structs import replace
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Action, Publish
-from foosim.protocol.assets import pin_assets
+from foosim.protocol.asset_transfer import Fetching, piece_of
 from foosim.protocol.codec import decode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import Malformed
-from foosim.protocol.fetching import Fetching, piece_of
-from foosim.protocol.member import AGAIN_NS, Member
+from foosim.protocol.handshake import AGAIN_NS, Member
 from foosim.protocol.messages import Build, Fetch, Heartbeat, Piece
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

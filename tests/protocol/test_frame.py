@@ -13,16 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from foosim.common.errors import Malformed
+from foosim.deployment.loader import load_deployment
 from foosim.protocol.barrier import basis_of, edits_content
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.edits import Add, Edit, Push, Remove, fitting_edits, layout_after
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Order
-from foosim.protocol.robot_packets import Outbox
-from foosim.protocol.start import initial_frame
+from foosim.world.edits import Add, Edit, Push, Remove, fitting_edits, layout_after
+from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
+from foosim.world.initial_state import initial_frame
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import Outbox
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

@@ -9,17 +9,17 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol.assign import Assignment, reach_of
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
-from foosim.protocol.errors import DeploymentError, Malformed
-from foosim.protocol.hall_start import start_findings
-from foosim.protocol.kinematics import forward_kinematics
-from foosim.protocol.layout import build_layout
-from foosim.protocol.obstacles import Circle, Rectangle, obstacle, obstacles_of
-from foosim.protocol.scene import Cylinder, Shape
-from foosim.protocol.scenes import build_scene
-from foosim.protocol.start import initial_frame, initial_numbers
+from foosim.common.errors import DeploymentError, Malformed
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.edits import Add, Edit, Freeze, Push, Remove, Thaw, fitting_edits
+from foosim.world.initial_state import initial_frame, initial_numbers
+from foosim.world.islands import Assignment, reach_of
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import build_layout
+from foosim.world.scene import Cylinder, Shape
+from foosim.world.scenes.build import build_scene
+from foosim.world.scenes.hall_start import start_findings
+from foosim.world.scenes.obstacles import Circle, Rectangle, obstacle, obstacles_of
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 WAREHOUSE: Final = (DEPLOY / "warehouse.yaml").read_text()

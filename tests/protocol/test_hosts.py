@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.deployment import Deployment, places
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.hosts import Host
+from foosim.deployment.hosts import Host
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment, places
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 TEXT = (DEPLOY / "table.yaml").read_text()

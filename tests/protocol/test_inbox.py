@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from foosim.protocol.inbox import Inbox, InboxStatistics, Item
+from foosim.runtime.transport.inbox import Inbox, InboxStatistics, Item
 
 ALL = 1000
 LONG_S = 600.0

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol import journal as journal_module
-from foosim.protocol.journal import (
+from foosim.runtime import journal as journal_module
+from foosim.runtime.journal import (
     Journal,
     JournalDamaged,
     JournalError,
@@ -20,7 +20,7 @@ from foosim.protocol.journal import (
     read_newest,
     read_records,
 )
-from foosim.protocol.journal_format import FRAMING_BYTES, HEAD_BYTES
+from foosim.runtime.journal_format import FRAMING_BYTES, HEAD_BYTES
 
 RECORDS = [b"", b"\x00", b"first", bytes(range(256)) * 2, b"\xff" * 7, b"last"]
 
@@ -70,7 +70,7 @@ def test_a_record_is_in_the_file_when_append_returns(tmp_path: Path) -> None:
 def test_a_killed_process_loses_nothing(tmp_path: Path) -> None:
     program = """if True:
         import os, pathlib, signal, sys
-        from foosim.protocol.journal import Journal
+        from foosim.runtime.journal import Journal
         journal = Journal(pathlib.Path(sys.argv[1]), "hub")
         for number in range(1000):
             journal.append(b"%d" % number)
@@ -204,7 +204,7 @@ def test_a_full_disk_ends_the_journal_between_two_records(tmp_path: Path) -> Non
     """The limit of a process's file size stands in for a full disk: a write goes in part, the next one fails."""
     program = """if True:
         import pathlib, resource, sys
-        from foosim.protocol.journal import Journal, JournalError
+        from foosim.runtime.journal import Journal, JournalError
         journal = Journal(pathlib.Path(sys.argv[1]), "hub")
         journal.append(b"whole")
         resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))

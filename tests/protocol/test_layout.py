@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import Malformed
-from foosim.protocol.layout import ADDABLE, BALL, BODIES, ROBOTS, WORLD, Layout, build_layout
+from foosim.common.errors import Malformed
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.layout import ADDABLE, BALL, BODIES, ROBOTS, WORLD, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

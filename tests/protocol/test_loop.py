@@ -10,9 +10,9 @@ import pytest
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish, Say
 from foosim.protocol.channels import ALIVE, CHANNELS, Channel, Plane
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import JournalError
-from foosim.protocol.loop import Loop, channel_of
+from foosim.runtime.journal import JournalError
+from foosim.runtime.loop import Loop, channel_of
+from foosim.runtime.transport.inbox import Inbox
 
 LATER_NS: Final = 2**62
 LOG: Final = logging.getLogger("test_loop")

@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 import pytest
 
-from foosim.protocol import limits
-from foosim.protocol.errors import Refused
-from foosim.protocol.mesh import AssetError, Mesh, read_mesh
+from foosim.common import limits
+from foosim.common.errors import Refused
+from foosim.world.mesh import AssetError, Mesh, read_mesh
 
 Point = tuple[float, float, float]
 Triangle = tuple[Point, Point, Point]
@@ -25,9 +25,7 @@ CUBE: Final = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS) + "".join(
 TRIANGLES: Final = [(CORNERS[a], CORNERS[b], CORNERS[c]) for a, *rest in SIDES for b, c in (rest[:2], rest[1:])]
 
 
-def binary_stl(
-    triangles: Sequence[Triangle], count: int | None = None, head: bytes = b"made"
-) -> bytes:
+def binary_stl(triangles: Sequence[Triangle], count: int | None = None, head: bytes = b"made") -> bytes:
     body = b"".join(struct.pack("<12fH", *(0.0,) * 3, *a, *b, *c, 0) for a, b, c in triangles)
     return head.ljust(80, b" ") + struct.pack("<I", len(triangles) if count is None else count) + body
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.protocol.names import is_name, is_robot_name, is_selector, nearest_name
+from foosim.common.names import is_name, is_robot_name, is_selector, nearest_name
 
 
 @pytest.mark.parametrize("text", ["red", "player-red", "n1", "a_b", "a" * 32])

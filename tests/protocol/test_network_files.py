@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.assets import pin_assets
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.mesh import AssetError, digest_of
-from foosim.protocol.traces import file_settings, read_opportunities, read_table
-from foosim.vhub.fabric import Fabric
-from foosim.vhub.packet import Flight
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.traces import file_settings, read_opportunities, read_table
+from foosim.vhub.links.fabric import Fabric
+from foosim.vhub.network.packet import Flight
+from foosim.world.mesh import AssetError, digest_of
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 RULES = (

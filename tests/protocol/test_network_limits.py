@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import DeploymentError
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import apply_sets, load_deployment
 
 TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 

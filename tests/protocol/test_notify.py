@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.notify import Notify
+from foosim.runtime.systemd import Notify
 
 MS = 1_000_000
 

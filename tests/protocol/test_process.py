@@ -10,15 +10,15 @@ from typing import IO
 
 import pytest
 
-from foosim.protocol import process
-from foosim.protocol.process import new_boot, start_log
+from foosim.runtime import process
+from foosim.runtime.process import new_boot, start_log
 
 LIMIT_S = 900.0
 NODE = "from foosim.node.main import main; main()"
 PLAYER = "from foosim.client.main import main; main()"
 ASLEEP = """
 import threading, time
-from foosim.protocol.process import Stop
+from foosim.runtime.process import Stop
 stop = Stop()
 told = threading.Event()
 if {late}:
@@ -95,7 +95,7 @@ def test_a_player_writes_its_stack_when_it_is_asked_for_it() -> None:
 
 
 def test_a_child_whose_launcher_is_gone_does_not_even_start() -> None:
-    program = "from foosim.protocol.process import die_with_parent; die_with_parent(); print('alive')"
+    program = "from foosim.runtime.process import die_with_parent; die_with_parent(); print('alive')"
     environment = {process.PARENT_VARIABLE: "1:0"}
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (1, "")
@@ -123,10 +123,10 @@ import atexit, gc, sys
 from foosim.client import main as player
 from foosim.node import main as node
 from foosim.vhub import main as vhub
-print([name for name in ("ssl", "cryptography", "foosim.vhub.capture_reader") if name in sys.modules])
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.table import Table
-from foosim.supervisor import cli as up
+print([name for name in ("ssl", "cryptography", "foosim.capture.reader") if name in sys.modules])
+from foosim.deployment.schema import Deployment
+from foosim.world.kits.table import Table
+from foosim.cli import supervisor as up
 print([name for name in ("ssl", "cryptography") if name in sys.modules])
 print([model.__name__ for model in (Deployment, Table) if model.__pydantic_complete__])
 atexit.register(lambda: print(gc.get_freeze_count() > len(gc.get_objects())))

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
+from foosim.common.errors import BadValue, Failed
 from foosim.protocol.actions import Action
 from foosim.protocol.channels import Channel
-from foosim.protocol.errors import BadValue, Failed
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.loop import Loop
-from foosim.protocol.probe import probe_file
-from foosim.protocol.progress import EVERY_NS, NoProgress, ProgressFile, age_ns
+from foosim.runtime.health import probe_file
+from foosim.runtime.loop import Loop
+from foosim.runtime.progress import EVERY_NS, NoProgress, ProgressFile, age_ns
+from foosim.runtime.transport.inbox import Inbox
 
 S = 1_000_000_000
 

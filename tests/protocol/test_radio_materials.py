@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import yaml
 
-from foosim.protocol.assets import pin_assets
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import DeploymentError
-from foosim.protocol.layout import build_layout
-from foosim.protocol.mesh import is_closed, read_mesh
-from foosim.protocol.radio_materials import MATERIALS, METAL, PLASTIC, UNKNOWN, WOOD, MaterialName, RadioMaterial
-from foosim.protocol.scene import Cylinder
-from foosim.protocol.scenes import build_scene
+from foosim.common.errors import DeploymentError
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.world.layout import build_layout
+from foosim.world.materials import MATERIALS, METAL, PLASTIC, UNKNOWN, WOOD, MaterialName, RadioMaterial
+from foosim.world.mesh import is_closed, read_mesh
+from foosim.world.scene import Cylinder
+from foosim.world.scenes.build import build_scene
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 POST: Final = "shape: cylinder, radius: 1 cm, length: 20 cm, z: 1 m, surface: walls"

@@ -6,11 +6,11 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment, load_network
-from foosim.protocol.errors import DeploymentError
-from foosim.protocol.network_request import BadEvent, event_text
-from foosim.protocol.presets import PRESETS
+from foosim.common.errors import DeploymentError
+from foosim.deployment.event_requests import BadEvent, event_text
+from foosim.deployment.loader import apply_sets, load_deployment, load_network
+from foosim.deployment.network.presets import PRESETS
+from foosim.deployment.schema import Deployment
 from tests.links.offered import TABLE, deployment_of
 
 EVERYBODY: Final = ("network.robots={'*': [r]}", "network.places={'*': [0 m, 0 m, 1 m]}")

@@ -7,14 +7,15 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Say
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import Malformed
 from foosim.protocol.messages import Want
-from foosim.protocol.refusals import OTHERS, QUARANTINE_NS, REFUSALS_MAX, TOLD_MAX, WINDOW_NS, Quarantined, Refusals
+from foosim.protocol.rejects import OTHERS, QUARANTINE_NS, REFUSALS_MAX, TOLD_MAX, WINDOW_NS, Quarantined, Refusals
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final[Deployment] = load_deployment(TABLE.read_text(), TABLE.name)

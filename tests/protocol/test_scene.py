@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.assign import reach_of
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.kinematics import forward_kinematics
-from foosim.protocol.layout import build_layout
-from foosim.protocol.scene import Box, Shape, Vector, multiply, place, rotate, swept_box, turn
-from foosim.protocol.scenes import build_scene
-from foosim.protocol.start import initial_numbers, place_ball
-from foosim.protocol.table_scene import spin_inertia
+from foosim.deployment.loader import load_deployment
+from foosim.world.initial_state import initial_numbers, place_ball
+from foosim.world.islands import reach_of
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import build_layout
+from foosim.world.scene import Box, Shape, Vector, multiply, place, rotate, swept_box, turn
+from foosim.world.scenes.build import build_scene
+from foosim.world.scenes.football_table import spin_inertia
 
 DEPLOYMENT = load_deployment((Path(__file__).parents[2] / "deploy" / "table.yaml").read_text(), "table.yaml")
 TABLE = DEPLOYMENT.table

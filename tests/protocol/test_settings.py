@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol import limits
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment, read_deployment
-from foosim.protocol.errors import DeploymentError
-from foosim.protocol.rod import RodRobot
+from foosim.common import limits
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import apply_sets, load_deployment, read_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.robots.foosball_rod import RodRobot
 
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 

@@ -8,11 +8,11 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.protocol import loop as loops
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.loop import Loop
-from foosim.protocol.orphan import UNKNOWN_NS, Orphan
-from foosim.protocol.standstill import STOOD_NS, Standstill, told
+from foosim.runtime import loop as loops
+from foosim.runtime.loop import Loop
+from foosim.runtime.standstill import STOOD_NS, Standstill, told
+from foosim.runtime.supervisor_timeout import UNKNOWN_NS, Orphan
+from foosim.runtime.transport.inbox import Inbox
 
 MS: Final = 1_000_000
 S: Final = 1_000 * MS

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.protocol import units
-from foosim.protocol.errors import BadValue
-from foosim.protocol.units import Dimension, Pace, format_ns, format_rate, parse, parse_ns, parse_pace
+from foosim.common import units
+from foosim.common.errors import BadValue
+from foosim.common.units import Dimension, Pace, format_ns, format_rate, parse, parse_ns, parse_pace
 
 DIMENSIONS = [value for value in vars(units).values() if isinstance(value, Dimension)]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MINUTE_TICKS = 30_000

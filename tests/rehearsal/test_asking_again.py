@@ -9,7 +9,7 @@ from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Part, Want
 from foosim.rehearsal.bus import Traced, Weather
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.settings import Settings
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

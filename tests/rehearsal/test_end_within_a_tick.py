@@ -6,12 +6,12 @@ import re
 from pathlib import Path
 from typing import Final
 
-from foosim.protocol.limits import RELEASE_AHEAD
-from foosim.rehearsal.rehearse import rehearse
+from foosim.capture.info import capture_info
+from foosim.capture.reader import open_capture
+from foosim.common.limits import RELEASE_AHEAD
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import IDLE_NS_MAX, System
-from foosim.rehearsal.verify import verify_capture
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import open_capture
+from foosim.replay.verify import verify_capture
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -30,9 +30,7 @@ def test_a_run_that_loses_a_player_is_captured_to_its_last_commit(tmp_path: Path
 
     sets = ("engine=pure", "deadlines.lockstep_fast=200 ms", *BY_PERIOD)
     run = rehearse(TABLE.read_text(), TABLE.name, 400, 2, sets, prepare=prepare, capture=path).json
-    found = re.fullmatch(
-        r"player-red has not answered tick (\d+) for 0.2 s \(deadlines.lockstep_fast\)", run["reason"]
-    )
+    found = re.fullmatch(r"player-red has not answered tick (\d+) for 0.2 s \(deadlines.lockstep_fast\)", run["reason"])
     assert found is not None, run["reason"]
     waited = int(found[1])
     assert waited % PERIOD == 0 and waited < run["ticks"] <= waited + 1 + RELEASE_AHEAD, "nodes are ahead of that tick"

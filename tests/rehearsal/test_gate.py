@@ -11,7 +11,7 @@ from bench.gate import find
 from bench.mutants import MUTANTS
 from bench.mutants.planting import Mutant
 from foosim.node.core import NodeCore
-from foosim.rehearsal.swarm import fly
+from foosim.rehearsal.swarm.campaign import fly
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SEEDS_MAX: Final = 1000

@@ -18,21 +18,22 @@ from typing import Any, ClassVar, Final
 import pytest
 from typer.testing import CliRunner
 
+from foosim.capture.reader import open_capture
+from foosim.cli import rehearse as rehearse_command
+from foosim.cli.rehearse import app
+from foosim.cli.replay import app as replay_app
 from foosim.client.player import Commands, Samples
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.disk import free_bytes
-from foosim.protocol.errors import Refused
-from foosim.protocol.units import Pace
-from foosim.rehearsal import attendant, onlooker, rehearse_command
+from foosim.common.errors import Refused
+from foosim.common.units import Pace
+from foosim.deployment.schema import Deployment
+from foosim.rehearsal import attendant, onlooker
 from foosim.rehearsal.attendant import INTERRUPTS_MAX
 from foosim.rehearsal.onlooker import LOOK_S, STOOD_S, Onlooker
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.rehearse_command import app
-from foosim.rehearsal.replay_command import app as replay_app
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.settings import AtWork
+from foosim.runtime.disk import free_bytes
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub.capture_reader import open_capture
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -257,9 +258,7 @@ def test_a_rehearsal_that_a_ctrl_z_has_stopped_goes_on(monkeypatch: pytest.Monke
         os.write(told, bytes([before, threads_of(os.getpid())]))
 
     Hangs.how = stops
-    child = forked(
-        lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, LONG), on_stuck=lambda result: None)
-    )
+    child = forked(lambda: rehearse(TABLE.read_text(), TABLE.name, 60, 1, (*SETS, LONG), on_stuck=lambda result: None))
     assert os.WIFSTOPPED(os.waitpid(child, os.WUNTRACED)[1])
     stopped = threads_of(child)
     os.kill(child, signal.SIGCONT)

@@ -10,12 +10,12 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from foosim.protocol import limits
-from foosim.protocol.mesh import AssetError
-from foosim.rehearsal.rehearse import rehearse
+from foosim.capture.reader import open_capture
+from foosim.common import limits
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.verify import verify, verify_capture
-from foosim.vhub.capture_reader import open_capture
+from foosim.replay.verify import verify, verify_capture
+from foosim.world.mesh import AssetError
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()

@@ -10,15 +10,17 @@ from typing import Final
 import pytest
 from typer.testing import CliRunner
 
+from foosim.cli.rehearse import app
+from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
-from foosim.node.step import Work
+from foosim.node.tick import Work
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.messages import Deliveries, Done, Sent
 from foosim.rehearsal.bus import CALM
 from foosim.rehearsal.clock import Clock
 from foosim.rehearsal.failures import Broken
-from foosim.rehearsal.faults import (
+from foosim.rehearsal.swarm.campaign import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
+from foosim.rehearsal.swarm.faults import (
     CHANGES_THE_WORLD,
     FAULT_OF,
     HEALED_TICK,
@@ -28,9 +30,7 @@ from foosim.rehearsal.faults import (
     Dice,
     loses_players,
 )
-from foosim.rehearsal.packet_laws import PacketLaws
-from foosim.rehearsal.rehearse_command import app
-from foosim.rehearsal.swarm import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
+from foosim.rehearsal.swarm.packet_invariants import PacketLaws
 from foosim.rehearsal.system import Settings
 from foosim.vhub.records import TickRecord
 

@@ -14,18 +14,19 @@ import pytest
 from mcap import records
 from typer.testing import CliRunner
 
-from foosim.protocol.errors import Refused
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.replay_command import app
-from foosim.rehearsal.report import Report, gather
+from foosim.capture import contents as capture_contents
+from foosim.capture.contents import declare_topics, write_all
+from foosim.capture.mcap.checks import CHECKS
+from foosim.capture.mcap.format import McapFile, Message
+from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import PROFILE, Fate, PacketRow
+from foosim.cli.replay import app
+from foosim.common.errors import Refused
+from foosim.console.report.collect import Report, gather
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import System
-from foosim.vhub import capture_contents, capture_writer
-from foosim.vhub.capture_contents import declare_topics, write_all
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.mcap_checks import CHECKS
-from foosim.vhub.mcap_file import McapFile, Message
-from foosim.vhub.mcap_writer import McapWriter
-from foosim.vhub.rows import PROFILE, Fate, PacketRow
+from foosim.vhub.recording import writer as capture_writer
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -8,21 +8,21 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import BadValue
-from foosim.protocol.frame import Frame
-from foosim.protocol.start import AddedEntity, Start, first_frame, start_with
-from foosim.rehearsal.rehearse import Rehearsed, rehearse, with_nodes
-from foosim.rehearsal.rehearse_command import app as rehearse_app
-from foosim.rehearsal.replay_command import app as replay_app
-from foosim.rehearsal.replica import Replica
+from foosim.capture.info import capture_info
+from foosim.capture.reader import open_capture
+from foosim.capture.start_frame import BadBranch, read_branch
+from foosim.cli.rehearse import app as rehearse_app
+from foosim.cli.replay import app as replay_app
+from foosim.common.errors import BadValue
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.rehearsal.resimulation import Replica
+from foosim.rehearsal.run import Rehearsed, rehearse, with_nodes
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.verify import verify_capture
+from foosim.replay.verify import verify_capture
 from foosim.supervisor import records
-from foosim.vhub.branching import BadBranch, read_branch
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.records import fold
+from foosim.world.frame import Frame
+from foosim.world.initial_state import AddedEntity, Start, first_frame, start_with
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT = TABLE.read_text()

@@ -8,17 +8,17 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import BadValue
-from foosim.rehearsal.diff import diff_captures
-from foosim.rehearsal.export import export_capture
-from foosim.vhub.branching import read_branch
-from foosim.vhub.capture_cut import cut_capture
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, TICK
-from foosim.vhub.viewing import POSES, SCENE
+from foosim.analysis.diff import diff_captures
+from foosim.analysis.export import export_capture
+from foosim.capture.cut import cut_capture
+from foosim.capture.foxglove import POSES, SCENE
+from foosim.capture.info import capture_info
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, TICK
+from foosim.capture.start_frame import read_branch
+from foosim.common.errors import BadValue
+from foosim.deployment.loader import load_deployment
 from tests.replay.conftest import ADDED_AT, TICK_NS, contents_of, damaged, messages_of, replay
 
 MS = 1_000_000

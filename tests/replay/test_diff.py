@@ -7,12 +7,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.protocol.errors import BadValue
-from foosim.rehearsal import diff as diff_module
-from foosim.rehearsal.diff import diff_captures, first_difference
-from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, PACKETS, TICK
-from foosim.vhub.viewing import POSES
+from foosim.analysis import diff as diff_module
+from foosim.analysis.diff import diff_captures, first_difference
+from foosim.capture.foxglove import POSES
+from foosim.capture.mcap.format import Message
+from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, PACKETS, TICK
+from foosim.common.errors import BadValue
 from tests.replay.conftest import capture_to, messages_of, replay, rewritten, with_row
 
 

@@ -13,12 +13,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from foosim.client.payloads import Command, decode_payload
-from foosim.protocol.errors import BadValue, Failed
-from foosim.rehearsal import export as export_module
-from foosim.rehearsal.export import export_capture
-from foosim.rehearsal.tables import table_names
-from foosim.vhub.capture_reader import open_capture
+from foosim.analysis import export as export_module
+from foosim.analysis.export import export_capture
+from foosim.analysis.tables import table_names
+from foosim.capture.reader import open_capture
+from foosim.common.errors import BadValue, Failed
+from foosim.world.payloads import Command, decode_payload
 from tests.replay.conftest import TICK_NS, damaged, messages_of, replay, rewritten, with_row
 
 

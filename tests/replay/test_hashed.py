@@ -7,11 +7,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.protocol.deployment_file import load_deployment
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.whatif import what_if
-from foosim.vhub.branching import read_branch
-from foosim.vhub.capture_reader import open_capture
+from foosim.capture.reader import open_capture
+from foosim.capture.start_frame import read_branch
+from foosim.deployment.loader import load_deployment
+from foosim.rehearsal.run import rehearse
+from foosim.replay.what_if import what_if
 from tests.replay.conftest import TABLE, disturb, replay
 
 NETWORK = (

@@ -10,15 +10,16 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.journal import Journal
-from foosim.rehearsal.diff import diff_captures
-from foosim.rehearsal.rehearse import rehearse
+from foosim.analysis.diff import diff_captures
+from foosim.capture import contents as capture_contents
+from foosim.capture.info import capture_info
+from foosim.capture.reader import open_capture
+from foosim.capture.start_frame import BadBranch, read_branch
+from foosim.deployment.loader import load_deployment
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
-from foosim.vhub import capture_contents, capture_writer
-from foosim.vhub.branching import BadBranch, read_branch
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import open_capture
+from foosim.runtime.journal import Journal
+from foosim.vhub.recording import writer as capture_writer
 from tests.replay.conftest import TABLE, damaged, messages_of, replay
 
 

@@ -22,9 +22,9 @@ from typing import Any
 import msgspec
 import pytest
 
+from foosim.capture.reader import open_capture
 from foosim.client.errors import ConnectionFailed
-from foosim.client.payloads import BallPosition
-from foosim.client.replay import (
+from foosim.client.replay_listener import (
     Replay,
     Replayed,
     ReplayedLine,
@@ -37,15 +37,15 @@ from foosim.client.replay import (
     ReplayTime,
     hear_replay,
 )
-from foosim.protocol.certificate_folder import CertificateError
-from foosim.protocol.certificates import load_credentials
-from foosim.protocol.errors import BadValue
-from foosim.protocol.units import Pace
-from foosim.rehearsal.play import PlayOptions, PlayResult, Stopper, play_capture
-from foosim.rehearsal.play_terminal import Lines
-from foosim.rehearsal.rehearse import rehearse
-from foosim.supervisor import pki
-from foosim.vhub.capture_reader import open_capture
+from foosim.common.errors import BadValue
+from foosim.common.units import Pace
+from foosim.launcher.pki import certificates
+from foosim.rehearsal.run import rehearse
+from foosim.replay.main import PlayOptions, PlayResult, Stopper, play_capture
+from foosim.replay.terminal import Lines
+from foosim.runtime.transport.certificate_folder import CertificateError
+from foosim.runtime.transport.certificates import load_credentials
+from foosim.world.payloads import BallPosition
 from tests.replay.conftest import TABLE, TICK_NS, TICKS, damaged, replay
 
 MS = 1_000_000
@@ -293,8 +293,8 @@ def test_nobody_at_an_address_is_told(tmp_path: Path) -> None:
 
 def test_with_certificates_operators_listen_and_nobody_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, alone = tmp_path / "pki", tmp_path / "alone"
-    pki.init(folder)
-    pki.issue(folder, ["vhub", "operator.admin", "client.player-red"])
+    certificates.init(folder)
+    certificates.issue(folder, ["vhub", "operator.admin", "client.player-red"])
     alone.mkdir()
     for name in ("ca.pem", "client.player-red.pem", "client.player-red.key"):
         (alone / name).write_bytes((folder / name).read_bytes())
@@ -313,7 +313,7 @@ def test_with_certificates_operators_listen_and_nobody_else(tmp_path: Path, monk
         with pytest.raises(BadValue, match="needs certificates"):
             hear_replay(play.address)
         player = partial(load_credentials, identity="client.player-red")
-        monkeypatch.setattr("foosim.client.replay.operator_credentials", player)
+        monkeypatch.setattr("foosim.client.replay_listener.operator_credentials", player)
         with pytest.raises(ReplayGone, match="no answer to status"):
             hear_replay(play.address, pki=alone, answer_s=0.5)
         assert play.stage.text.getvalue().count("\n") < 10

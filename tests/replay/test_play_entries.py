@@ -13,9 +13,11 @@ from foxglove.messages import SceneUpdate
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
+from foosim.capture.reader import Scan, deployment_of, open_capture, read_about
+from foosim.capture.rows import PacketRow
+from foosim.common.errors import BadValue
+from foosim.common.names import LINE_NAMES
 from foosim.protocol.codec import decode
-from foosim.protocol.errors import BadValue
-from foosim.protocol.names import LINE_NAMES
 from foosim.protocol.replay_messages import (
     LOG,
     PACKETS,
@@ -28,12 +30,10 @@ from foosim.protocol.replay_messages import (
     PlayedRow,
     PlayedScene,
 )
-from foosim.rehearsal.play_entries import Entries, Entry, Selection, make_selection
-from foosim.rehearsal.play_reader import Read, ReadAhead, read_span
-from foosim.rehearsal.playing import Reading, Span
-from foosim.rehearsal.rehearse import rehearse
-from foosim.vhub.capture_reader import Scan, deployment_of, open_capture, read_about
-from foosim.vhub.rows import PacketRow
+from foosim.rehearsal.run import rehearse
+from foosim.replay.core import Reading, Span
+from foosim.replay.entries import Entries, Entry, Selection, make_selection
+from foosim.replay.reader import Read, ReadAhead, read_span
 from tests.replay.conftest import TABLE, TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
 
 MS = 1_000_000

@@ -9,15 +9,15 @@ from typing import Any
 
 import pytest
 
-from foosim.protocol.errors import BadValue
-from foosim.protocol.json_text import decode_json, encode_json
-from foosim.protocol.limits import LAG_ANCHOR_NS
+from foosim.common.errors import BadValue
+from foosim.common.json_text import decode_json, encode_json
+from foosim.common.limits import LAG_ANCHOR_NS
+from foosim.common.units import Pace, parse_pace
 from foosim.protocol.messages import Answer, Request
-from foosim.protocol.units import Pace, parse_pace
-from foosim.rehearsal.play_entries import Entry
-from foosim.rehearsal.play_requests import ARGUMENTS, ASKING_MAX, Requests
-from foosim.rehearsal.play_terminal import split_keys
-from foosim.rehearsal.playing import AT_ONCE_MAX, STEPS_MAX, Playback, Span
+from foosim.replay.core import AT_ONCE_MAX, STEPS_MAX, Playback, Span
+from foosim.replay.entries import Entry
+from foosim.replay.requests import ARGUMENTS, ASKING_MAX, Requests
+from foosim.replay.terminal import split_keys
 
 MS = 1_000_000
 TICK_NS = 2 * MS

@@ -11,17 +11,17 @@ import pytest
 from msgspec.structs import replace
 from typer.testing import CliRunner
 
-from foosim.protocol import limits
+from foosim.capture.reader import open_capture
+from foosim.cli.replay import app
+from foosim.common import limits
 from foosim.protocol.channels import SUPERVISOR
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Commit
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
-from foosim.rehearsal.replay_command import app
+from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.verify import verify_capture
+from foosim.replay.verify import verify_capture
 from foosim.supervisor.account import Recovered, close_outages, tell_again
 from foosim.supervisor.records import CommitRecord, Record, RecoveredRecord, fold
-from foosim.vhub.capture_reader import open_capture
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300

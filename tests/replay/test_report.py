@@ -13,19 +13,19 @@ from typing import Final
 import numpy as np
 import pytest
 
+from foosim.capture.info import capture_info
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import PACKETS, EpochRow, OwnerRow, PacketRow
+from foosim.cli import replay_report
+from foosim.console.report.charts import drawings
+from foosim.console.report.collect import Band, BinReport, Mark, Report, _Gathered, bin_width_ns, gather
+from foosim.console.report.page import page
+from foosim.console.report.tallies import SAMPLES, LinkTally, Sample
 from foosim.console.shown.asked import moves
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import BALL, WORLD
-from foosim.protocol.start import initial_frame, kickoff_ticks
-from foosim.rehearsal import report_command
-from foosim.rehearsal.report import Band, BinReport, Mark, Report, _Gathered, bin_width_ns, gather
-from foosim.rehearsal.report_drawings import drawings
-from foosim.rehearsal.report_page import page
-from foosim.rehearsal.report_tallies import SAMPLES, LinkTally, Sample
-from foosim.rehearsal.whatif import what_if
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import PACKETS, EpochRow, OwnerRow, PacketRow
+from foosim.replay.what_if import what_if
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame, kickoff_ticks
+from foosim.world.layout import BALL, WORLD
 from tests.replay.conftest import damaged, messages_of, packet, replay, rewritten, with_row
 from tests.replay.report_pages import Page
 
@@ -287,7 +287,7 @@ def test_the_command_writes_a_page_and_overwrites_none(radio_run: Path, tmp_path
 def test_a_page_that_the_disk_does_not_take_leaves_no_file(
     radio_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(report_command, "page", lambda found: "x" * 100_000)
+    monkeypatch.setattr(replay_report, "page", lambda found: "x" * 100_000)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))

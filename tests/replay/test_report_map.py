@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as replace_row
 
-from foosim.protocol.frame import Frame
-from foosim.protocol.scene import Box, Cylinder, Shape, turn
-from foosim.rehearsal.report import Report
-from foosim.rehearsal.report_map import MapMaker, Place, outline, simplified
-from foosim.rehearsal.report_page import page
-from foosim.vhub.capture_reader import open_capture
+from foosim.capture.reader import open_capture
+from foosim.console.report.collect import Report
+from foosim.console.report.map import MapMaker, Place, outline, simplified
+from foosim.console.report.page import page
+from foosim.world.frame import Frame
+from foosim.world.scene import Box, Cylinder, Shape, turn
 from tests.replay.conftest import packet
 from tests.replay.report_pages import Page
 

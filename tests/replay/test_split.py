@@ -7,15 +7,15 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.protocol.deployment_file import load_deployment
-from foosim.rehearsal.diff import diff_captures
-from foosim.rehearsal.play_reader import read_span
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.report import gather
-from foosim.rehearsal.whatif import what_if
-from foosim.vhub.branching import read_branch
-from foosim.vhub.capture_parts import files_from
-from foosim.vhub.capture_reader import open_capture
+from foosim.analysis.diff import diff_captures
+from foosim.capture.parts import files_from
+from foosim.capture.reader import open_capture
+from foosim.capture.start_frame import read_branch
+from foosim.console.report.collect import gather
+from foosim.deployment.loader import load_deployment
+from foosim.rehearsal.run import rehearse
+from foosim.replay.reader import read_span
+from foosim.replay.what_if import what_if
 from tests.replay.conftest import SETS, TABLE, TICKS, disturb, replay
 
 

@@ -11,21 +11,21 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
+from foosim.capture.mcap.format import McapFile, Message
+from foosim.capture.reader import CapturedTick, open_capture
+from foosim.capture.rows import OwnerRow
+from foosim.cli.options import BadCapture
+from foosim.cli.rehearse import app as rehearse_app
+from foosim.cli.replay import app
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
 from foosim.node.core import NodeCore
 from foosim.node.engines import ENGINES
 from foosim.node.engines.interface import Engine
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.layout import Layout
-from foosim.rehearsal.capture_arguments import BadCapture
-from foosim.rehearsal.rehearse import Rehearsed, rehearse
-from foosim.rehearsal.rehearse_command import app as rehearse_app
-from foosim.rehearsal.replay_command import app
+from foosim.rehearsal.run import Rehearsed, rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.verify import verify, verify_capture
-from foosim.vhub.capture_reader import CapturedTick, open_capture
-from foosim.vhub.mcap_file import McapFile, Message
-from foosim.vhub.rows import OwnerRow
+from foosim.replay.verify import verify, verify_capture
+from foosim.world.layout import Layout
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT = TABLE.read_text()

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from foosim.client.replay import Replay, hear_replay
+from foosim.cli.replay_view import open_sources
+from foosim.client.replay_listener import Replay, hear_replay
+from foosim.common.errors import BadValue, Refused
 from foosim.console.recorded.capture_source import FileSource
 from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.replay_source import PlayedSource
 from foosim.console.shown.source import Wanted
-from foosim.protocol.errors import BadValue, Refused
-from foosim.rehearsal.view_command import open_sources
 from tests.console.test_capture_source import Heard, running
 from tests.replay.conftest import TICKS, replay
 from tests.replay.test_play import playing

@@ -11,15 +11,15 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from foosim.protocol.deployment_file import load_deployment, with_network
-from foosim.protocol.errors import DeploymentError
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.whatif import WhatIf, _age_ms, what_if
-from foosim.rehearsal.whatif_picture import picture
-from foosim.rehearsal.whatif_reading import Offers
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.rows import PACKETS, PacketRow
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import PACKETS, PacketRow
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import load_deployment, with_network
+from foosim.rehearsal.run import rehearse
+from foosim.replay.what_if import WhatIf, _age_ms, what_if
+from foosim.replay.what_if_chart import picture
+from foosim.replay.what_if_reader import Offers
 from tests.replay.conftest import TABLE, TICKS, Done, capture_to, disturb, messages_of, replay, rewritten, with_row
 from tests.turns import BY_PERIOD
 
@@ -59,7 +59,7 @@ def test_by_its_own_network_every_fate_is_the_captured_one(tmp_path: Path, netwo
 
 def test_frames_of_every_tick_are_read_and_not_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     capture = open_capture(captured(tmp_path / "run.mcap", "wifi", "capture.frames_every=1 tick"))
-    monkeypatch.setattr("foosim.rehearsal.whatif_reading.Replica", None)
+    monkeypatch.setattr("foosim.replay.what_if_reader.Replica", None)
     assert what_if(capture).changed == 0
 
 

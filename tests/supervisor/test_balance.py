@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.units import Pace
-from foosim.rehearsal.rehearse import rehearse
+from foosim.common.units import Pace
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.balance import EVERY_NS, SETTLE_NS, STAY_NS, Balancer, Shift, shifts_at_once
+from foosim.supervisor.load_balancing import EVERY_NS, SETTLE_NS, STAY_NS, Balancer, Shift, shifts_at_once
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 OWNERS = {"a": "n1", "b": "n1", "c": "n1", "d": "n2"}

@@ -9,11 +9,11 @@ from typing import Final
 
 import pytest
 
+from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.messages import Epoch
-from foosim.protocol.units import Pace
-from foosim.rehearsal.rehearse import Rehearsed, with_nodes
+from foosim.rehearsal.run import Rehearsed, with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import fold

@@ -9,15 +9,16 @@ from pathlib import Path
 
 import pytest
 
+from foosim.cli import supervisor
+from foosim.common.errors import Refused
+from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.schema import Capture
+from foosim.launcher.new_capture import check_capture, check_rooms
+from foosim.launcher.pki import certificates
 from foosim.node.main import main as run_node
-from foosim.protocol.deployment import Capture
-from foosim.protocol.deployment_file import load_deployment, read_deployment_text
-from foosim.protocol.disk import free_bytes
-from foosim.protocol.errors import Refused
 from foosim.protocol.identity import identities_of
-from foosim.supervisor import cli, pki
-from foosim.supervisor.new_capture import check_capture, check_rooms
-from foosim.supervisor.run_folder import runs_folder
+from foosim.runtime.disk import free_bytes
+from foosim.runtime.run_folder import runs_folder
 from tests.supervisor.conftest import Command, Typed
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
@@ -30,7 +31,7 @@ COMMANDS = (
 @pytest.fixture
 def command(typed: Typed) -> Command:
     """Runs `foosim-supervisor`."""
-    return typed("foosim-supervisor", cli.main)
+    return typed("foosim-supervisor", supervisor.main)
 
 
 def test_help_names_every_command_and_the_exit_codes(command: Command) -> None:
@@ -77,14 +78,14 @@ def test_a_valid_file_whose_players_cannot_be_found_is_refused_but_for_those_on_
     command: Command, tmp_path: Path
 ) -> None:
     path, text = tmp_path / "own.yaml", TABLE.read_text()
-    assert text.count("class: foosim.client.players:Team") == 2
-    path.write_text(text.replace("class: foosim.client.players:Team", "class: own_team:Team"))
+    assert text.count("class: foosim.players.football:Team") == 2
+    path.write_text(text.replace("class: foosim.players.football:Team", "class: own_team:Team"))
     done = command("validate", path)
     assert done.code == 2
     whose = [line.split(": ")[1] for line in done.err.splitlines()]
     assert whose == ["players.player-red.class", "players.player-blue.class"]
     lines = text.splitlines()
-    number = next(at for at, line in enumerate(lines, 1) if "foosim.client.players:Team" in line)
+    number = next(at for at, line in enumerate(lines, 1) if "foosim.players.football:Team" in line)
     place = f"{path}:{number}:{lines[number - 1].index('foosim.') + 1}: "
     missing = "there is no module own_team (is the folder that it is in on PYTHONPATH?), 'own_team:Team'"
     assert done.err.splitlines()[0] == f"{place}players.player-red.class: {missing}"
@@ -105,14 +106,14 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--set", "seed=2", "--set", "engine=bulet"), 2, "--set:2:8: engine: "),
         (("--engine", "bulet"), 2, "nearest is 'bullet'"),
         (
-            ("--set", "players.player-red.class=foosim.client.players.Team"),
+            ("--set", "players.player-red.class=foosim.players.football.Team"),
             2,
-            "nearest is 'foosim.client.players:Team'",
+            "nearest is 'foosim.players.football:Team'",
         ),
         (
-            ("--set", "players.player-red.class=foosim.client.players:Teem"),
+            ("--set", "players.player-red.class=foosim.players.football:Teem"),
             2,
-            "nearest is 'foosim.client.players:Team'",
+            "nearest is 'foosim.players.football:Team'",
         ),
         (
             ("--set", "players.player-red.class=own:Acts"),
@@ -276,14 +277,14 @@ def test_every_program_says_in_its_words_what_was_typed(typed: Typed, program: s
 
 def test_who_lacks_a_certificate_is_named_before_anything_starts(command: Command, tmp_path: Path) -> None:
     folder = tmp_path / "certs"
-    pki.init(folder)
-    pki.issue(folder, identities_of(load_deployment(read_deployment_text(TABLE), "table.yaml")))
+    certificates.init(folder)
+    certificates.issue(folder, identities_of(load_deployment(read_deployment_text(TABLE), "table.yaml")))
     (folder / "node.blue.key").unlink()
     (folder / "client.player-red.pem").unlink()
     done = command("up", TABLE, "--pki", folder)
     assert done.code == 3 and "node.blue.key: cannot be read, No such file" in done.err
     (folder / "node.blue.pem").unlink()
-    pki.issue(folder, ["node.blue"])
+    certificates.issue(folder, ["node.blue"])
     done = command("up", TABLE, "--pki", folder)
     assert done.code == 3 and f"{folder} has no certificate of client.player-red; it has: " in done.err
     done = command("up", TABLE, "--pki", folder, "--insecure")

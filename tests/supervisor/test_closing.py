@@ -9,13 +9,13 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.common.units import Pace
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.frame import Frame
-from foosim.protocol.units import Pace
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.status import result, status
 from foosim.vhub.core import HubCore
+from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 S: Final = 1_000_000_000
@@ -24,9 +24,7 @@ S: Final = 1_000_000_000
 class Slow:
     """A vHub that takes long to close its capture: rows are written until `stalls_s`, and all are after `takes_s`."""
 
-    def __init__(
-        self, takes_s: float, stalls_s: float = 1e9, capture: str = "run.mcap", syncs_s: float = 0.0
-    ) -> None:
+    def __init__(self, takes_s: float, stalls_s: float = 1e9, capture: str = "run.mcap", syncs_s: float = 0.0) -> None:
         self.syncs_ns = int(syncs_s * S)
         """Until then the disk writes."""
         self.takes_ns, self.stalls_ns, self.capture = int(takes_s * S), int(stalls_s * S), capture

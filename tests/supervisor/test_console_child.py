@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.errors import BadValue
-from foosim.supervisor.console_child import Page, page_of
+from foosim.common.errors import BadValue
+from foosim.launcher.console_child import Page, page_of
 
 
 def test_a_page_has_a_recording_beside_it_whose_path_holds_in_any_folder(

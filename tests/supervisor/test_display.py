@@ -7,10 +7,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.units import parse_pace
-from foosim.supervisor.core import SupervisorCore
-from foosim.supervisor.display import (
+from foosim.common.units import parse_pace
+from foosim.launcher.display import (
     LINKS_SHOWN_MAX,
     Display,
     closing_text,
@@ -19,6 +17,8 @@ from foosim.supervisor.display import (
     recovery_text,
     render_text,
 )
+from foosim.protocol.fingerprint import library_fingerprint
+from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import NO_PACKETS, status
 

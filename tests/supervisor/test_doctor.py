@@ -10,16 +10,17 @@ from typing import Final
 import pytest
 from typer.testing import CliRunner
 
-from foosim.protocol.deployment import Capture, Deployment
-from foosim.protocol.deployment_file import load_deployment, read_deployment_text
-from foosim.protocol.disk import free_bytes
-from foosim.protocol.errors import Refused
+from foosim.cli.doctor import app
+from foosim.common.errors import Refused
+from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.schema import Capture, Deployment
+from foosim.launcher.doctor import checks as doctor
+from foosim.launcher.doctor.checks import CHECKS, Case, Finding, examine, is_well
+from foosim.launcher.new_capture import check_rooms
+from foosim.launcher.pki import certificates
 from foosim.protocol.identity import identities_of
-from foosim.supervisor import doctor, pki
-from foosim.supervisor.doctor import CHECKS, Case, Finding, examine, is_well
-from foosim.supervisor.doctor_command import app
-from foosim.supervisor.new_capture import check_rooms
-from foosim.supervisor.run_folder import runs_folder
+from foosim.runtime.disk import free_bytes
+from foosim.runtime.run_folder import runs_folder
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -32,8 +33,8 @@ def deployment() -> Deployment:
 @pytest.fixture
 def folder(tmp_path: Path, deployment: Deployment) -> Path:
     path = tmp_path / "pki"
-    pki.init(path)
-    pki.issue(path, identities_of(deployment))
+    certificates.init(path)
+    certificates.issue(path, identities_of(deployment))
     return path
 
 
@@ -60,8 +61,8 @@ def test_where_all_is_well_every_check_says_so(deployment: Deployment, folder: P
 def test_the_classes_of_players_are_imported_where_they_are_to_run(tmp_path: Path) -> None:
     hosts = "\nhosts:\n  arm:\n    address: 192.0.2.7\n"
     text = read_deployment_text(TABLE) + hosts
-    text = text.replace("class: foosim.client.players:Team", "class: own_team:Team\n    host: arm", 1)
-    text = text.replace("class: foosim.client.players:Team", "class: foosim.client.players:Teem", 1)
+    text = text.replace("class: foosim.players.football:Team", "class: own_team:Team\n    host: arm", 1)
+    text = text.replace("class: foosim.players.football:Team", "class: foosim.players.football:Teem", 1)
     deployment = load_deployment(text, "table.yaml")
     here, there = Case(deployment, "127.0.0.1"), Case(deployment, "127.0.0.1", host="arm")
     (finding,) = [finding for finding in examine(here) if finding.check == "players"]
@@ -79,7 +80,7 @@ def _no_certificate(folder: Path) -> None:
 def _short(folder: Path) -> None:
     for suffix in (".pem", ".key"):
         (folder / f"node.red{suffix}").unlink()
-    pki.issue(folder, ["node.red"], days=3)
+    certificates.issue(folder, ["node.red"], days=3)
 
 
 def _swapped(folder: Path) -> None:
@@ -123,7 +124,7 @@ def test_the_servers_need_the_host_where_they_listen(deployment: Deployment, fol
     finding = found(case, "vhub")
     assert finding.state == "problem" and finding.remedy.endswith("vhub --host 127.0.0.9")
     assert found(case, "node.red").state == "fine", "who only connects listens nowhere"
-    pki.renew(folder, ["supervisor", "vhub"], hosts=["127.0.0.9"])
+    certificates.renew(folder, ["supervisor", "vhub"], hosts=["127.0.0.9"])
     assert found(case, "vhub").state == "fine"
 
 
@@ -132,7 +133,7 @@ def test_clients_with_passwords_need_one(folder: Path) -> None:
     case = Case(load_deployment(text, "table.yaml"), "127.0.0.1", pki=folder)
     finding = found(case, "client.player-red")
     assert finding.state == "problem" and finding.remedy.endswith("client.player-red --password")
-    pki.issue_password(folder, "client.player-red")
+    certificates.issue_password(folder, "client.player-red")
     assert "a password and a certificate" in found(case, "client.player-red").text
     (folder / "client.player-red.pem").unlink()
     assert found(case, "client.player-red").state == "fine"

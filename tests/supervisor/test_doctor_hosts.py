@@ -11,18 +11,20 @@ from typing import Any, Final
 import msgspec
 import pytest
 
-from foosim.protocol.certificate_files import read_certificate
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import Malformed
-from foosim.protocol.hosts import Host
-from foosim.supervisor import doctor, install, pki
-from foosim.supervisor.doctor import Case, Finding, examine, fingerprint
-from foosim.supervisor.doctor_hosts import CLOCK_WARN_NS, Told, findings_of
-from foosim.supervisor.doctor_there import GREETING, Answer, Question, serve
-from foosim.supervisor.pki_hosts import files_for
-from foosim.supervisor.remote import Remote
-from foosim.supervisor.units import units_of
+from foosim.common.errors import Malformed
+from foosim.deployment.hosts import Host
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.launcher.doctor import checks as doctor
+from foosim.launcher.doctor.checks import Case, Finding, examine, fingerprint
+from foosim.launcher.doctor.hosts import CLOCK_WARN_NS, Told, findings_of
+from foosim.launcher.doctor.remote import GREETING, Answer, Question, serve
+from foosim.launcher.hosts import install
+from foosim.launcher.hosts.ssh import Remote
+from foosim.launcher.hosts.systemd_units import units_of
+from foosim.launcher.pki import certificates
+from foosim.launcher.pki.hosts import files_for
+from foosim.runtime.transport.certificate_files import read_certificate
 
 CLUSTER: Final = Path(__file__).parents[2] / "deploy" / "cluster.yaml"
 LISTEN: Final = "192.168.10.1:7400"
@@ -98,8 +100,8 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_host_has_its_own_certificates_of_the_runs_root(tmp_path: Path) -> None:
     folder, there = tmp_path / "pki", tmp_path / "there"
     deployment = deployed()
-    ca = fingerprint(read_certificate(pki.init(folder)))
-    pki.issue(folder, ["node.blue", "vhub"])
+    ca = fingerprint(read_certificate(certificates.init(folder)))
+    certificates.issue(folder, ["node.blue", "vhub"])
     there.mkdir()
     for name in {*files_for(deployment, "left"), *files_for(deployment, "radio")}:
         (there / name).write_bytes((folder / name).read_bytes())

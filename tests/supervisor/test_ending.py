@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.supervisor import launcher, memory
+from foosim.launcher import memory, processes
+from foosim.launcher.memory import OomKills, oom_kills
+from foosim.launcher.processes import Child
 from foosim.supervisor.ending import Ending
-from foosim.supervisor.launcher import Child
-from foosim.supervisor.memory import OomKills, oom_kills
 
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 
@@ -77,7 +77,7 @@ def test_what_is_killed_on_a_machine_after_its_end_is_not_held_against_a_process
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     counts = [OomKills(0, 5), OomKills(0, 6)]
-    monkeypatch.setattr(launcher, "oom_kills", lambda: counts.pop(0))
+    monkeypatch.setattr(processes, "oom_kills", lambda: counts.pop(0))
     ended: Any = SimpleNamespace(poll=lambda: -9)
     child = Child("red", ("foosim-node",), tmp_path / "log", ended, oom_kills=OomKills(0, 5))
     for _ in range(2):

@@ -10,21 +10,21 @@ from typing import Final
 
 import pytest
 
+from foosim.capture.reader import open_capture
+from foosim.capture.start_frame import read_branch
+from foosim.cli.supervisor import main
+from foosim.common.errors import Refused
+from foosim.deployment.loader import load_deployment
+from foosim.launcher.journal_check import check_journals, supervisor_records
+from foosim.launcher.plan import make_plan, plan_again
+from foosim.launcher.run_options import RunOptions, launch_of
 from foosim.protocol import channels
-from foosim.protocol import journal as journal_module
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import Refused
-from foosim.protocol.journal import Journal, journal_files, read_records
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings
-from foosim.supervisor.cli import main
-from foosim.supervisor.journal_check import check_journals, supervisor_records
+from foosim.runtime import journal as journal_module
+from foosim.runtime.journal import Journal, journal_files, read_records
+from foosim.runtime.run_folder import LAUNCHER_FILE, RunFolder, create_run
 from foosim.supervisor.main import serve
-from foosim.supervisor.plan import make_plan, plan_again
-from foosim.supervisor.run_folder import LAUNCHER_FILE, RunFolder, create_run
-from foosim.supervisor.run_options import RunOptions, launch_of
-from foosim.vhub.branching import read_branch
-from foosim.vhub.capture_reader import open_capture
 from tests.supervisor.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -43,9 +43,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, dict[str, list
 
 
 @pytest.fixture
-def folder(
-    run: tuple[bytes, dict[str, list[bytes]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> RunFolder:
+def folder(run: tuple[bytes, dict[str, list[bytes]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RunFolder:
     """The folder of a run whose launcher was killed with everything."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     folder = create_run("table", "rehearsal")

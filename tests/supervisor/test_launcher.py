@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from foosim.supervisor.launcher import Child, Launcher
+from foosim.launcher.processes import Child, Launcher
 
 HANGS = """
 import signal
-from foosim.protocol.process import end_with_stack
+from foosim.runtime.process import end_with_stack
 end_with_stack()
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
 def hangs():

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.protocol.deployment_file import load_deployment
-from foosim.supervisor.liveness import (
+from foosim.deployment.loader import load_deployment
+from foosim.launcher.liveness import (
     CUT_OFF_S,
     LOOK_S_MAX,
     STALLED_S,

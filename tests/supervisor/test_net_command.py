@@ -11,18 +11,18 @@ from typing import Any, Final
 import pytest
 import yaml
 
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.errors import DeploymentError
-from foosim.protocol.presets import PRESETS
-from foosim.protocol.settings import nested
-from foosim.rehearsal.rehearse import rehearse
+from foosim.analysis.explain import PacketName, explain_packet, parse_packet
+from foosim.analysis.explain_stages import STAGE_NAMES
+from foosim.analysis.network_tables import link_line, links_shown, use_text
+from foosim.capture.reader import CaptureData, open_capture
+from foosim.capture.rows import PACKETS, PacketRow
+from foosim.cli import net
+from foosim.common.errors import DeploymentError
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.network.presets import PRESETS
+from foosim.deployment.overrides import nested
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor import net_command
-from foosim.supervisor.net_text import link_line, links_shown, use_text
-from foosim.vhub.capture_reader import CaptureData, open_capture
-from foosim.vhub.explain import PacketName, explain_packet, parse_packet
-from foosim.vhub.explain_stages import STAGE_NAMES
-from foosim.vhub.rows import PACKETS, PacketRow
 from tests.supervisor.conftest import Command, Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -44,7 +44,7 @@ TICKS: Final = 320
 @pytest.fixture
 def command(typed: Typed) -> Command:
     """Runs `foosim-net`."""
-    return typed("foosim-net", net_command.main)
+    return typed("foosim-net", net.main)
 
 
 def text_of(**network: Any) -> str:

@@ -11,29 +11,29 @@ from typing import Final
 import msgspec
 import pytest
 
+from foosim.capture.parts import FOOTER
+from foosim.cli.supervisor import main
+from foosim.common.errors import Refused
+from foosim.launcher.journal_check import supervisor_records
+from foosim.launcher.outcome import plan_facts, result_without_supervisor, with_capture
+from foosim.launcher.plan import make_plan, plan_again
+from foosim.launcher.run_options import RunOptions, launch_of
+from foosim.launcher.up import Killed, Up
 from foosim.protocol.actions import Journal as JournalAction
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any
-from foosim.protocol.command import DONE, FAILED, REFUSED
-from foosim.protocol.errors import Refused
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, journal_files, read_records
 from foosim.protocol.messages import End
-from foosim.protocol.session import Session
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.cli import main
-from foosim.supervisor.journal_check import supervisor_records
+from foosim.runtime.command import DONE, FAILED, REFUSED
+from foosim.runtime.journal import Journal, journal_files, read_records
+from foosim.runtime.run_folder import RunFolder, create_run
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session
 from foosim.supervisor.main import SupervisorProcess
 from foosim.supervisor.main import _history as history_of
-from foosim.supervisor.outcome import plan_facts, result_without_supervisor, with_capture
-from foosim.supervisor.plan import make_plan, plan_again
 from foosim.supervisor.records import Record, fold
-from foosim.supervisor.run_folder import RunFolder, create_run
-from foosim.supervisor.run_options import RunOptions, launch_of
 from foosim.supervisor.status import UNFINISHED, status
-from foosim.supervisor.up import Killed, Up
-from foosim.vhub.capture_parts import FOOTER
 from tests.supervisor.conftest import Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol import limits
-from foosim.protocol.lags import Lags
-from foosim.protocol.units import Pace, parse_pace
+from foosim.common import limits
+from foosim.common.histogram import Lags
+from foosim.common.units import Pace, parse_pace
 from foosim.supervisor.pacing import Pacer
 
 T: Final = 2_000_000

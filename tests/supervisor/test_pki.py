@@ -14,20 +14,21 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 from typer.testing import CliRunner
 
-from foosim.protocol import certificates, wall
-from foosim.protocol.certificate_files import hosts_of, read_certificate
-from foosim.protocol.certificate_folder import CertificateError
-from foosim.protocol.certificates import (
+from foosim.cli.pki import app
+from foosim.common import wall_clock
+from foosim.common.errors import Refused
+from foosim.launcher.pki import certificates as pki
+from foosim.launcher.pki.certificates import FileExists
+from foosim.runtime.transport import certificates
+from foosim.runtime.transport.certificate_files import hosts_of, read_certificate
+from foosim.runtime.transport.certificate_folder import CertificateError
+from foosim.runtime.transport.certificates import (
     check_host,
     load_credentials,
     operator_credentials,
     passwords_file,
     viewer_credentials,
 )
-from foosim.protocol.errors import Refused
-from foosim.supervisor import pki
-from foosim.supervisor.pki import FileExists
-from foosim.supervisor.pki_command import app
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -68,7 +69,7 @@ def test_a_certificate_is_what_the_docs_say(folder: Path) -> None:
 def test_what_is_issued_is_accepted_and_nothing_is_overwritten(folder: Path) -> None:
     pki.issue(folder, ["node.red", "client.a_b"])
     credentials = load_credentials(folder, "node.red")
-    assert credentials is not None and credentials.name == "red" and credentials.ends_soon(wall.now_utc()) == ""
+    assert credentials is not None and credentials.name == "red" and credentials.ends_soon(wall_clock.now_utc()) == ""
     assert load_credentials(None, "node.red") is None, "no folder, no certificates"
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     with pytest.raises(FileExists, match=r"not overwritten: .*node\.red\.pem, .*node\.red\.key"):
@@ -81,8 +82,8 @@ def test_what_is_issued_is_accepted_and_nothing_is_overwritten(folder: Path) -> 
 def test_renewed_is_the_same_but_for_the_dates(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pki.issue(folder, ["node.red"], ["10.0.0.7"], days=10)
     old, key = read_certificate(folder / "node.red.pem"), (folder / "node.red.key").read_bytes()
-    now = wall.now_utc()
-    monkeypatch.setattr(wall, "now_utc", lambda: now + timedelta(days=4))
+    now = wall_clock.now_utc()
+    monkeypatch.setattr(wall_clock, "now_utc", lambda: now + timedelta(days=4))
     assert pki.renew(folder, within_days=3) == []
     assert pki.renew(folder, within_days=7) == [folder / "node.red.pem"]
     new = read_certificate(folder / "node.red.pem")
@@ -96,18 +97,18 @@ def test_renewed_is_the_same_but_for_the_dates(folder: Path, monkeypatch: pytest
 
 
 def _expired(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = wall.now_utc()
-    monkeypatch.setattr(wall, "now_utc", lambda: now + timedelta(days=91))
+    now = wall_clock.now_utc()
+    monkeypatch.setattr(wall_clock, "now_utc", lambda: now + timedelta(days=91))
 
 
 def _early(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = wall.now_utc()
-    monkeypatch.setattr(wall, "now_utc", lambda: now - timedelta(hours=2))
+    now = wall_clock.now_utc()
+    monkeypatch.setattr(wall_clock, "now_utc", lambda: now - timedelta(hours=2))
 
 
 def _root_expired(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = wall.now_utc()
-    monkeypatch.setattr(wall, "now_utc", lambda: now + timedelta(days=3700))
+    now = wall_clock.now_utc()
+    monkeypatch.setattr(wall_clock, "now_utc", lambda: now + timedelta(days=3700))
 
 
 def _others_key(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -183,7 +184,7 @@ def test_what_would_be_refused_is_refused_before_anything_is_opened(
 def test_a_certificate_that_ends_soon_is_told(folder: Path) -> None:
     pki.issue(folder, ["node.red"], days=5)
     credentials = load_credentials(folder, "node.red")
-    assert credentials is not None and "renew it" in credentials.ends_soon(wall.now_utc())
+    assert credentials is not None and "renew it" in credentials.ends_soon(wall_clock.now_utc())
 
 
 def test_who_listens_has_a_certificate_for_that_host(folder: Path) -> None:

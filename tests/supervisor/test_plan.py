@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from foosim.protocol.addresses import Address, Insecure
-from foosim.protocol.errors import BadValue
-from foosim.supervisor import cli
-from foosim.supervisor.plan import make_plan
-from foosim.supervisor.run_folder import RunFolder
-from foosim.supervisor.run_options import RunOptions
+from foosim.cli import supervisor
+from foosim.common.addresses import Address, Insecure
+from foosim.common.errors import BadValue
+from foosim.launcher.plan import make_plan
+from foosim.launcher.run_options import RunOptions
+from foosim.runtime.run_folder import RunFolder
 from foosim.supervisor.settings import RunSettings
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
@@ -55,9 +55,9 @@ def test_the_supervisors_process_makes_the_same_plan(
         served.extend((settings, address, pki, folder.name))
         return 0
 
-    monkeypatch.setattr(cli, "serve", serve)
+    monkeypatch.setattr(supervisor, "serve", serve)
     with pytest.raises(SystemExit) as ended:
-        cli.main()
+        supervisor.main()
     assert ended.value.code == 0
     settings, address, pki, name = served
     plan = make_plan(options)

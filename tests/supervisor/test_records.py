@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
+from foosim.common.units import Pace
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.edits import Push
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.units import Pace
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import History, fold
 from foosim.supervisor.settings import RunSettings
+from foosim.world.edits import Push
 
 TEXT = apply_sets(
     (Path(__file__).parent.parent.parent / "deploy" / "table.yaml").read_text(),

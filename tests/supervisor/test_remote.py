@@ -6,8 +6,8 @@ import shlex
 
 import pytest
 
-from foosim.protocol.hosts import Host
-from foosim.supervisor.remote import Remote
+from foosim.deployment.hosts import Host
+from foosim.launcher.hosts.ssh import Remote
 
 
 def test_a_users_options_come_before_ours_but_ssh_never_asks() -> None:

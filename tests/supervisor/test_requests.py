@@ -12,18 +12,19 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.json_text import decode_json, encode_json
+from foosim.common.units import Pace
+from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.frame import Frame
-from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.messages import Answer, Epoch, Order, Prepare, Request
-from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced
-from foosim.rehearsal.rehearse import with_nodes
+from foosim.rehearsal.run import with_nodes
 from foosim.rehearsal.system import OPERATOR, Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.records import Closing
+from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()

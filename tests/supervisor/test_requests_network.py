@@ -7,12 +7,12 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.json_text import decode_json
+from foosim.common.json_text import decode_json
+from foosim.deployment.event_requests import BadEvent, event_text, told
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.rules import EVENTS_MAX, event_of
 from foosim.protocol.messages import Answer
-from foosim.protocol.network import EVENTS_MAX, event_of
-from foosim.protocol.network_request import BadEvent, event_text, told
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.records import Closing
 

@@ -8,19 +8,20 @@ from typing import Any, Final
 import msgspec
 import pytest
 
+from foosim.common import limits
+from foosim.common.units import Pace
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.core import NodeCore, NodeStatistics
-from foosim.node.solver import Solver
-from foosim.protocol import channels, limits
+from foosim.node.engines_pool import Solver
+from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Refusal
-from foosim.protocol.units import Pace
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.roster import SILENT_NS, Roster
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
+from foosim.world.layout import build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure", "players={}"])

@@ -13,16 +13,17 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.json_text import encode_json
+from foosim.common.struct_types import Message
+from foosim.common.units import Pace
+from foosim.deployment.loader import apply_sets
+from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.channels import SUPERVISOR, VHUB, Channel
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.deployment_file import apply_sets
-from foosim.protocol.json_text import encode_json
-from foosim.protocol.message_types import Message
 from foosim.protocol.messages import Answer, Epoch, Heartbeat, Hello, Part, Ready, Request
-from foosim.protocol.units import Pace
-from foosim.rehearsal.rehearse import with_nodes
+from foosim.rehearsal.run import with_nodes
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
 

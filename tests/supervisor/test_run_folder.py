@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.errors import BadValue, Refused
-from foosim.supervisor.run_folder import (
+from foosim.common.errors import BadValue, Refused
+from foosim.runtime.run_folder import (
     KEPT_RUNS,
     NoRun,
     RunFolder,

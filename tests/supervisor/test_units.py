@@ -9,17 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol.addresses import Address
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.errors import BadValue, Failed, Refused
-from foosim.supervisor import cli, pki
-from foosim.supervisor.hosts import NoFolder, OutOfReach, check_hosts
-from foosim.supervisor.pki_hosts import files_for
-from foosim.supervisor.plan import check_certificates, make_plan
-from foosim.supervisor.remote import remotes
-from foosim.supervisor.run_options import RunOptions
-from foosim.supervisor.units import units_of
+from foosim.cli import supervisor
+from foosim.common.addresses import Address
+from foosim.common.errors import BadValue, Failed, Refused
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.launcher.hosts.prepare import NoFolder, OutOfReach, check_hosts
+from foosim.launcher.hosts.ssh import remotes
+from foosim.launcher.hosts.systemd_units import units_of
+from foosim.launcher.pki import certificates
+from foosim.launcher.pki.hosts import files_for
+from foosim.launcher.plan import check_certificates, make_plan
+from foosim.launcher.run_options import RunOptions
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 COMMANDS = Path(sys.executable).parent
@@ -113,7 +114,7 @@ def test_install_prints_or_writes_them(
     def install(*arguments: str) -> tuple[str, str]:
         monkeypatch.setattr(sys, "argv", ["foosim-supervisor", "install", *arguments])
         with pytest.raises(SystemExit) as ended:
-            cli.main()
+            supervisor.main()
         assert ended.value.code == 0
         return capsys.readouterr()
 
@@ -128,8 +129,8 @@ def test_install_prints_or_writes_them(
 
 def test_who_is_elsewhere_has_certificates_there(tmp_path: Path) -> None:
     folder = tmp_path / "pki"
-    pki.init(folder)
-    pki.issue(folder, ["supervisor", "client.player-red", "client.player-blue", "operator.admin"])
+    certificates.init(folder)
+    certificates.issue(folder, ["supervisor", "client.player-red", "client.player-blue", "operator.admin"])
     hosts = [f"hosts.{name}.pki=/etc/foosim" for name in ("left", "radio", "right")]
     plan = make_plan(RunOptions(DEPLOY / "cluster.yaml", sets=tuple(hosts), pki=folder))
     check_hosts(plan.deployment, plan.address, remotes(plan.deployment))

@@ -12,20 +12,20 @@ from typing import Final
 import msgspec
 import pytest
 
+from foosim.launcher.display import Display
+from foosim.launcher.liveness import UNANSWERED_MAX
+from foosim.launcher.outcome import capture_lines
+from foosim.launcher.plan import make_plan
+from foosim.launcher.processes import Child
+from foosim.launcher.restarts import WAITS_S
+from foosim.launcher.run_options import RunOptions
+from foosim.launcher.up import END_S, Killed, Up
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.protocol.command import REFUSED
-from foosim.protocol.session import ConnectError
+from foosim.runtime.command import REFUSED
+from foosim.runtime.run_folder import RESULT_FILE, RunInfo
+from foosim.runtime.transport.session import ConnectError
 from foosim.supervisor import control
-from foosim.supervisor.display import Display
-from foosim.supervisor.launcher import Child
-from foosim.supervisor.liveness import UNANSWERED_MAX
-from foosim.supervisor.outcome import capture_lines
-from foosim.supervisor.plan import make_plan
-from foosim.supervisor.restarts import WAITS_S
-from foosim.supervisor.run_folder import RESULT_FILE, RunInfo
-from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.status import NOT_RECORDED
-from foosim.supervisor.up import END_S, Killed, Up
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -187,9 +187,7 @@ def test_a_supervisor_that_hangs_is_killed_and_that_is_said(tmp_path: Path, monk
         up._supervisor_watch.unanswered()
     up._end_stalled_supervisor(supervisor)
     supervisor.process.wait()
-    assert said.getvalue() == (
-        "supervisor does not answer any more: it is killed (it had not answered for 5 s)\n"
-    )
+    assert said.getvalue() == ("supervisor does not answer any more: it is killed (it had not answered for 5 s)\n")
     assert up._outcome().result["reason"] == "lost supervisor: it was killed by up: it had not answered for 5 s"
     up._launcher.close()
 

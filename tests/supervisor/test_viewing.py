@@ -7,20 +7,21 @@ from typing import Any
 
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.common.json_text import decode_json, encode_json
+from foosim.common.units import Pace
+from foosim.deployment.loader import load_deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.frame import frame_from_bytes
-from foosim.protocol.json_text import decode_json, encode_json
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Answer, Commit, Inquiry, Request
-from foosim.protocol.units import Pace
 from foosim.rehearsal.system import OPERATOR, Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.viewing import BYTES_PER_S_MAX
+from foosim.world.frame import frame_from_bytes
+from foosim.world.layout import build_layout
 from tests.supervisor.test_requests import MS, REALTIME, TABLE, TEXT, Run
 
 

@@ -11,21 +11,21 @@ from typing import Any, Final
 import pytest
 from msgspec.structs import replace
 
+from foosim.common.units import Pace, parse_pace
+from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import encode
-from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat, Request
-from foosim.protocol.units import Pace, parse_pace
-from foosim.rehearsal.rehearse import rehearse, with_nodes
+from foosim.rehearsal.run import rehearse, with_nodes
 from foosim.rehearsal.system import IDLE_NS_MAX, OPERATOR, Settings, System
+from foosim.supervisor.progress import Watch, _names
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import status
-from foosim.supervisor.watch import Watch, _names
 from foosim.vhub.core import HubCore
-from foosim.vhub.waits import Waits
+from foosim.vhub.wait_times import Waits
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

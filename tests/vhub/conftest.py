@@ -15,14 +15,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.capture import contents as capture_contents
+from foosim.common import limits
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.edits import Add, Edit, Push, Remove
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import (
     Build,
     ClientHello,
@@ -41,13 +40,16 @@ from foosim.protocol.messages import (
     Subscription,
     Up,
 )
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.start import AddedEntity, initial_numbers
-from foosim.vhub import capture_contents, capture_writer
-from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.recording import writer as capture_writer
+from foosim.vhub.recording.queue import Keep, KeepEpoch
+from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.records import Closing, HubRecord, TickRecord
+from foosim.world.edits import Add, Edit, Push, Remove
+from foosim.world.frame import Frame
+from foosim.world.initial_state import AddedEntity, initial_numbers
+from foosim.world.layout import build_layout
+from foosim.world.robot_packets import RobotPacket
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -10,19 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import AGES, AgeRow
+from foosim.common.json_text import decode_json
+from foosim.console.report.collect import gather
+from foosim.console.report.page import page
 from foosim.protocol.codec import decode_any
-from foosim.protocol.json_text import decode_json
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.report import gather
-from foosim.rehearsal.report_page import page
+from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.rehearsal.whatif import what_if
-from foosim.vhub.ages import Ages, quantile
-from foosim.vhub.capture_reader import open_capture
+from foosim.replay.what_if import what_if
+from foosim.vhub.network.ages import Ages, quantile
 from foosim.vhub.records import HubRecord, TickRecord
-from foosim.vhub.report import report
-from foosim.vhub.rows import AGES, AgeRow
 from foosim.vhub.state import HubState
+from foosim.vhub.status import report
 from tests.laws.test_hub_recovery_law import Fault, Seen, fly
 from tests.turns import BY_PERIOD
 from tests.vhub.conftest import WATCHER, HubRun

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from foosim.protocol import limits
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.frame import Frame
+from foosim.common import limits
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol.messages import Sent
-from foosim.protocol.start import initial_frame
-from foosim.vhub.memory import Joining
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.memory import Joining
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.state import HubState
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SETS = (

@@ -18,15 +18,15 @@ from mcap.records import Chunk, Message, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap_protobuf.decoder import DecoderFactory
 
-from foosim.protocol.frame import CHAIN_START, chain_next
-from foosim.protocol.kinematics import forward_kinematics
-from foosim.protocol.scenes import build_scene
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import CaptureData, open_capture
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.model_hash import model_hash
-from foosim.vhub.rows import ROW_TYPES, EpochRow, OwnerRow, row_schema
-from foosim.vhub.viewing import VIEW_TYPES
+from foosim.capture.foxglove import VIEW_TYPES
+from foosim.capture.info import capture_info
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.reader import CaptureData, open_capture
+from foosim.capture.rows import ROW_TYPES, EpochRow, OwnerRow, row_schema
+from foosim.vhub.recording.model_hash import model_hash
+from foosim.world.frame import CHAIN_START, chain_next
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.scenes.build import build_scene
 from tests.vhub.conftest import RECOVERED, noise
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.reader import open_capture
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Epoch
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.keeping import Keep
-from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.recording.queue import Keep
+from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.records import Closing, HubRecord, TickRecord
 from foosim.vhub.resume import Captured, end_of, first_tick_of, recall
 from tests.vhub.conftest import EPOCH_AT, NAME

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_parts import end_of, head_of
-from foosim.vhub.capture_reader import open_capture, read_about
-from foosim.vhub.capture_recovery import recover_capture
-from foosim.vhub.mcap_checks import CaptureError, combined_crc
-from foosim.vhub.mcap_file import McapFile, Message
+from foosim.capture.info import capture_info
+from foosim.capture.mcap.checks import CaptureError, combined_crc
+from foosim.capture.mcap.format import McapFile, Message
+from foosim.capture.parts import end_of, head_of
+from foosim.capture.reader import open_capture, read_about
+from foosim.vhub.recording.recovery import recover_capture
 
 FLIPS = 400
 

@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import zstandard
 
-from foosim.protocol import limits
-from foosim.protocol.errors import Refused
-from foosim.vhub import capture_contents, capture_file, capture_writer
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.disk_progress import DiskProgress
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.mcap_file import CHUNK_BYTES_MAX
-from foosim.vhub.mcap_writer import McapWriter
+from foosim.capture import contents as capture_contents
+from foosim.capture.info import capture_info
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.mcap.format import CHUNK_BYTES_MAX
+from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.reader import open_capture
+from foosim.common import limits
+from foosim.common.errors import Refused
+from foosim.vhub.recording import file as capture_file
+from foosim.vhub.recording import writer as capture_writer
+from foosim.vhub.recording.disk_progress import DiskProgress
+from foosim.vhub.recording.writer import CaptureWriter
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -287,8 +289,8 @@ def test_a_disk_that_is_full_at_the_start_is_told_at_once(
 def test_a_process_that_ends_without_finishing_is_not_held_up(hub_run: HubRun, tmp_path: Path) -> None:
     program = """if True:
         import pathlib, sys
-        from foosim.protocol.deployment_file import load_deployment
-        from foosim.vhub.capture_writer import CaptureWriter
+        from foosim.deployment.loader import load_deployment
+        from foosim.vhub.recording.writer import CaptureWriter
         text = sys.stdin.read()
         CaptureWriter(pathlib.Path(sys.argv[1]), load_deployment(text, "t"), "t", text, {})
     """

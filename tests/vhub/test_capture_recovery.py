@@ -12,16 +12,16 @@ from mcap.reader import make_reader
 from mcap.records import DataEnd
 from mcap.stream_reader import StreamReader
 
-from foosim.protocol.errors import Refused
-from foosim.protocol.journal import Journal, JournalError
-from foosim.vhub import capture_left
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_recovery import UNCLEAN, Recovered, recover_capture
-from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.mcap_file import MAGIC, McapFile, Message
-from foosim.vhub.mcap_scan import UNSYNCED_BYTES
+from foosim.capture.info import capture_info
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.mcap.format import MAGIC, McapFile, Message
+from foosim.capture.mcap.repair import UNSYNCED_BYTES
+from foosim.capture.reader import open_capture
+from foosim.common.errors import Refused
+from foosim.runtime.journal import Journal, JournalError
+from foosim.vhub.recording import unfinished
+from foosim.vhub.recording.recovery import UNCLEAN, Recovered, recover_capture
+from foosim.vhub.recording.writer import CaptureWriter
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -221,7 +221,7 @@ def test_a_writer_goes_on_with_what_it_left(
     chunked: bytes, path: Path, hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unsynced: int
 ) -> None:
     """As a vHub does that was killed and started again: it feeds all of its journal, and the run goes on."""
-    monkeypatch.setattr(capture_left, "UNSYNCED_BYTES", unsynced)
+    monkeypatch.setattr(unfinished, "UNSYNCED_BYTES", unsynced)
     whole = rows(path, 64)
     for size in (10, first_chunk(chunked), len(chunked) // 2, len(chunked) - 3000):
         going = cut(tmp_path, chunked[:size])

@@ -12,14 +12,17 @@ from typing import TYPE_CHECKING
 import pytest
 from mcap.reader import make_reader
 
-from foosim.protocol import disk, limits
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.disk import Level, Room
-from foosim.vhub import capture_contents, capture_file, capture_writer
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_recovery import recover_capture
-from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.room_watch import RoomWatch
+from foosim.capture import contents as capture_contents
+from foosim.capture.reader import open_capture
+from foosim.common import limits
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.runtime import disk
+from foosim.runtime.disk import Level, Room
+from foosim.vhub.recording import file as capture_file
+from foosim.vhub.recording import writer as capture_writer
+from foosim.vhub.recording.disk_watch import RoomWatch
+from foosim.vhub.recording.recovery import recover_capture
+from foosim.vhub.recording.writer import CaptureWriter
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun

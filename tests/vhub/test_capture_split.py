@@ -10,27 +10,29 @@ from typing import TYPE_CHECKING
 import msgspec
 import pytest
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.disk import Level
-from foosim.protocol.journal import Journal
-from foosim.vhub import capture_contents, capture_left, capture_writer
-from foosim.vhub.capture_cut import cut_capture
-from foosim.vhub.capture_file import CaptureFile, Described
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_left import Journalled
-from foosim.vhub.capture_parts import Joined, files_from
-from foosim.vhub.capture_reader import open_capture, read_about
-from foosim.vhub.capture_recovery import recover_capture
-from foosim.vhub.capture_split import Split
-from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.keeping import Keep
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.mcap_file import McapFile, Message
-from foosim.vhub.mcap_writer import McapWriter
+from foosim.capture import contents as capture_contents
+from foosim.capture.cut import cut_capture
+from foosim.capture.info import capture_info
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.mcap.format import McapFile, Message
+from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.parts import Joined, files_from
+from foosim.capture.reader import open_capture, read_about
+from foosim.capture.rows import PROFILE
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.runtime.disk import Level
+from foosim.runtime.journal import Journal
+from foosim.vhub.recording import unfinished
+from foosim.vhub.recording import writer as capture_writer
+from foosim.vhub.recording.file import CaptureFile, Described
+from foosim.vhub.recording.queue import Keep
+from foosim.vhub.recording.recovery import recover_capture
+from foosim.vhub.recording.split import Split
+from foosim.vhub.recording.unfinished import Journalled
+from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.records import Closing
 from foosim.vhub.resume import end_of, first_tick_of, recall
-from foosim.vhub.rows import PROFILE
 from tests.vhub.conftest import ADDED_AT, LOG_LINES, NAME, REMOVED_AT
 from tests.vhub.test_capture_branch import journal_until
 from tests.vhub.test_capture_recovery import LAST, read_by_others, rows
@@ -316,7 +318,7 @@ def test_a_vhub_goes_on_with_what_it_left_wherever_its_journal_ends(
     unsynced: int,
 ) -> None:
     """The machine was lost: files may be further than the journal, whole ones too."""
-    monkeypatch.setattr(capture_left, "UNSYNCED_BYTES", unsynced)
+    monkeypatch.setattr(unfinished, "UNSYNCED_BYTES", unsynced)
     text, deployment = split_by(hub_run, BY_TIME)
     records = journal_until(hub_run, closed)
     for number, (count, size) in enumerate(lefts):

@@ -11,19 +11,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.edits import Disrupt
-from foosim.protocol.frame import Frame
-from foosim.protocol.json_text import encode_json
+from foosim.common.json_text import encode_json
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.rules import Event, Network
+from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
-from foosim.protocol.network import Event, Network
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.start import initial_frame
-from foosim.vhub.events import Timeline
-from foosim.vhub.memory import Joining
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.memory import Joining
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.timeline import Timeline
 from foosim.vhub.state import HubState
+from foosim.world.edits import Disrupt
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame
+from foosim.world.robot_packets import RobotPacket
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60

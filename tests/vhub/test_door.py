@@ -7,14 +7,15 @@ from typing import Final
 import msgspec
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode_any
-from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.hub_messages import Proceed
 from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Down, Epoch, Failure, Go, Join, Tempo
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep
+from foosim.vhub.recording.queue import Keep
 from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.resume import recall
 from foosim.vhub.sessions import BOOTS_KEPT

@@ -14,24 +14,26 @@ from typing import TYPE_CHECKING
 import msgspec
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.capture import contents as capture_contents
+from foosim.capture.info import capture_info
+from foosim.capture.parts import end_of, has_end
+from foosim.capture.reader import open_capture
+from foosim.common import limits
+from foosim.common.errors import Failed
+from foosim.common.json_text import decode_json
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.command import DONE, FAILED
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.errors import Failed
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.journal import Journal, journal_files
-from foosim.protocol.json_text import decode_json
 from foosim.protocol.messages import CAPTURE, Build, End, Heartbeat
-from foosim.protocol.session import Session
-from foosim.vhub import capture_contents, capture_file
-from foosim.vhub.capture_file import CaptureFile, Described
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_parts import end_of, has_end
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_recovery import UNCLEAN, recover_capture
+from foosim.runtime.command import DONE, FAILED
+from foosim.runtime.journal import Journal, journal_files
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session
 from foosim.vhub.main import HubOptions, HubProcess
+from foosim.vhub.recording import file as capture_file
+from foosim.vhub.recording.file import CaptureFile, Described
+from foosim.vhub.recording.recovery import UNCLEAN, recover_capture
 from foosim.vhub.records import HeadRecord, HubRecord, TickRecord
 from tests.vhub.conftest import NAME
 from tests.vhub.test_capture_recovery import LAST
@@ -112,9 +114,7 @@ def test_a_vhub_whose_journal_contradicts_itself_leaves_its_capture_as_it_was(
     assert found.tick == 39, "what is before the gap is used"
 
 
-def test_a_vhub_whose_journal_is_damaged_goes_on_over_nothing(
-    hub_run: HubRun, plane: Session, tmp_path: Path
-) -> None:
+def test_a_vhub_whose_journal_is_damaged_goes_on_over_nothing(hub_run: HubRun, plane: Session, tmp_path: Path) -> None:
     """The run ends, with the place; the capture has what the journal tells up to there, and says so."""
     path = leave(tmp_path, hub_run)
     before = path.read_bytes()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from msgspec import structs
 
-from foosim.protocol import channels, limits
-from foosim.protocol.deployment_file import apply_sets
+from foosim.common import limits
+from foosim.deployment.loader import apply_sets
+from foosim.protocol import channels
 from foosim.protocol.messages import ClientHello, Epoch, Join, Subscription, Want
 from foosim.vhub.state import HubState
 from tests.vhub.test_sessions import BUILD, DEPLOYMENT, FRAME, OWNERS, PERIODS, TEXT, Hub, sent

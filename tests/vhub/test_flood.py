@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.protocol import channels
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.journal import Journal
 from foosim.protocol.messages import Deliveries, Sent, Up
-from foosim.protocol.robot_packets import RobotPacket
+from foosim.runtime.journal import Journal
 from foosim.vhub.records import fold
+from foosim.world.robot_packets import RobotPacket
 from tests.vhub.conftest import Driver, HubRun
 
 if TYPE_CHECKING:

@@ -6,14 +6,15 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.hub_messages import Proceed, Standing
 from foosim.protocol.messages import Build, ClientHello, Deliveries, Done, Epoch, Want
 from foosim.supervisor.arrivals import Arrivals
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.recording.queue import Keep, KeepEpoch
 from foosim.vhub.records import HeadRecord, HubRecord
 from foosim.vhub.resume import recall
 from tests.client.test_core import DEPLOYMENT, NAME, TEXT

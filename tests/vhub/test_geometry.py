@@ -12,12 +12,15 @@ import numpy as np
 import pybullet as p
 import pytest
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.frame import Frame
-from foosim.protocol.layout import Layout, build_layout
-from foosim.protocol.mesh import Mesh, read_mesh
-from foosim.protocol.radio_materials import METAL, PLASTIC, UNKNOWN, WOOD, RadioMaterial
-from foosim.protocol.scene import (
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.vhub.line_of_sight import occlusion as geometry_module
+from foosim.vhub.line_of_sight.occlusion import Crossing, Geometry, LineOfSight, Sight
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_numbers, place_ball
+from foosim.world.layout import Layout, build_layout
+from foosim.world.materials import METAL, PLASTIC, UNKNOWN, WOOD, RadioMaterial
+from foosim.world.mesh import Mesh, read_mesh
+from foosim.world.scene import (
     UPRIGHT,
     Body,
     Box,
@@ -31,9 +34,6 @@ from foosim.protocol.scene import (
     place,
     rotate,
 )
-from foosim.protocol.start import initial_numbers, place_ball
-from foosim.vhub import geometry as geometry_module
-from foosim.vhub.geometry import Crossing, Geometry, LineOfSight, Sight
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 GREY: Final = (0.5, 0.5, 0.5, 1.0)

@@ -6,14 +6,15 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.messages import Commit, End, Tempo, Up
-from foosim.vhub.keeping import Keep, Keeping
 from foosim.vhub.main import needs_record
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.paced_release import Release, Releases
+from foosim.vhub.recording.queue import Keep, Keeping
 from foosim.vhub.records import Closing
-from foosim.vhub.release import Release, Releases
 from tests.vhub.test_sessions import FRAME, MS, Hub, sent
 
 T: Final = 2 * MS

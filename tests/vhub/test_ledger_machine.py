@@ -15,14 +15,14 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.frame import Frame
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.protocol.messages import Sent
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.start import initial_frame
-from foosim.vhub.memory import Joining
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.memory import Joining
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.state import HubState
+from foosim.world.frame import Frame
+from foosim.world.initial_state import initial_frame
+from foosim.world.robot_packets import RobotPacket
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 LINKS: Final = (

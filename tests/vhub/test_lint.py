@@ -11,14 +11,13 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.draws import draw_key, draw_words
-from foosim.protocol.impairments import Impairments
-from foosim.protocol.network import Network
-from foosim.protocol.radios import Radio
-from foosim.vhub.jitter import interpolate_ns, quantiles_ns
-from foosim.vhub.lint import (
+from foosim.common.keyed_random import draw_key, draw_words
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.impairments import Impairments
+from foosim.deployment.network.radios import Radio
+from foosim.deployment.network.rules import Network
+from foosim.deployment.schema import Deployment
+from foosim.vhub.links.summary import (
     Use,
     delay_of,
     meaning_of,
@@ -29,7 +28,8 @@ from foosim.vhub.lint import (
     uses_alone,
     uses_of,
 )
-from foosim.vhub.lint_text import LINES_MAX, meaning_line, start_lines
+from foosim.vhub.links.summary_text import LINES_MAX, meaning_line, start_lines
+from foosim.vhub.network.jitter import interpolate_ns, quantiles_ns
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

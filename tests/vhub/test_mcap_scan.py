@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from random import Random
 
-from foosim.vhub.mcap_scan import Scanned, scan
+from foosim.capture.mcap.repair import Scanned, scan
 
 SEED = 23
 

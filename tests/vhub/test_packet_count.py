@@ -7,7 +7,7 @@ from typing import Any, Final
 import pytest
 
 from bench.packets import Count, Load, run
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.state import HubState
 
 TICKS: Final = 180

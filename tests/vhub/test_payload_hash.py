@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import pytest
 
-from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.journal import Journal
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_recovery import recover_capture
-from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.mcap_file import McapFile, Message
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.mcap.format import McapFile, Message
+from foosim.capture.reader import open_capture
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.runtime.journal import Journal
+from foosim.vhub.recording.recovery import recover_capture
+from foosim.vhub.recording.writer import CaptureWriter
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun

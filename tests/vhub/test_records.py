@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING
 import msgspec
 import pytest
 
-from foosim.protocol import limits
+from foosim.common import limits
+from foosim.common.errors import Malformed
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.errors import Malformed
-from foosim.protocol.frame import CHAIN_START, Frame, chain_next
-from foosim.protocol.journal import Journal, journal_files, read_journal, read_records
-from foosim.protocol.journal_format import FRAMING_BYTES
 from foosim.protocol.messages import Deliveries, Down
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.runtime.journal import Journal, journal_files, read_journal, read_records
+from foosim.runtime.journal_format import FRAMING_BYTES
+from foosim.vhub.recording.queue import Keep, KeepEpoch
+from foosim.vhub.recording.rows_of_closing import Entry, Plan, packet_entry, plan_of, world_rows
 from foosim.vhub.records import Closing, HeadRecord, HubRecord, InputsRecord, TickRecord, fold
 from foosim.vhub.resume import Captured, recall
 from foosim.vhub.state import HubState
-from foosim.vhub.to_rows import Entry, Plan, packet_entry, plan_of, world_rows
+from foosim.world.frame import CHAIN_START, Frame, chain_next
 from tests.vhub.conftest import EPOCH_AT
 
 if TYPE_CHECKING:

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.common.json_text import decode_json
 from foosim.protocol import channels
-from foosim.protocol.json_text import decode_json
 from foosim.protocol.messages import Tempo
-from foosim.vhub.packet import Flight
-from foosim.vhub.release import ANCHOR_WINDOW_NS, Release, Releases
-from foosim.vhub.report import report
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.paced_release import ANCHOR_WINDOW_NS, Release, Releases
+from foosim.vhub.status import report
 from tests.vhub.test_sessions import PERIODS, Hub, sent
 
 MS: Final = 1_000_000

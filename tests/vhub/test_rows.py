@@ -11,12 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words
-from foosim.protocol.edits import Add, Edit, Push, Remove
-from foosim.protocol.frame import Frame
-from foosim.vhub.capture_columns import word_of
-from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.rows import (
+from foosim.capture.columns import word_of
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.rows import (
     AGES,
     CLIENTS,
     EPOCHS,
@@ -36,7 +33,10 @@ from foosim.vhub.rows import (
     edit_of,
     row_schema,
 )
-from foosim.vhub.to_rows import Entry, edit_row, epoch_entry, packet_entry, plan_of, world_rows
+from foosim.common.keyed_random import Slot, chance_threshold, draw_key, draw_words
+from foosim.vhub.recording.rows_of_closing import Entry, edit_row, epoch_entry, packet_entry, plan_of, world_rows
+from foosim.world.edits import Add, Edit, Push, Remove
+from foosim.world.frame import Frame
 from tests.vhub.conftest import DOWN_FROM, DOWN_TO
 
 if TYPE_CHECKING:

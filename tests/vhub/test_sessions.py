@@ -9,11 +9,12 @@ from typing import Any, Final
 import msgspec
 import pytest
 
-from foosim.protocol import channels, limits
+from foosim.common import limits
+from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.protocol import channels
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.messages import (
     Build,
     ClientHello,
@@ -35,12 +36,12 @@ from foosim.protocol.messages import (
     Tempo,
     Up,
 )
-from foosim.protocol.start import initial_frame
 from foosim.vhub.core import HubCore
 from foosim.vhub.members import may_lockstep
-from foosim.vhub.memory import Joining
+from foosim.vhub.network.memory import Joining
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
+from foosim.world.initial_state import initial_frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SETS: Final = (

@@ -8,12 +8,12 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol.layout import Layout
-from foosim.protocol.scene import Box, Scene, Shape, Vector
-from foosim.vhub import geometry
-from foosim.vhub.geometry import Geometry
-from foosim.vhub.rays import box_span
-from foosim.vhub.solids import TOUCH_M
+from foosim.vhub.line_of_sight import occlusion
+from foosim.vhub.line_of_sight.occlusion import Geometry
+from foosim.vhub.line_of_sight.rays import box_span
+from foosim.vhub.line_of_sight.solids import TOUCH_M
+from foosim.world.layout import Layout
+from foosim.world.scene import Box, Scene, Shape, Vector
 
 GREY: Final = (0.5, 0.5, 0.5, 1.0)
 HALF: Final = (0.12, 0.08, 0.16)
@@ -41,7 +41,7 @@ def crossed(boxes: dict[str, Vector], start: Vector, end: Vector) -> set[str]:
 def test_lines_that_drive_through_litter_cross_what_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """Their ends stay in a cell or go from cell to cell, on both sides of the origin; little is remembered."""
     rng = random.Random(26)
-    monkeypatch.setattr(geometry, "PAIRS_KEPT", 50)
+    monkeypatch.setattr(occlusion, "PAIRS_KEPT", 50)
     boxes = {f"box{n}": at_random(rng, 1.5) for n in range(LITTER)}
     things = tuple(Shape(Box(HALF), "walls", GREY, place, name=name) for name, place in boxes.items())
     sight = Geometry(Scene({}, things)).sight(Layout({}, {}), ())

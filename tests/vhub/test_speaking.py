@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from foosim.common.json_text import decode_json
+from foosim.common.limits import HEARTBEAT_NS
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode_any
-from foosim.protocol.json_text import decode_json
-from foosim.protocol.limits import HEARTBEAT_NS
 from foosim.protocol.messages import Farewell, Tempo, Up
-from foosim.vhub.report import LINKS_TOLD_EVERY
+from foosim.vhub.status import LINKS_TOLD_EVERY
 from tests.vhub.test_sessions import PERIODS, Hub, sent
 
 

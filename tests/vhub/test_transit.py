@@ -8,11 +8,11 @@ from typing import Final
 
 import pytest
 
-from foosim.protocol import limits
-from foosim.protocol.journal import Journal, JournalError, read_journal
+from foosim.analysis.explain import PacketName, explain_packet
+from foosim.capture.reader import open_capture
+from foosim.common import limits
 from foosim.protocol.messages import Sent
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.explain import PacketName, explain_packet
+from foosim.runtime.journal import Journal, JournalError, read_journal
 from foosim.vhub.state import HubState
 from tests.links.offered import Hub, deployment_of
 from tests.vhub.conftest import drive, write_capture

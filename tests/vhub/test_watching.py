@@ -13,27 +13,28 @@ from typing import Any, Final
 import pytest
 from msgspec.structs import replace
 
+from foosim.analysis.drops_shown import Reported, explain_drops
+from foosim.analysis.explain import explain_row
+from foosim.capture.rows import ClientRow
+from foosim.common import limits
+from foosim.common.json_text import decode_json, encode_json
+from foosim.common.units import Pace
 from foosim.console.live.watched import Watched as Shown
-from foosim.protocol import channels, limits
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
 from foosim.protocol.codec import decode
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.edits import Disrupt
-from foosim.protocol.frame import Frame
-from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.messages import Heartbeat, Watched
-from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.units import Pace
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.drops_shown import Reported, explain_drops
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub import report
-from foosim.vhub.explain import explain_row
-from foosim.vhub.packet import DROPPED, Flight
+from foosim.vhub import status
+from foosim.vhub.network.packet import DROPPED, Flight
+from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import ClientRow
-from foosim.vhub.to_rows import packet_row
 from foosim.vhub.watching import DROPS_KEPT, READINGS_KEPT, REPORT_BYTES_MAX, Watching
+from foosim.world.edits import Disrupt
+from foosim.world.frame import Frame
+from foosim.world.robot_packets import RobotPacket
 from tests.supervisor.test_net_command import text_of
 
 TICKS: Final = 320
@@ -65,9 +66,9 @@ class Run:
         if traced.channel == channels.WATCHED.name:
             self.told.append(decode(Watched, traced.payload))
         elif traced.channel == channels.HEARTBEAT.name and traced.process == channels.VHUB:
-            report = decode(Heartbeat, traced.payload).report
-            if report:
-                self.reports.append(decode_json(report))
+            status = decode(Heartbeat, traced.payload).report
+            if status:
+                self.reports.append(decode_json(status))
 
     def at(self, tick: int, verb: str, **arguments: Any) -> Run:
         self.system.at_tick(tick, lambda: self.asked.append(self.system.request(verb, **arguments)))
@@ -85,7 +86,7 @@ class Run:
     @property
     def watched(self) -> dict[str, Any]:
         """What the vHub reported last of what is looked at."""
-        return next(report["watched"] for report in reversed(self.reports) if "watched" in report)
+        return next(status["watched"] for status in reversed(self.reports) if "watched" in status)
 
 
 @cache
@@ -121,7 +122,7 @@ def test_a_run_is_the_same_whoever_looks() -> None:
 
 def test_while_nobody_looks_nothing_is_kept_nor_said() -> None:
     run = unseen()
-    assert run.reports and not any("watched" in report for report in run.reports) and not run.told
+    assert run.reports and not any("watched" in status for status in run.reports) and not run.told
     assert not run.system.people.viewed
 
 
@@ -137,13 +138,13 @@ def test_the_last_drops_of_a_watched_link_are_told_as_rows() -> None:
 
 
 def test_watched_links_are_told_beside_the_busiest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(report, "LINKS_TOLD_MAX", 3)
+    monkeypatch.setattr(status, "LINKS_TOLD_MAX", 3)
     state = seen().system.hub.state
     assert state is not None and len(state.fabric.states) > 4
     order = sorted(state.fabric.states, key=lambda key: (-state.fabric.states[key].offered, key))
     last = order[-1]
     for watched, expected in (([], order[:3]), ([last[:2], ("no", "body")], [*order[:3], last])):
-        lines = decode_json(bytes(report.LinksTold().lines(state, watched, anew=True)))
+        lines = decode_json(bytes(status.LinksTold().lines(state, watched, anew=True)))
         assert [(line[0], line[1], line[6]) for line in lines] == sorted(expected)
 
 
@@ -300,14 +301,14 @@ def test_a_report_of_what_is_looked_at_has_a_size() -> None:
 def test_a_page_is_told_of_drops_with_their_steps_and_of_each_reading_once() -> None:
     run = seen()
     console = Shown(run.system.supervisor.deployment)
-    reports = [report["watched"] for report in run.reports if "watched" in report]
-    messages = [console.drops(report, [LINK]) for report in reports]
+    reports = [status["watched"] for status in run.reports if "watched" in status]
+    messages = [console.drops(status, [LINK]) for status in reports]
     (last,) = next(told for told in reversed(messages) if told)
     assert (last["type"], last["link"]) == ("watched", list(LINK))
     assert [drop["cause"] for drop in last["drops"]] == [row.cause for row, _ in explain_drops(evidence(run), *LINK)]
     assert {"stage", "outcome", "text"} == last["drops"][0]["steps"][0].keys()
     assert console.drops(reports[-1], [LINK]) == [], "nothing new"
-    told = [message for report in reports for message in console.readings(report)]
+    told = [message for status in reports for message in console.readings(status)]
     ticks = [tick for message in told for tick, _ in message["points"]]
     assert (told[0]["robot"], told[0]["channel"]) == READING
     assert ticks == list(range(ticks[0], ticks[-1] + 1, 5)), "each one once"

@@ -17,17 +17,17 @@ import pytest
 import yaml
 import zenoh
 
-from foosim.protocol import session as wire
+from foosim.common.addresses import parse_address
+from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.deployment.schema import Deployment
+from foosim.launcher.pki import certificates
 from foosim.protocol.access import access_to
-from foosim.protocol.addresses import parse_address
-from foosim.protocol.certificates import NotAuthorised, load_credentials, passwords_file
 from foosim.protocol.channels import ALIVE, CHANNELS, Plane
-from foosim.protocol.deployment import Deployment
-from foosim.protocol.deployment_file import load_deployment, read_deployment_text
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.session import ConnectError, Session
-from foosim.protocol.session_settings import Security, client_settings, router_settings
-from foosim.supervisor import pki
+from foosim.runtime.transport import session as wire
+from foosim.runtime.transport.certificates import NotAuthorised, load_credentials, passwords_file
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import ConnectError, Session
+from foosim.runtime.transport.settings import Security, client_settings, router_settings
 from tests.granted import may_be_present, may_hear, may_put, may_watch
 from tests.wire.conftest import TABLE, wait_for
 
@@ -58,9 +58,9 @@ BYTES_MAX: Final = 1 << 20
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A root, and a certificate for everybody in the matrix."""
     path = tmp_path_factory.mktemp("pki")
-    pki.init(path)
+    certificates.init(path)
     everybody = {who for table in (INSIDERS, OUTSIDERS) for plane in Plane for who in table[plane]}
-    pki.issue(path, sorted({*everybody, "supervisor", "vhub"}))
+    certificates.issue(path, sorted({*everybody, "supervisor", "vhub"}))
     return path
 
 
@@ -291,8 +291,8 @@ def test_who_has_no_certificate_of_this_root_is_told_so(
     folder: Path, deployment: Deployment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     other = tmp_path / "other"
-    pki.init(other, "somebody else's")
-    pki.issue(other, ["node.red"])
+    certificates.init(other, "somebody else's")
+    certificates.issue(other, ["node.red"])
     shutil.copytree(folder, tmp_path / "late", ignore=shutil.ignore_patterns("node.red.*"))
     credentials, theirs = load_credentials(folder, "supervisor"), load_credentials(other, "node.red")
     ours = load_credentials(folder, "node.red")
@@ -304,8 +304,8 @@ def test_who_has_no_certificate_of_this_root_is_told_so(
         trusting = replace(theirs, ca=ours.ca)
         with pytest.raises(NotAuthorised, match=r"it does not accept .*node.red.pem \("):
             Session.client(router.locator, LONG_S, security=Security(trusting))
-        monkeypatch.setattr(pki, "SLACK", timedelta(days=2))
-        pki.issue(tmp_path / "late", ["node.red"], days=1)
+        monkeypatch.setattr(certificates, "SLACK", timedelta(days=2))
+        certificates.issue(tmp_path / "late", ["node.red"], days=1)
         late = replace(ours, certificate=tmp_path / "late" / "node.red.pem", key=tmp_path / "late" / "node.red.key")
         with pytest.raises(NotAuthorised, match=r"it does not accept .*node.red.pem \(certificate expired\)"):
             Session.client(router.locator, LONG_S, security=Security(late))
@@ -321,7 +321,7 @@ def test_passwords_let_clients_in_by_name(folder: Path, tmp_path: Path) -> None:
     content = yaml.safe_load(read_deployment_text(TABLE))
     content |= {"players": {}, "clients": {"hand": {}, "other": {}}, "access": {"radio": "password"}}
     deployment = load_deployment(yaml.safe_dump(content), "test")
-    secret = pki.issue_password(tmp_path, "client.hand")
+    secret = certificates.issue_password(tmp_path, "client.hand")
     server, ours = load_credentials(folder, "vhub"), load_credentials(folder, "client.hand", secret)
     with_certificate = load_credentials(folder, "client.hand")
     assert server is not None and ours is not None and with_certificate is not None

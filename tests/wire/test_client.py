@@ -8,13 +8,13 @@ import pytest
 
 from foosim.client import connect
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded
-from foosim.client.payloads import RodPosition
-from foosim.protocol.errors import BadValue, UnknownName
+from foosim.common.errors import BadValue, UnknownName
 from foosim.supervisor import control
+from foosim.world.payloads import RodPosition
 
 if TYPE_CHECKING:
     from foosim.client.client import Client
-    from foosim.supervisor.run_folder import RunInfo
+    from foosim.runtime.run_folder import RunInfo
     from tests.wire.conftest import House
 
 CLIENTS = "clients={hand: {lockstep: true, rate: 100 Hz}, ear: {lockstep: false}}"

@@ -13,9 +13,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from foosim.protocol.deployment_file import apply_sets
-from foosim.protocol.units import parse_pace
-from foosim.rehearsal.rehearse import rehearse
+from foosim.common.units import parse_pace
+from foosim.deployment.loader import apply_sets
+from foosim.rehearsal.run import rehearse
 from foosim.supervisor.control import Control
 from tests.deploy.processes import Declared, from_compose, from_kubernetes, from_units
 from tests.wire.conftest import LONG

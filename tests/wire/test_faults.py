@@ -16,7 +16,7 @@ from bench.faults.digest import FAULTS
 from bench.faults.kinds import KINDS, NODE, Trial, twin_refused
 from bench.faults.outside import OUTSIDE
 from bench.faults.outside import SETS as WITH_CLIENT
-from foosim.vhub.capture_reader import open_capture
+from foosim.capture.reader import open_capture
 from tests.wire.proxy import Weather
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
-from foosim.protocol.deployment_file import apply_sets
-from foosim.supervisor import doctor_hosts
-from foosim.supervisor.doctor_hosts import LIMIT_S, ask, findings_of
-from foosim.supervisor.doctor_there import Question
-from foosim.supervisor.remote import Remote
-from foosim.vhub.capture_info import capture_info
+from foosim.capture.info import capture_info
+from foosim.deployment.loader import apply_sets
+from foosim.launcher.doctor import hosts as doctor_hosts
+from foosim.launcher.doctor.hosts import LIMIT_S, ask, findings_of
+from foosim.launcher.doctor.remote import Question
+from foosim.launcher.hosts.ssh import Remote
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE
 from tests.wire.test_run import last_json

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Final
 
 import pytest
 
+from foosim.capture.parts import files_from
+from foosim.capture.reader import open_capture
 from foosim.client import connect
 from foosim.client.errors import RunEnded
-from foosim.protocol.closed import CLOSED
-from foosim.protocol.deployment_file import load_deployment
-from foosim.rehearsal.rehearse import rehearse
+from foosim.deployment.loader import load_deployment
+from foosim.rehearsal.run import rehearse
+from foosim.runtime.closed import CLOSED
 from foosim.supervisor.control import Control
-from foosim.vhub.capture_parts import files_from
-from foosim.vhub.capture_reader import open_capture
 from tests.wire.conftest import LIMIT_S, LONG
 from tests.wire.test_run import last_json
 from tests.wire.test_same_bytes import PLAYERS, scribes

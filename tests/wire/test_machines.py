@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
-from foosim.rehearsal.rehearse import rehearse
-from foosim.vhub.capture_reader import open_capture
+from foosim.capture.reader import open_capture
+from foosim.rehearsal.run import rehearse
 from tests.wire import namespaces
 from tests.wire.conftest import LONG, command_path
 from tests.wire.namespaces import Machine, Machines

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from foosim.capture.reader import open_capture
+from foosim.common.errors import Refused
+from foosim.launcher.plan import plan_again
 from foosim.protocol import channels
-from foosim.protocol.errors import Refused
-from foosim.protocol.journal import journal_files, read_records
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.verify import verify_capture
-from foosim.supervisor.plan import plan_again
-from foosim.supervisor.run_folder import open_run
-from foosim.vhub.capture_reader import open_capture
+from foosim.rehearsal.run import rehearse
+from foosim.replay.verify import verify_capture
+from foosim.runtime.journal import journal_files, read_records
+from foosim.runtime.run_folder import open_run
 from tests.wire.conftest import LONG, SLOW
 from tests.wire.test_run import last_json
 

@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import PacketRow
+from foosim.common.names import LINE_NAMES, TEAMS
+from foosim.deployment.loader import load_deployment
 from foosim.protocol import channels
-from foosim.protocol.closed import CLOSED
 from foosim.protocol.codec import decode
-from foosim.protocol.deployment_file import load_deployment
-from foosim.protocol.frame import frame_from_bytes
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import Commit
-from foosim.protocol.names import LINE_NAMES, TEAMS
-from foosim.rehearsal.verify import verify_capture
+from foosim.replay.verify import verify_capture
+from foosim.runtime.closed import CLOSED
+from foosim.runtime.transport.inbox import Inbox
 from foosim.supervisor import control
 from foosim.supervisor.control import Control, RequestRefused
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import PacketRow
+from foosim.world.frame import frame_from_bytes
+from foosim.world.layout import build_layout
 from tests.wire.conftest import LIMIT_S, LONG
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def test_a_second_ctrl_c_kills_everything(house: House) -> None:
 TRIPS = """
 from pathlib import Path
 
-from foosim.client.players import Team
+from foosim.players.football import Team
 
 class Trips(Team):
     def __init__(self, deployment, parameters):
@@ -193,7 +193,7 @@ def test_a_player_that_is_killed_plays_again_and_one_that_raises_ends_the_run(
 FAILS = """
 import sys
 
-from foosim.client.players import Team
+from foosim.players.football import Team
 
 if "foosim-player" in sys.argv[0]:
     raise RuntimeError("no licence here")
@@ -238,7 +238,7 @@ def test_a_vhub_that_cannot_open_its_capture_is_gone_at_once(house: House) -> No
 
 COUNTED: Final = """
 import os
-from foosim.protocol.loop import Loop
+from foosim.runtime.loop import Loop
 
 go_round, rounds = Loop.go_round, 0
 file = os.open(os.path.join(os.path.dirname(__file__), f"{os.getpid()}.rounds"), os.O_CREAT | os.O_WRONLY)

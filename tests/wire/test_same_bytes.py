@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from foosim.protocol.units import parse_pace
-from foosim.rehearsal.rehearse import rehearse
-from foosim.vhub.capture_reader import open_capture
+from foosim.capture.reader import open_capture
+from foosim.common.units import parse_pace
+from foosim.rehearsal.run import rehearse
 from tests.replay.test_verify import messages_of
 from tests.wire.test_run import assert_finished, last_json
 

@@ -6,13 +6,14 @@ Nodes, supervisor and vHub that are killed, hang or are stopped come back, and t
 import signal
 from pathlib import Path
 
+from foosim.capture.reader import open_capture
 from foosim.client.client import connect
-from foosim.protocol.certificates import operator_credentials
-from foosim.protocol.closed import CLOSED
-from foosim.rehearsal.rehearse import rehearse
-from foosim.supervisor import control, pki
+from foosim.launcher.pki import certificates as pki
+from foosim.rehearsal.run import rehearse
+from foosim.runtime.closed import CLOSED
+from foosim.runtime.transport.certificates import operator_credentials
+from foosim.supervisor import control
 from foosim.supervisor.control import Control
-from foosim.vhub.capture_reader import open_capture
 from tests.wire.conftest import LIMIT_S, House
 from tests.wire.test_run import last_json
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from foosim.protocol.inbox import Inbox, Item
-from foosim.protocol.session import Publisher, Session
+from foosim.runtime.transport.inbox import Inbox, Item
+from foosim.runtime.transport.session import Publisher, Session
 
 LONG_S = 900.0
 ANY_PORT = "tcp/127.0.0.1:0"
@@ -262,7 +262,7 @@ def test_presence_is_told_to_those_who_come_later_and_ends_with_the_session(plan
 
 BE_PRESENT = """
 import sys
-from foosim.protocol.session import Session
+from foosim.runtime.transport.session import Session
 session = Session.client(sys.argv[1], 900.0)
 session.declare_alive("w/alive/blue")
 session.publisher("w/part/blue").put(b"")
@@ -313,7 +313,7 @@ def test_garbage_on_the_port_harms_nobody(plane: Plane, inbox: Inbox) -> None:
 
 RUN_A_ROUTER = """
 import sys
-from foosim.protocol.session import Session
+from foosim.runtime.transport.session import Session
 session = Session.router(sys.argv[1])
 print("listening", flush=True)
 sys.stdin.read()

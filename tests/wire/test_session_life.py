@@ -10,15 +10,15 @@ from collections.abc import Iterator
 import pytest
 import zenoh
 
+from foosim.common.errors import BadValue
 from foosim.protocol import channels
-from foosim.protocol import session as sessions
 from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.codec import decode, encode
-from foosim.protocol.errors import BadValue
-from foosim.protocol.inbox import Inbox, Item
-from foosim.protocol.loop import Wire
 from foosim.protocol.messages import Answer, Request
-from foosim.protocol.session import ConnectError, ListenError, Session
+from foosim.runtime.loop import Wire
+from foosim.runtime.transport import session as sessions
+from foosim.runtime.transport.inbox import Inbox, Item
+from foosim.runtime.transport.session import ConnectError, ListenError, Session
 from foosim.supervisor.control import Control
 
 LONG_S = 900.0
@@ -123,8 +123,8 @@ def test_a_close_that_hangs_is_left_to_itself(client: Session, monkeypatch: pyte
 
 LEAVE_IT_OPEN = """
 import sys, time
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.session import Session
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session
 session = Session.client(sys.argv[1], 900.0)
 inbox = Inbox(10)
 session.subscribe("w/*", "w", inbox)
@@ -150,8 +150,8 @@ def test_a_process_that_forgets_to_close_ends_with_its_own_code(router: Session,
 
 FORK = """
 import os, sys
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.session import Session
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session
 session = Session.router("tcp/127.0.0.1:0")
 publisher = session.publisher("w/a")
 uses = [lambda: publisher.put(b""), lambda: session.subscribe("w/*", "w", Inbox(1)), session.close]
@@ -177,7 +177,7 @@ def test_a_session_is_not_used_in_a_forked_child() -> None:
 
 CLIENT_RUNTIME = """
 import os, sys, time
-from foosim.protocol.session import CLIENT_RUNTIME, ROUTER_RUNTIME, Session, use_client_runtime
+from foosim.runtime.transport.session import CLIENT_RUNTIME, ROUTER_RUNTIME, Session, use_client_runtime
 if sys.argv[1] == "client":
     use_client_runtime()
 with Session.router("tcp/127.0.0.1:0") as router, Session.client(router.locator, 900.0) as client:

@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
-from foosim.protocol.certificates import operator_credentials
-from foosim.protocol.errors import Failed
-from foosim.protocol.hosts import Host
-from foosim.supervisor import remote as remote_module
+from foosim.common.errors import Failed
+from foosim.deployment.hosts import Host
+from foosim.launcher.hosts import ssh as remote_module
+from foosim.launcher.hosts.install import install
+from foosim.launcher.hosts.prepare import fetch_capture
+from foosim.launcher.hosts.ssh import CAPTURE, Remote
+from foosim.launcher.processes import Child, Launcher
+from foosim.runtime.transport.certificates import operator_credentials
 from foosim.supervisor.control import Control
-from foosim.supervisor.hosts import fetch_capture
-from foosim.supervisor.install import install
-from foosim.supervisor.launcher import Child, Launcher
-from foosim.supervisor.remote import CAPTURE, Remote
 from tests.wire import sshd
 from tests.wire.conftest import LONG, TABLE, command_path, processes_with, wait_for
 from tests.wire.sshd import Sshd, run
@@ -41,7 +41,7 @@ GUARD_KILLED: Final = "ended: host there (127.0.0.1): the connection ended, or t
 COMMANDS: Final = str(Path(sys.executable).parent)
 SLEEPER: Final = """#!{python}
 import signal, sys, time
-from foosim.protocol.process import die_with_parent
+from foosim.runtime.process import die_with_parent
 die_with_parent()
 if {stubborn}:
     signal.signal(signal.SIGTERM, lambda number, frame: print("no", flush=True))

@@ -7,15 +7,15 @@ import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from foosim.capture.reader import open_capture
+from foosim.common.json_text import encode_json
 from foosim.protocol import channels
 from foosim.protocol.codec import encode
-from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Request
-from foosim.rehearsal.rehearse import rehearse
+from foosim.rehearsal.run import rehearse
+from foosim.runtime.run_folder import open_run
 from foosim.supervisor.control import Control, answer_to
-from foosim.supervisor.run_folder import open_run
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_recovery import recover_capture
+from foosim.vhub.recording.recovery import recover_capture
 from tests.wire.conftest import LIMIT_S, LONG
 from tests.wire.test_run import last_json
 

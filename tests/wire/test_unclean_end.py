@@ -10,13 +10,13 @@ from typing import Any
 import msgspec
 import pytest
 
-from foosim.protocol import disk
-from foosim.rehearsal.rehearse import rehearse
-from foosim.rehearsal.verify import verify_capture
-from foosim.vhub.capture_info import capture_info
-from foosim.vhub.capture_parts import files_from
-from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.capture_recovery import UNCLEAN
+from foosim.capture.info import capture_info
+from foosim.capture.parts import files_from
+from foosim.capture.reader import open_capture
+from foosim.rehearsal.run import rehearse
+from foosim.replay.verify import verify_capture
+from foosim.runtime import disk
+from foosim.vhub.recording.recovery import UNCLEAN
 from tests.wire.conftest import House
 
 

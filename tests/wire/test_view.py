@@ -10,9 +10,9 @@ from typing import Final
 
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, Plane
-from foosim.protocol.inbox import Inbox
-from foosim.protocol.loop import Wire
-from foosim.protocol.session import Session
+from foosim.runtime.loop import Wire
+from foosim.runtime.transport.inbox import Inbox
+from foosim.runtime.transport.session import Session
 
 FRAME_BYTES: Final = 180_000
 """Of a thousand rovers."""
@@ -24,7 +24,7 @@ LOOK: Final = """
 import sys
 from foosim.protocol import session_settings
 session_settings.LEASE_MS = 900_000
-from foosim.protocol.inbox import Inbox
+from foosim.runtime.transport.inbox import Inbox
 from foosim.supervisor.control import Control
 inbox = Inbox(10_000)
 with Control(sys.argv[1], role="viewer") as control:

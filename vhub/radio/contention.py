@@ -25,7 +25,7 @@ from functools import lru_cache
 from math import exp
 from typing import Final, Literal, NamedTuple
 
-from foosim.protocol.draws import chance_threshold
+from foosim.common.keyed_random import chance_threshold
 from foosim.vhub.radio.timings import LRWPAN, LrwpanTiming, WifiTiming
 
 CONTENDERS_MAX: Final = 200

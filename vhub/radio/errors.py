@@ -14,7 +14,7 @@ from math import erfc, exp, expm1, log1p, log2, sqrt
 from types import MappingProxyType
 from typing import Final, Literal
 
-from foosim.protocol.draws import UNIT
+from foosim.common.keyed_random import UNIT
 
 Family = Literal["ofdm", "ht", "ofdm10", "oqpsk"]
 

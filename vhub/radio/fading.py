@@ -12,7 +12,7 @@ from functools import lru_cache
 from math import exp, gamma, log, log10, sqrt
 from typing import Final, Literal
 
-from foosim.protocol.draws import draw_words
+from foosim.common.keyed_random import draw_words
 
 Kind = Literal["none", "rayleigh", "rician", "nakagami"]
 

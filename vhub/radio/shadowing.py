@@ -12,7 +12,7 @@ from functools import lru_cache
 from math import exp, floor, sqrt
 from typing import Final
 
-from foosim.protocol.draws import draw_words, gaussian
+from foosim.common.keyed_random import draw_words, gaussian
 
 LATTICES: Final = ((0, 1.0 / 0.25), (1, 1.0 / 1.0), (2, 1.0 / 2.8))
 """Number, and nodes per correlation distance: the pitches are 0.25, 1 and 2.8 correlation distances."""

@@ -12,15 +12,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from foosim.vhub.setup import LinkSetup
-from foosim.vhub.stages.admit import Admit
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.stages.admission import Admit
 from foosim.vhub.stages.capacity import Capacity
 from foosim.vhub.stages.channel import Channel
+from foosim.vhub.stages.corruption import Mangle
+from foosim.vhub.stages.custom_model import Own
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.duty import Duty
-from foosim.vhub.stages.mangle import Mangle
 from foosim.vhub.stages.medium import make_medium
-from foosim.vhub.stages.own import Own
 from foosim.vhub.stages.policy import Policy
 from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.receiver import Receiver

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.vhub.memory import LinkState
-from foosim.vhub.packet import Flight
-from foosim.vhub.setup import LinkSetup
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.memory import LinkState
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.stage import Stage
 
 EVICTED: Final = "evicted"

@@ -6,13 +6,13 @@ it judges again what others spoiled that began later: broadcasts, and whatever i
 
 from __future__ import annotations
 
-from foosim.protocol.draws import UNIT, Slot
-from foosim.vhub.air import DEAF
-from foosim.vhub.packet import Flight
-from foosim.vhub.propagation import OUT_OF_RANGE
+from foosim.common.keyed_random import UNIT, Slot
+from foosim.vhub.network.air import DEAF
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.errors import lora_interferer, lora_received
 from foosim.vhub.radio.noise import level_of
-from foosim.vhub.setup import LinkSetup
+from foosim.vhub.radio.propagation import OUT_OF_RANGE
 from foosim.vhub.stages.medium import COLLISION, SNR, error_curve
 from foosim.vhub.stages.stage import Stage
 

@@ -2,7 +2,7 @@
 
 Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo unless
 they say otherwise. A clog that is asked for, or healed, while packets are on their way moves their due times: as if it
-had been known when they were sent. Neighbours: `jitter` makes the table.
+had been known when they were sent.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from foosim.protocol.draws import Slot, chance_threshold
-from foosim.vhub.jitter import interpolate_ns, quantiles_ns
-from foosim.vhub.packet import Flight
-from foosim.vhub.setup import LinkSetup
+from foosim.common.keyed_random import Slot, chance_threshold
+from foosim.vhub.network.jitter import interpolate_ns, quantiles_ns
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.stage import Stage
 
 _JITTER: Final = int(Slot.JITTER)

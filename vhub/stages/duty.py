@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.vhub.memory import RadioState, Sending
-from foosim.vhub.packet import Flight
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.memory import RadioState, Sending
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
-from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages.stage import Stage
 
 DUTY_CYCLE: Final = "duty_cycle"

@@ -3,7 +3,6 @@
 A wire serialises. On Wi-Fi a station freezes its backoff while those that it hears send, contends with them, and
 repeats what is not acknowledged: others appear as delay to unicasts, and as loss to broadcasts, which are sent once.
 IEEE 802.15.4 looks before it sends. LoRa sends at once. What is out of range is on air all the same.
-Neighbours: `queue` (what waits before), `air` (who is on air), `radio` (the formulas), `channel` (what gets through).
 """
 
 from __future__ import annotations
@@ -13,12 +12,14 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
-from foosim.protocol.draws import UNIT, Slot, draw_words
-from foosim.protocol.radios import Radio
-from foosim.vhub.air import Air
-from foosim.vhub.budget import Budget
-from foosim.vhub.memory import RadioState, Sending, Transmission
-from foosim.vhub.packet import Flight
+from foosim.common.keyed_random import UNIT, Slot, draw_words
+from foosim.deployment.network.radios import Radio
+from foosim.vhub.network.air import Air
+from foosim.vhub.network.link_budget import Budget
+from foosim.vhub.network.link_context import BLOCK_SHIFT, LinkSetup
+from foosim.vhub.network.memory import RadioState, Sending, Transmission
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.turns import Contest
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (
     LRWPAN_OVERHEAD_BYTES,
@@ -39,10 +40,8 @@ from foosim.vhub.radio.timings import (
     WifiTiming,
     with_category,
 )
-from foosim.vhub.setup import BLOCK_SHIFT, LinkSetup
 from foosim.vhub.stages.duty import note_sent
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.turns import Contest
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"

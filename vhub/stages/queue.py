@@ -9,10 +9,10 @@ from __future__ import annotations
 from math import sqrt
 from typing import Final
 
-from foosim.protocol.radios import Radio
-from foosim.vhub.memory import RadioState, Sending
-from foosim.vhub.packet import Flight
-from foosim.vhub.setup import LinkSetup
+from foosim.deployment.network.radios import Radio
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.memory import RadioState, Sending
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.policy import EXPIRED
 from foosim.vhub.stages.stage import Stage
 

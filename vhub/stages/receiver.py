@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.vhub.packet import Flight
-from foosim.vhub.setup import LinkSetup
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.stage import Stage
 
 RECEIVER_DOWN: Final = "rx_down"

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.protocol.draws import Slot, chance_threshold, draw_key
-from foosim.protocol.impairments import Burst, GilbertElliott, Markov4
-from foosim.vhub.episodes import Episodes
-from foosim.vhub.memory import LinkState
-from foosim.vhub.packet import Flight
-from foosim.vhub.setup import LinkSetup
+from foosim.common.keyed_random import Slot, chance_threshold, draw_key
+from foosim.deployment.network.impairments import Burst, GilbertElliott, Markov4
+from foosim.vhub.network.good_bad_periods import Episodes
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.memory import LinkState
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.stage import Stage
 
 _LOSS: Final = int(Slot.LOSS)

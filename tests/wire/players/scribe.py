@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from foosim.client.player import Commands, Samples
-from foosim.client.players import Team
-from foosim.protocol.deployment import Deployment
+from foosim.deployment.schema import Deployment
+from foosim.players.football import Team
 
 
 class Scribe(Team):

@@ -1,0 +1,44 @@
+"""Files that commands write: none is overwritten, and one that could not be written to its end does not stay."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from foosim.common.errors import BadValue, Failed, Refused
+
+
+class Existing(Refused):
+    """There is a file already where one is to be written."""
+
+
+def check_name(option: str, out: Path, what: str, endings: tuple[str, ...]) -> None:
+    """Raise BadValue for a name with another ending than `what` has, Existing where something is there already."""
+    if out.suffix.lower() not in endings:
+        raise BadValue(f"{option}: the name of {what} ends with {' or '.join(endings)}", str(out))
+    check_absent(out)
+
+
+def check_absent(out: Path) -> None:
+    if os.path.lexists(out):
+        raise Existing(f"{out}: exists already, and is not overwritten")
+
+
+@contextmanager
+def new_file(out: Path) -> Iterator[Path]:
+    """Give the name to write to; the file gets its own name, `out`, when it is whole.
+
+    Raises Existing, and Failed when it cannot be written.
+    """
+    check_absent(out)
+    part = out.with_name(f".{out.name}.part")
+    try:
+        yield part
+        part.rename(out)
+    except OSError as error:
+        raise Failed(f"{out}: cannot be written, {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)

@@ -1,0 +1,245 @@
+"""What a capture gives as tables: columns with types and units, and the values of a message as rows of a table.
+
+Every kind of row is a table by itself, made from its type: a field is a column, and what is a list or a structure is
+JSON in a text. Beside them are `poses`, a row for each link and message of /tf, and `commands`, the packets that were
+to move robots, with their numbers. Integers (times in ns, ticks, sequence numbers) are 64-bit and never rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any, Final, Literal
+
+import msgspec
+from msgspec import inspect
+
+from foosim.capture.foxglove import POSES
+from foosim.capture.foxglove_reader import read_poses
+from foosim.capture.mcap.format import Message
+from foosim.capture.rows import PACKETS, ROW_TYPES, PacketRow, Row
+from foosim.common.errors import BadValue, Malformed, UnknownName, show
+from foosim.common.json_text import encode_json
+from foosim.common.names import nearest_name
+from foosim.deployment.channel_kinds import channel_kind
+from foosim.deployment.schema import Deployment
+from foosim.world.payloads import COMMAND_KINDS, decode_payload, value_fields
+
+Kind = Literal["integer", "number", "text", "bytes", "boolean", "json"]
+POSES_TABLE: Final = "poses"
+COMMANDS_TABLE: Final = "commands"
+
+Decode = Callable[[msgspec.json.Decoder[Any], Message], Any]
+"""Gives the row that a message holds, or says which message of which file is damaged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column: what its values are, and their unit, empty where there is none."""
+
+    name: str
+    kind: Kind
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One table: the topic that it is made from, its columns, and the rows that a message of it gives."""
+
+    name: str
+    topic: str
+    columns: tuple[Column, ...]
+    rows: Callable[[Decode, Message], Iterable[tuple[Any, ...]]]
+
+
+_UNITS: Final[Mapping[str, str]] = {
+    "ns": "ns",
+    "m": "m",
+    "mm": "mm",
+    "s": "s",
+    "hz": "Hz",
+    "bps": "bit/s",
+    "ppm": "ppm",
+    "bytes": "B",
+    "size": "B",
+    "db": "dB",
+    "dbm": "dBm",
+    "cdb": "0.01 dB",
+    "cdbm": "0.01 dBm",
+    "slide": "m",
+    "spin": "rad",
+    "left": "m/s",
+    "right": "m/s",
+    "tick": "tick",
+    "period": "ticks",
+}
+"""By the last word of a column's name."""
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that a name says."""
+    return _UNITS.get(name.rpartition("_")[2], "")
+
+
+def table_names() -> list[str]:
+    """Return what can be exported, what people ask for first."""
+    rows = [topic.removeprefix("/") for topic in ROW_TYPES]
+    first = [PACKETS.removeprefix("/"), POSES_TABLE, COMMANDS_TABLE]
+    return [*first, *(name for name in rows if name not in first)]
+
+
+def table_of(name: str, deployment: Deployment) -> Table:
+    """Return a table by name; raises BadValue."""
+    if name not in table_names():
+        nearest = nearest_name(name, table_names())
+        what = f"--what: not one of {', '.join(table_names())}"
+        raise BadValue(what, name, None if nearest is None else show(nearest))
+    if name == POSES_TABLE:
+        return Table(name, POSES, _POSE_COLUMNS, _pose_rows)
+    if name == COMMANDS_TABLE:
+        return Table(name, PACKETS, _command_columns(), _Commands(deployment).rows)
+    topic = f"/{name}"
+    if topic == PACKETS:
+        return Table(name, topic, (*_columns(PacketRow), Column("value", "json")), _PacketRows(deployment).rows)
+    return _rows_table(name, topic, ROW_TYPES[topic])
+
+
+# --- any kind of row -------------------------------------------------------------------------------------------------
+
+_KINDS: Final[Mapping[type[inspect.Type], Kind]] = {
+    inspect.IntType: "integer",
+    inspect.FloatType: "number",
+    inspect.StrType: "text",
+    inspect.LiteralType: "text",
+    inspect.BytesType: "bytes",
+    inspect.BoolType: "boolean",
+}
+
+
+def _columns(kind: type[Row]) -> tuple[Column, ...]:
+    info = inspect.type_info(kind)
+    assert isinstance(info, inspect.StructType)
+    return tuple(
+        Column(field.name, _KINDS.get(type(_plain(field.type)), "json"), unit_of(field.name)) for field in info.fields
+    )
+
+
+def _plain(kind: inspect.Type) -> inspect.Type:
+    """Return a type without what says more of it than its values."""
+    while isinstance(kind, inspect.Metadata):
+        kind = kind.type
+    return kind
+
+
+def _values(row: Row, json: Iterable[int]) -> list[Any]:
+    """Return the values of a row in the order of its columns; `json` are the places of those that are JSON."""
+    values = list(msgspec.structs.astuple(row))
+    for place in json:
+        values[place] = encode_json(values[place]).decode()
+    return values
+
+
+def _json_places(columns: Sequence[Column]) -> list[int]:
+    return [place for place, column in enumerate(columns) if column.kind == "json"]
+
+
+def _rows_table(name: str, topic: str, kind: type[Row]) -> Table:
+    columns = _columns(kind)
+    decoder, json = msgspec.json.Decoder(kind), _json_places(columns)
+
+    def rows(decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
+        yield tuple(_values(decode(decoder, message), json))
+
+    return Table(name, topic, columns, rows)
+
+
+# --- packets and commands --------------------------------------------------------------------------------------------
+
+
+class _Decoded:
+    """Turns payloads into values, as far as it is known what they mean."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._deployment = deployment
+        self._kinds: dict[tuple[str, str], str] = {}
+
+    def kind(self, robot: str, channel: str) -> str:
+        """Return the kind of a robot's channel, empty when it has no such one."""
+        pair = robot, channel
+        if pair not in self._kinds:
+            try:
+                known = robot in self._deployment.robots
+                self._kinds[pair] = channel_kind(self._deployment, robot, channel) if known else ""
+            except UnknownName:
+                self._kinds[pair] = ""
+        return self._kinds[pair]
+
+    def numbers(self, kind: str, payload: bytes) -> dict[str, Any]:
+        """Return what a payload holds by name; nothing when it is no payload of its channel, or plain bytes."""
+        if not kind:
+            return {}
+        try:
+            value = decode_payload(kind, payload)
+        except Malformed:
+            return {}
+        return {} if isinstance(value, bytes) else value._asdict()
+
+
+class _PacketRows(_Decoded):
+    """All packets. `value` has the numbers of a payload where its channel is a robot's sensor or actuator."""
+
+    _decoder = msgspec.json.Decoder(PacketRow)
+    _json = _json_places(_columns(PacketRow))
+
+    def rows(self, decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
+        row = decode(self._decoder, message)
+        kind = self.kind(row.source, row.channel) or self.kind(row.destination, row.channel)
+        numbers = self.numbers(kind, row.payload)
+        yield (*_values(row, self._json), encode_json(numbers).decode() if numbers else None)
+
+
+_COMMAND_FIELDS: Final = (
+    *("sent_ns", "stamp_ns", "due_ns", "arrival_tick", "source", "destination", "channel", "sequence", "copy", "fate"),
+    "cause",
+)
+
+
+def _command_numbers() -> list[str]:
+    return list(dict.fromkeys(name for kind in COMMAND_KINDS for name in value_fields(kind)))
+
+
+def _command_columns() -> tuple[Column, ...]:
+    known = {column.name: column for column in _columns(PacketRow)}
+    numbers = (Column(name, "number", unit_of(name)) for name in _command_numbers())
+    return (*(known[name] for name in _COMMAND_FIELDS), *numbers)
+
+
+class _Commands(_Decoded):
+    """Packets to robots on the channels that move them, with their numbers; a number that a robot has not is empty."""
+
+    _decoder = msgspec.json.Decoder(PacketRow)
+    _fields = attrgetter(*_COMMAND_FIELDS)
+    _numbers = tuple(_command_numbers())
+
+    def rows(self, decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
+        row = decode(self._decoder, message)
+        kind = self.kind(row.destination, row.channel)
+        if kind in COMMAND_KINDS:
+            numbers = self.numbers(kind, row.payload)
+            yield (*self._fields(row), *(numbers.get(name) for name in self._numbers))
+
+
+# --- poses -----------------------------------------------------------------------------------------------------------
+
+_POSE_COLUMNS: Final = (
+    Column("time_ns", "integer", "ns"),
+    Column("link", "text"),
+    *(Column(name, "number", "m") for name in ("x", "y", "z")),
+    *(Column(name, "number") for name in ("qx", "qy", "qz", "qw")),
+)
+
+
+def _pose_rows(decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
+    for pose in read_poses(message.data):
+        yield (message.log_ns, pose.link, *pose.position, *pose.orientation)

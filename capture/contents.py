@@ -1,0 +1,111 @@
+"""What stands in a capture beside its rows: topics with their schemas, attachments, and entries of its metadata."""
+
+from __future__ import annotations
+
+import os
+import platform
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final
+
+from foosim.capture.foxglove import VIEW_TYPES
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.parts import (
+    AFTER,
+    FAILED_RUN,
+    LAST,
+    ORIGIN,
+    ORIGIN_CHAIN,
+    ORIGIN_DIGEST,
+    ORIGIN_TICK,
+    PART,
+    parts_at,
+)
+from foosim.capture.rows import ROW_TYPES, row_schema
+from foosim.common.json_text import encode_json
+from foosim.protocol.messages import End
+from foosim.world.initial_state import Origin
+
+DEPLOYMENT: Final = "deployment.yaml"
+ASSETS: Final = "assets/"
+"""How the names of the files begin that the deployment refers to; their paths follow."""
+VERSIONS: Final = "versions.json"
+CHUNK_BYTES: Final = 4 * 1024 * 1024
+"""A chunk is ended at this size, or when it is to be flushed; a reader holds one at a time."""
+_LIBRARIES: Final = (
+    *("foosim", "eclipse-zenoh", "foxglove-sdk", "mcap", "msgspec", "numpy", "pybullet", "pydantic", "zstandard"),
+)
+CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cut_chain"
+"""Which capture a file is of that begins later, its first frame, its digest, and the chain up to it: entries of the
+metadata `foosim`."""
+CUT_REASON: Final = "cut"
+"""The reason of its end that a part says."""
+OWN: Final = frozenset({PART, AFTER, LAST, CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN})
+"""What the files of a capture say otherwise, each for itself."""
+
+
+def origin_metadata(origin: Origin | None) -> dict[str, str]:
+    """Return what a capture says of where its run began."""
+    if origin is None:
+        return {}
+    digest, chain = origin.digest.hex(), origin.chain.hex()
+    return {ORIGIN: origin.source, ORIGIN_TICK: str(origin.tick), ORIGIN_DIGEST: digest, ORIGIN_CHAIN: chain}
+
+
+def ending_metadata(end: End) -> dict[str, str]:
+    """Return what a capture says of how its run ended."""
+    return {"reason": end.reason, **({FAILED_RUN: "true"} if end.failed else {})}
+
+
+def declare_topics(mcap: McapWriter) -> dict[str, int]:
+    """Declare all topics, also those that stay empty; return their channels."""
+    return {topic: mcap.add_channel(topic, encoding, schema) for topic, encoding, schema in _topics()}
+
+
+@cache
+def _topics() -> tuple[tuple[str, str, tuple[str, str, bytes]], ...]:
+    """Return each topic with its encoding and schema, made once: a run waits while another file is begun."""
+    topics = []
+    for topic, kind in ROW_TYPES.items():
+        schema = (f"foosim.{kind.__name__.removesuffix('Row')}", "jsonschema", encode_json(row_schema(kind)))
+        topics.append((topic, "json", schema))
+    for topic, message in VIEW_TYPES.items():
+        view = message.get_schema()
+        topics.append((topic, "protobuf", (view.name, view.encoding, view.data)))
+    return tuple(topics)
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions that a run depends on, for the capture."""
+    versions = {"python": platform.python_version(), "platform": platform.platform()}
+    for name in _LIBRARIES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions
+
+
+def write_all(file: int, content: bytes) -> None:
+    """Write to a file descriptor until all of it is written."""
+    written = os.write(file, content)
+    while written < len(content):
+        written += os.write(file, content[written:])
+
+
+def check_new(path: Path, *, is_split: bool = False) -> None:
+    """Raise CaptureError when there is something where a capture is to be, or where one that is split goes on."""
+    there = parts_at(path) if is_split else {0: path} if os.path.lexists(path) else {}
+    for found in there.values():
+        raise CaptureError(f"{found}: exists already; a capture is never overwritten")
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names of a folder's files to the disk; raises OSError."""
+    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(opened)
+    finally:
+        os.close(opened)

@@ -1,0 +1,198 @@
+"""Cuts a part out of a capture: a capture of its own, that begins with a captured frame and has all up to a time.
+
+What was in force at that frame is repeated at the start, as it was written: the layout, the epoch, the clients that
+take part, the scene. Deployment, files and metadata are those of the whole, and the metadata say where the cut begins.
+A run can begin with any of its frames; a verification starts where the run began, unless asked to take its first one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from mcap import records
+
+from foosim.capture.contents import (
+    CHUNK_BYTES,
+    CUT,
+    CUT_CHAIN,
+    CUT_DIGEST,
+    CUT_REASON,
+    CUT_TICK,
+    OWN,
+    check_new,
+    declare_topics,
+)
+from foosim.capture.mcap.checks import CHECKS, CaptureError
+from foosim.capture.mcap.format import Message
+from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.parts import END_METADATA, METADATA, Joined
+from foosim.capture.reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
+from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK
+from foosim.capture.state_at import InForce
+from foosim.common.errors import BadValue, Failed
+from foosim.common.units import format_ns
+from foosim.world.frame import chain_next
+
+_BEFORE_TICK: Final = frozenset({EPOCHS, LAYOUT, CLIENTS, RECOVERIES})
+"""Rows of a closing that stand before its row of /tick."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """What a cut has: ticks of the first and last frame that have a row of /tick, messages, bytes of the file."""
+
+    path: Path
+    first_tick: int
+    last_tick: int
+    tick_ns: int
+    messages: int
+    bytes: int
+
+
+@dataclass(slots=True)
+class _Start:
+    """What is in force at the last tick that was read."""
+
+    in_force: InForce
+    tick: int = -1
+    digest: bytes = b""
+    chain: bytes = b""
+
+    def take(self, scan: Scan, message: Message) -> None:
+        """Take one more message; what it brings holds from here on."""
+        if message.topic == TICK:
+            row = scan.decode(DECODERS[TICK], message)
+            self.digest = bytes.fromhex(row.digest)
+            self.chain = chain_next(self.chain, self.digest) if self.tick >= 0 else chain_at_start(scan.about)
+            self.tick = row.tick
+        else:
+            self.in_force.take(message)
+
+
+def cut_capture(path: Path, out: Path, from_ns: int | None = None, to_ns: int | None = None) -> Cut:
+    """Write the part of a capture between two simulated times (None: its start, its end) to a new file.
+
+    It begins with the newest captured frame at or before `from_ns`, or else with the first one; it has all that was
+    recorded of the ticks up to `to_ns`. Raises BadValue for times that the capture does not have, CaptureError when it
+    cannot be read, has no frame, or `out` exists, Failed when `out` cannot be written.
+    """
+    if from_ns is not None and to_ns is not None and to_ns < from_ns:
+        raise BadValue(f"--to: before --from, which is {format_ns(from_ns)}", format_ns(to_ns))
+    check_new(out)
+    start, tick_ns, last_tick = _find_start(path, from_ns, to_ns)
+    stop_tick = last_tick if to_ns is None else min(last_tick, to_ns // tick_ns)
+    try:
+        with out.open("xb") as stream:
+            mcap = McapWriter(lambda content: _write(stream, content), PROFILE)
+            _Copy(path, mcap, start, tick_ns, stop_tick).run()
+            mcap.finish()
+        return Cut(out, start.tick, stop_tick, tick_ns, mcap.messages, mcap.offset)
+    except OSError as error:
+        out.unlink(missing_ok=True)
+        raise Failed(f"{out}: cannot be written, {error.strerror}") from None
+    except BaseException:
+        out.unlink(missing_ok=True)
+        raise
+
+
+def _write(stream: BinaryIO, content: bytes) -> None:
+    stream.write(content)
+
+
+def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_Start, int, int]:
+    """Return the frame to begin with and what is in force there, the tick in ns, and the last tick."""
+    tick_ns = deployment_of(read_about(path)).tick_ns
+    scan = Scan(path)
+    start, held = (_Start(InForce(str(path))) for _ in range(2))
+    for message in scan.messages():
+        if message.topic != FRAME:
+            held.take(scan, message)
+            if to_ns is not None and start.tick >= 0 and held.tick * tick_ns > to_ns:
+                break  # what is behind may be damaged: it is not needed
+        elif start.tick < 0 or (from_ns is not None and held.tick * tick_ns <= from_ns):
+            start = replace(held, in_force=held.in_force.copy())
+    if start.tick < 0:
+        raise CaptureError(f"{path}: no frame to begin with")
+    if from_ns is not None and from_ns > held.tick * tick_ns:
+        raise BadValue(f"--from: the capture ends at {held.tick * tick_ns / 1e9:g} s", format_ns(from_ns))
+    if to_ns is not None and to_ns < start.tick * tick_ns:
+        raise BadValue(f"--to: the capture begins at {start.tick * tick_ns / 1e9:g} s", format_ns(to_ns))
+    return start, tick_ns, held.tick
+
+
+class _Copy:
+    """One pass over the whole capture that writes the cut."""
+
+    def __init__(self, path: Path, mcap: McapWriter, start: _Start, tick_ns: int, stop_tick: int) -> None:
+        self._path = path
+        self._mcap = mcap
+        self._start = start
+        self._tick_ns = tick_ns
+        self._stop_tick = stop_tick
+        self._channels = declare_topics(mcap)
+        self._tick = -1
+        self._begun = False
+        self._head: list[Message] = []
+        """Rows of a closing whose row of /tick has not come yet."""
+
+    def run(self) -> None:
+        scan = Scan(self._path)
+        for content in Joined(self._path).contents():
+            if isinstance(content, records.Attachment):
+                self._mcap.add_attachment(content.name, content.media_type, content.data)
+            elif isinstance(content, records.Metadata):
+                self._describe(content)
+            elif not self._take(scan, content):
+                break
+        self._mcap.end_chunk()
+        self._mcap.add_metadata(END_METADATA, {"reason": CUT_REASON, "last_tick": str(self._stop_tick)})
+
+    def _describe(self, content: records.Metadata) -> None:
+        if content.name == END_METADATA:
+            return
+        if content.name == CHECKS:
+            self._mcap.add_checks()
+            return
+        metadata = content.metadata
+        if content.name == METADATA:
+            start = self._start
+            cut = {CUT: self._path.name, CUT_TICK: str(start.tick), CUT_DIGEST: start.digest.hex()}
+            metadata = {key: value for key, value in metadata.items() if key not in OWN}
+            metadata |= {**cut, CUT_CHAIN: start.chain.hex()}
+        self._mcap.add_metadata(content.name, metadata)
+
+    def _take(self, scan: Scan, message: Message) -> bool:
+        """Write a message that belongs to the cut; False behind the last one."""
+        if message.topic == TICK:
+            self._tick = scan.decode(DECODERS[TICK], message).tick
+            if self._tick > self._stop_tick:
+                return False
+            self._begin_tick()
+        if message.topic in _BEFORE_TICK:
+            self._head.append(message)
+        elif self._begun and message.topic in self._channels:
+            self._put(message)
+        return True
+
+    def _begin_tick(self) -> None:
+        """Write what stands before a row of /tick; at the first one of the cut that is what is in force there."""
+        head, self._head = self._head, []
+        if self._begun:
+            for message in head:
+                self._put(message)
+        elif self._tick >= self._start.tick:
+            self._begun = True
+            at_ns = self._start.tick * self._tick_ns
+            recoveries = [message for message in head if message.topic == RECOVERIES]
+            for message in (*self._start.in_force.messages(), *recoveries):
+                self._put(message, at_ns)
+
+    def _put(self, message: Message, at_ns: int | None = None) -> None:
+        log_ns = message.log_ns if at_ns is None else at_ns
+        publish_ns = message.publish_ns if at_ns is None else at_ns
+        channel = self._channels[message.topic]
+        self._mcap.add_message(channel, log_ns, publish_ns, message.sequence, message.data)
+        if self._mcap.chunk_bytes > CHUNK_BYTES:
+            self._mcap.end_chunk()

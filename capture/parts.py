@@ -1,0 +1,256 @@
+"""The files of one capture: what they are called, which of them belong together, and all of them read as one.
+
+`run.mcap` goes on in `run_0001.mcap`, `run_0002.mcap` and so on. Each can be read by itself: it has the description of
+the run, and its first chunk repeats what holds at its first frame; who comes from the file before passes that chunk by.
+What is read is the file that is named and all behind it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+from array import array
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, Final
+from zlib import crc32
+
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+
+from foosim.capture.mcap.checks import CHECKS, CaptureError, compare, read_metadata
+from foosim.capture.mcap.format import MAGIC, RECORD, Content, McapFile, Message, chunk_records
+
+FOOTER: Final = struct.Struct("<BQQQI8s")
+"""The last record of an MCAP file, and the magic bytes behind it."""
+_BEHIND_FOOTER: Final = 4 + len(MAGIC)
+"""Its checksum, which is of what stands before it, and those bytes."""
+METADATA: Final = "foosim"
+END_METADATA: Final = "foosim.end"
+PART, AFTER, LAST = "part", "part_after", "last"
+"""What each file of a split capture says: its number from 0, the file before, and how long a time is kept where only
+the last is: entries of the metadata `foosim`."""
+ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
+"""Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
+NEXT: Final = "goes_on_in"
+"""The file behind one: an entry of the metadata `foosim.end`."""
+FAILED_RUN: Final = "failed"
+"""An entry there where the run failed."""
+
+
+def part_path(path: Path, number: int) -> Path:
+    """Return where the file of a number is of the capture that begins at `path`."""
+    return path.with_name(f"{path.stem}_{number:04d}{path.suffix}") if number else path
+
+
+def first_path(path: Path, number: int) -> Path | None:
+    """Return where the capture begins whose file of this number is at `path`; None when it is called otherwise."""
+    if not number:
+        return path
+    ending = f"_{number:04d}"
+    stem = path.stem.removesuffix(ending)
+    return path.with_name(stem + path.suffix) if stem and stem != path.stem else None
+
+
+def parts_at(path: Path) -> dict[int, Path]:
+    """Return the files that are called as those of the capture that begins at `path`, by their number, ascending."""
+    form = re.compile(rf"{re.escape(path.stem)}_(\d{{4,}}){re.escape(path.suffix)}")
+    found = {0: path} if os.path.lexists(path) else {}
+    try:
+        names = os.listdir(path.parent)
+    except OSError:
+        names = []
+    for name in names:
+        match = form.fullmatch(name)
+        if match is not None and part_path(path, number := int(match[1])).name == name and number:
+            found[number] = path.with_name(name)
+    return dict(sorted(found.items()))
+
+
+def first_there(path: Path) -> Path:
+    """Return the first file of the capture that begins at `path`; one that keeps its last alone lets files go."""
+    return next(iter(parts_at(path).values()), path)
+
+
+def head_of(path: Path) -> dict[str, str]:
+    """Return what a file says of itself at its beginning; nothing when it does not. Raises CaptureError."""
+    try:
+        with path.open("rb") as stream:
+            size = path.stat().st_size
+            for content in McapFile(stream, size, str(path)).contents() if size >= len(MAGIC) else ():
+                if isinstance(content, records.Metadata) and content.name == METADATA:
+                    return content.metadata
+                if isinstance(content, Message):
+                    break
+    except OSError as error:
+        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+    return {}
+
+
+def number_of(path: Path, head: dict[str, str], entry: str = PART) -> int:
+    """Return a whole number that a file says of itself. Raises CaptureError when it is none."""
+    text = head[entry]
+    if not (text.isascii() and text.isdigit() and len(text) < 19):
+        raise CaptureError(f"{path}: its {entry} is no number, {text!r}")
+    return int(text)
+
+
+def whole_path(path: Path) -> Path:
+    """Return where the capture begins that a file is of. Raises CaptureError when it cannot be read."""
+    head = head_of(path) if path.exists() else {}
+    return first_path(path, number_of(path, head)) or path if PART in head else path
+
+
+def files_from(path: Path) -> list[Path]:
+    """Return a file and those behind it. Where the first was let go (`capture.last`), the first that is left.
+
+    Raises CaptureError when one of them is missing, or is of another run.
+    """
+    if not os.path.lexists(path) and (kept := parts_at(path)):
+        path, missing = next(iter(kept.values())), path
+        if LAST not in head_of(path):
+            raise CaptureError(f"{missing}: is missing, {path.name} goes on behind it")
+    head = head_of(path)
+    if PART not in head:
+        return [path]
+    number = number_of(path, head)
+    first = first_path(path, number)
+    files = [path]
+    for found, behind in ({} if first is None else parts_at(first)).items():
+        if found <= number:
+            continue
+        assert first is not None
+        if found != number + len(files):
+            raise CaptureError(f"{part_path(first, number + len(files))}: is missing, {behind.name} goes on behind it")
+        other = head_of(behind)
+        if not other and found == max(parts_at(first)):  # it was just begun
+            break
+        if other.get("run") != head.get("run") or other.get(PART) != str(found):
+            raise CaptureError(f"{behind}: is not what {files[-1].name} goes on in: another run's, or another part")
+        files.append(behind)
+    return files
+
+
+def end_of(path: Path) -> dict[str, str] | None:
+    """Return what a file says at its end, by its summary; None when it has no end. Raises CaptureError."""
+    try:
+        with path.open("rb") as stream:
+            size = path.stat().st_size
+            footer = size - FOOTER.size
+            stream.seek(max(0, footer))
+            tail = stream.read(FOOTER.size)
+            if len(tail) < FOOTER.size or not tail.endswith(MAGIC):
+                return None
+            opcode, _, start, _, told, _ = FOOTER.unpack(tail)
+            if opcode != Opcode.FOOTER or start > footer:
+                raise ValueError("it does not end with a footer")
+            stream.seek(start)
+            summary = stream.read(footer - start) if start else b""
+            compare("all of it", crc32(tail[:-_BEHIND_FOOTER], crc32(summary)), told)
+            return _end_in(stream, summary, size)
+    except OSError as error:
+        raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+    except (EndOfFile, struct.error, ValueError) as error:
+        raise CaptureError(f"{path}: a damaged summary, {error}") from None
+
+
+def has_end(last: Path) -> bool:
+    """Whether a capture has its end, which is in its last file. Raises CaptureError."""
+    end = end_of(last)
+    return end is not None and NEXT not in end
+
+
+def is_complete(first: Path) -> bool:
+    """Whether there is a capture that begins at `first`, and it has its end; not where that cannot be read."""
+    files = parts_at(first)
+    try:
+        return bool(files) and has_end(files[max(files)])
+    except CaptureError:
+        return False
+
+
+def _end_in(stream: BinaryIO, summary: bytes, size: int) -> dict[str, str]:
+    for opcode, start, stop in chunk_records(summary):
+        if opcode != Opcode.METADATA_INDEX:
+            continue
+        index = records.MetadataIndex.read(ReadDataStream(BytesIO(summary[start:stop])))
+        if index.name == END_METADATA:
+            if not RECORD.size <= index.length <= size - index.offset:
+                raise ValueError(f"metadata of {index.length} bytes at byte {index.offset}")
+            stream.seek(index.offset + RECORD.size)
+            content = stream.read(index.length - RECORD.size)
+            return read_metadata(content).metadata
+    return {}
+
+
+class Joined:
+    """Reads a file and those behind it as one MCAP file, from start to end; else as `McapFile` does."""
+
+    def __init__(self, path: Path, since_ns: int = 0, topics: frozenset[str] | None = None) -> None:
+        """`since_ns`: what was recorded long before that time is passed by, if it can be; so are other topics."""
+        self.finished = False
+        """Whether the last of them has an end."""
+        self.unfinished_bytes = 0
+        self.chunk_starts: array[int] = array("Q")
+        self.end_ns = 0
+        """Times of the first message of each chunk so far, and of the last of all, passed by or not."""
+        self._path = path
+        self._since_ns = since_ns
+        self._topics = topics
+        self._first: McapFile | None = None
+
+    @property
+    def profile(self) -> str:
+        return "" if self._first is None else self._first.profile
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether the first file has the digests of what stands before its messages, and they are right."""
+        return self._first is not None and self._first.is_checked
+
+    @property
+    def library(self) -> str:
+        return "" if self._first is None else self._first.library
+
+    def contents(self) -> Iterator[Content]:
+        """Yield the messages of all files, metadata and attachments of the first one, and the end of the last."""
+        files = files_from(self._path)
+        if len(files) == 1:
+            yield from self._read(files[0])
+            return
+        before, end = files[0], None
+        for path in files:
+            is_behind, has_end, end = path is not files[0], end is not None, None
+            for content in self._read(path):
+                if isinstance(content, records.Metadata) and content.name == END_METADATA:
+                    end = content
+                elif not is_behind:
+                    yield content
+                elif isinstance(content, Message):
+                    if not has_end:
+                        raise CaptureError(f"{before}: it has no end, and {path.name} goes on behind it")
+                    yield content
+            before = path
+        if end is not None:
+            yield end
+
+    def _read(self, path: Path) -> Iterator[Content]:
+        try:
+            with path.open("rb") as stream:
+                is_behind = self._first is not None
+                size = path.stat().st_size
+                file = McapFile(stream, size, str(path), self._since_ns, self._topics)
+                file.repeats = is_behind
+                file.chunk_starts = self.chunk_starts
+                self._first = self._first or file
+                yield from file.contents()
+                if is_behind and file.chunk_starts and not file.is_checked:
+                    raise CaptureError(f"{path}: it lacks its metadata {CHECKS!r}")
+        except OSError as error:
+            raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
+        self.finished, self.unfinished_bytes = file.finished, file.unfinished_bytes
+        self.end_ns = max(self.end_ns, file.end_ns)

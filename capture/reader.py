@@ -1,0 +1,439 @@
+"""The reader of captures: a finished or an unfinished file as numpy arrays, and what a re-simulation is fed with.
+
+A file is read from start to end, with no more of it in memory than a chunk and the columns that are asked for: frames,
+packets and rows are read when they are used. What is damaged or is no capture raises `CaptureError`; a file whose
+writer was killed gives everything up to its last whole chunk, and says so.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+from mcap import records
+from numpy.typing import NDArray
+
+from foosim.capture.columns import AllFrames, Frames, Integers, Packets, Poses, frames_of, packet_columns, poses_of
+from foosim.capture.contents import ASSETS, CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK, DEPLOYMENT, VERSIONS
+from foosim.capture.mcap.checks import CHECKS, CaptureError
+from foosim.capture.mcap.format import Message
+from foosim.capture.parts import (
+    END_METADATA,
+    METADATA,
+    NEXT,
+    ORIGIN,
+    ORIGIN_CHAIN,
+    ORIGIN_DIGEST,
+    ORIGIN_TICK,
+    Joined,
+    files_from,
+    has_end,
+)
+from foosim.capture.rows import (
+    CLIENTS,
+    EPOCHS,
+    FORMAT,
+    FRAME,
+    LAYOUT,
+    PACKETS,
+    PROFILE,
+    RECOVERIES,
+    ROW_TYPES,
+    TICK,
+    ClientRow,
+    DigestHex,
+    EditRow,
+    EpochRow,
+    FrameRow,
+    LayoutRow,
+    PacketRow,
+    RecoveryRow,
+    Row,
+    TickRow,
+    delivered_of,
+    edit_of,
+)
+from foosim.common.errors import Malformed, Refused
+from foosim.common.json_text import decode_json
+from foosim.common.names import nearest_name
+from foosim.common.struct_types import Counter
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.world.edits import Edit
+from foosim.world.frame import Frame
+from foosim.world.initial_state import Origin, first_chain
+from foosim.world.layout import Layout, build_layout
+from foosim.world.robot_packets import Delivered
+from foosim.world.scene import Body
+from foosim.world.scenes.build import build_scene
+
+DECODERS: Final = {topic: msgspec.json.Decoder(kind) for topic, kind in ROW_TYPES.items()}
+"""Decodes and checks a row of each topic."""
+
+
+class TickMark(msgspec.Struct, frozen=True, gc=False):
+    """What of a row of /tick is read where the world is not simulated again; the rest is passed over."""
+
+    tick: Counter
+    digest: DigestHex
+    edits: list[EditRow]
+
+
+class FrameMark(msgspec.Struct, frozen=True, gc=False):
+    """The tick of a row of /frame."""
+
+    tick: Counter
+
+
+TICK_MARKS: Final = msgspec.json.Decoder(TickMark)
+FRAME_MARKS: Final = msgspec.json.Decoder(FrameMark)
+
+
+@dataclass(frozen=True, slots=True)
+class CapturedTick:
+    """One tick as the capture has it: the frame's digests, and the inputs of the tick that led to it."""
+
+    tick: int
+    digest: bytes
+    entities: tuple[bytes, ...]
+    """64-bit digests, in name order."""
+    edits: list[Edit]
+    delivered: list[Delivered]
+
+
+@dataclass(slots=True)
+class About:
+    """What a capture says about itself, beside its rows."""
+
+    path: Path
+    library: str = ""
+    metadata: dict[str, str] = field(default_factory=dict)
+    end: dict[str, str] = field(default_factory=dict)
+    deployment_text: str = ""
+    files: dict[str, bytes] = field(default_factory=dict)
+    """The files that the deployment refers to, by path."""
+    versions: dict[str, str] = field(default_factory=dict)
+    finished: bool = False
+    unfinished_bytes: int = 0
+    start_ns: int = 0
+    end_ns: int = 0
+    """Simulated times of the first and the last message, once the file was read to its end."""
+    chunk_starts: Sequence[int] = ()
+    """That of the first message in each chunk, up to the one that is being read."""
+
+    @property
+    def deployment_name(self) -> str:
+        return self.metadata["deployment"]
+
+
+class Scan:
+    """One pass over a file: it yields the messages of some topics and gathers what stands beside them (`about`)."""
+
+    def __init__(self, path: Path, since_ns: int = 0) -> None:
+        """`since_ns`: what was recorded long before that time is passed by, if it can be (`McapFile`)."""
+        self.about = About(path)
+        self._path = path
+        self._since_ns = since_ns
+
+    def messages(self, topics: frozenset[str] | None = None) -> Iterator[Message]:
+        """Yield the messages of some topics (None: all), from the first on behind the checked metadata."""
+        file = Joined(self._path, self._since_ns, topics)
+        self.about.chunk_starts = file.chunk_starts
+        checked = False
+        for content in file.contents():
+            if isinstance(content, Message):
+                if not checked:
+                    self._check(file)
+                    checked = True
+                yield content
+            else:
+                self._take(content)
+        self._check(file)
+        self.about.library = file.library
+        self.about.finished = file.finished and NEXT not in self.about.end
+        self.about.unfinished_bytes = file.unfinished_bytes
+        self.about.start_ns, self.about.end_ns = min((file.end_ns, *file.chunk_starts)), file.end_ns
+
+    def rows(self, topics: frozenset[str]) -> Iterator[tuple[str, Row]]:
+        """Yield the rows of some topics."""
+        for message in self.messages(topics):
+            yield message.topic, self.decode(DECODERS[message.topic], message)
+
+    def decode(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
+        """Return the row that a message holds."""
+        try:
+            return decoder.decode(message.data)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise CaptureError(f"{self._path}: {message.topic} at {message.log_ns} ns: {error}") from None
+
+    def _check(self, file: Joined) -> None:
+        """Refuse what is no capture, or one of another version, before its rows are looked at."""
+        if file.profile != PROFILE or not self.about.metadata:
+            raise CaptureError(f"{self._path}: no capture of foosim, its profile is {file.profile!r}, not {PROFILE!r}")
+        version = self.about.metadata.get("format", "")
+        if version != str(FORMAT):
+            raise CaptureError(f"{self._path}: format {version!r} of a capture, this reads {FORMAT}")
+        if not self.about.deployment_text or "deployment" not in self.about.metadata:
+            raise CaptureError(f"{self._path}: the capture has no deployment")
+        if not file.is_checked:
+            raise CaptureError(f"{self._path}: the capture lacks its metadata {CHECKS!r}")
+
+    def _take(self, content: records.Metadata | records.Attachment) -> None:
+        about = self.about
+        if isinstance(content, records.Metadata):
+            if content.name == METADATA:
+                about.metadata = content.metadata
+            elif content.name == END_METADATA:
+                about.end = content.metadata
+            return
+        try:
+            if content.name == DEPLOYMENT:
+                about.deployment_text = content.data.decode()
+            elif content.name.startswith(ASSETS):
+                about.files[content.name.removeprefix(ASSETS)] = content.data
+            elif content.name == VERSIONS:
+                about.versions = msgspec.convert(decode_json(content.data), dict[str, str])
+        except (Malformed, UnicodeDecodeError, msgspec.ValidationError) as error:
+            raise CaptureError(f"{self._path}: attachment {content.name}: {error}") from None
+
+
+@dataclass(frozen=True)
+class CaptureData:
+    """A capture, opened. Packets and frames are read when they are asked for, rows each time from the file."""
+
+    about: About
+    deployment: Deployment
+    ticks: Integers
+    """Ticks of the frames whose digests are there, ascending; all from 0 on in a whole capture."""
+    digests: NDArray[np.uint8]
+    """D(tick) of each, (n, 32)."""
+    frame_ticks: Integers
+    """Ticks of the frames that are there themselves."""
+    edit_kinds: frozenset[str]
+    """Kinds of the edits that the run had."""
+    clients: tuple[ClientRow, ...]
+    epochs: tuple[EpochRow, ...]
+    recoveries: tuple[RecoveryRow, ...]
+
+    @property
+    def path(self) -> Path:
+        return self.about.path
+
+    @property
+    def finished(self) -> bool:
+        return self.about.finished
+
+    @cached_property
+    def frame_blocks(self) -> tuple[Frames, ...]:
+        """Captured frames, a block for each layout."""
+        scan = Scan(self.path)
+        reader = FrameReader(scan, self.deployment)
+        blocks: list[tuple[Layout, list[FrameRow]]] = []
+        for message in scan.messages(FrameReader.TOPICS):
+            layout, row = reader.row(message)
+            if row is None:
+                blocks.append((layout, []))
+            else:
+                blocks[-1][1].append(row)
+        return tuple(frames_of(layout, rows) for layout, rows in blocks)
+
+    def each_frame(self) -> Iterator[Frame]:
+        """Yield the captured frames one by one."""
+        scan = Scan(self.path)
+        reader = FrameReader(scan, self.deployment)
+        for message in scan.messages(FrameReader.TOPICS):
+            frame = reader.frame(message)
+            if frame is not None:
+                yield frame
+
+    def first_frame(self) -> Frame | None:
+        """Return the first captured frame, None when there is none."""
+        return next(self.each_frame(), None)
+
+    @property
+    def frames(self) -> AllFrames:
+        """All captured frames, whatever was added and removed in between."""
+        return AllFrames(str(self.path), self.frame_blocks)
+
+    @cached_property
+    def packets(self) -> Packets:
+        """All packets with their fates."""
+        return packet_columns(row for row in self.rows(PACKETS) if isinstance(row, PacketRow))
+
+    def rows(self, topic: str) -> Iterator[Row]:
+        """Yield the rows of a topic, in the order of the file."""
+        if topic not in ROW_TYPES:
+            raise CaptureError(f"{self.path}: no rows of {topic!r}, there are {', '.join(sorted(ROW_TYPES))}")
+        for _, row in Scan(self.path).rows(frozenset({topic})):
+            yield row
+
+    def captured_ticks(self) -> Iterator[CapturedTick]:
+        """Yield what a re-simulation needs, tick by tick."""
+        for row in self.rows(TICK):
+            assert isinstance(row, TickRow)
+            yield captured_tick(row)
+
+    def poses(self, name: str) -> Poses:
+        """Return the poses of a link (`red.goal/slide`), or of an entity's last link (`ball`, `red.goal`)."""
+        found: list[tuple[Frames, Body]] = []
+        link = ""
+        names: set[str] = set()
+        for frames in self.frame_blocks:
+            for body in build_scene(self.deployment, frames.layout).bodies.values():
+                links = [part.name for part in body.links]
+                names.update((body.name, *links))
+                if name == body.name or name in links:
+                    link = name if name in links else links[-1]
+                    found.append((frames, body))
+        if not found:
+            nearest = nearest_name(name, sorted(names))
+            hint = f", nearest is {nearest}" if nearest else ""
+            raise CaptureError(f"{self.path}: nothing with a body is called {name!r}{hint}")
+        return poses_of(found, link)
+
+
+def captured_tick(row: TickRow) -> CapturedTick:
+    """Return what a re-simulation needs of a row."""
+    return CapturedTick(
+        row.tick,
+        bytes.fromhex(row.digest),
+        tuple(bytes.fromhex(digest) for digest in row.entities),
+        [edit_of(edit) for edit in row.edits],
+        [delivered_of(delivered) for delivered in row.deliveries],
+    )
+
+
+def read_about(path: Path) -> About:
+    """Return what a capture, finished or not, says about itself before its first row. Raises CaptureError."""
+    scan = Scan(path)
+    for _ in scan.messages():
+        break
+    scan.about.finished = has_end(files_from(path)[-1])
+    return scan.about
+
+
+def deployment_of(about: About) -> Deployment:
+    """Return the deployment that a capture has attached. Raises CaptureError when it is not valid here."""
+    try:
+        return load_deployment(about.deployment_text, about.deployment_name).with_assets(about.files)
+    except Refused as error:
+        raise CaptureError(f"{about.path}: its deployment is not valid:\n{error}") from None
+
+
+def open_capture(path: Path | str) -> CaptureData:
+    """Open a capture, also an unfinished one. Raises CaptureError when it is none, or damaged."""
+    scan = Scan(Path(path))
+    ticks: array[int] = array("q")
+    frame_ticks: array[int] = array("q")
+    digests = bytearray()
+    edit_kinds: set[str] = set()
+    others: dict[str, list[Any]] = {CLIENTS: [], EPOCHS: [], RECOVERIES: []}
+    for message in scan.messages(frozenset({TICK, FRAME, *others})):
+        if message.topic == TICK:
+            mark = scan.decode(TICK_MARKS, message)
+            if ticks and mark.tick <= ticks[-1]:
+                raise CaptureError(f"{path}: tick {mark.tick} comes behind tick {ticks[-1]}")
+            ticks.append(mark.tick)
+            digests += bytes.fromhex(mark.digest)
+            edit_kinds.update(edit.kind for edit in mark.edits)
+        elif message.topic == FRAME:
+            frame_ticks.append(scan.decode(FRAME_MARKS, message).tick)
+        else:
+            others[message.topic].append(scan.decode(DECODERS[message.topic], message))
+    return CaptureData(
+        scan.about,
+        deployment_of(scan.about),
+        np.array(ticks, dtype=np.int64),
+        np.frombuffer(bytes(digests), dtype=np.uint8).reshape(len(ticks), 32),
+        np.array(frame_ticks, dtype=np.int64),
+        frozenset(edit_kinds),
+        tuple(others[CLIENTS]),
+        tuple(others[EPOCHS]),
+        tuple(others[RECOVERIES]),
+    )
+
+
+class FrameReader:
+    """Reads the frames of a pass over a file, each checked against the layout before it."""
+
+    TOPICS: Final = frozenset({LAYOUT, FRAME})
+
+    def __init__(self, scan: Scan, deployment: Deployment) -> None:
+        self._scan = scan
+        self._deployment = deployment
+        self._layout: Layout | None = None
+
+    def frame(self, message: Message) -> Frame | None:
+        """Return the frame that a message of `TOPICS` brings; None where that is a layout. Raises CaptureError."""
+        layout, row = self.row(message)
+        return None if row is None else frames_of(layout, [row]).frame(0)
+
+    def row(self, message: Message) -> tuple[Layout, FrameRow | None]:
+        """Return the layout that a message brings, or the row of a frame with its layout. Raises CaptureError."""
+        row = self._scan.decode(DECODERS[message.topic], message)
+        path = self._scan.about.path
+        if isinstance(row, LayoutRow):
+            self._layout = layout_of(path, self._deployment, row)
+            return self._layout, None
+        layout = self._layout
+        if layout is None:
+            raise CaptureError(f"{path}: a frame without a layout before it")
+        if len(row.values) != 8 * layout.size or any(o.index >= len(layout.entities) for o in row.outboxes):
+            raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")
+        return layout, row
+
+
+def origin_of(about: About) -> Origin | None:
+    """Return where the run of a capture began, None: at frame 0. Raises CaptureError."""
+    about_it = about.metadata
+    if ORIGIN_TICK not in about_it:
+        return None
+    try:
+        digest, chain = bytes.fromhex(about_it[ORIGIN_DIGEST]), bytes.fromhex(about_it[ORIGIN_CHAIN])
+        return Origin(int(about_it[ORIGIN_TICK]), about_it[ORIGIN], digest, chain)
+    except (KeyError, ValueError) as error:
+        raise CaptureError(f"{about.path}: it does not say in full where its run began: {error}") from None
+
+
+def beginning_of(about: About) -> Origin | None:
+    """Return where a capture begins, a cut or its run, None: at frame 0. Raises CaptureError."""
+    told = about.metadata
+    if CUT not in told:
+        return origin_of(about)
+    try:
+        digest, chain = bytes.fromhex(told[CUT_DIGEST]), bytes.fromhex(told[CUT_CHAIN])
+        return Origin(int(told[CUT_TICK]), told[CUT], digest, chain)
+    except (KeyError, ValueError) as error:
+        raise CaptureError(f"{about.path}: it does not say in full where it was cut: {error}") from None
+
+
+def chain_at_start(about: About) -> bytes:
+    """Return the chain over all frames up to the first one that a capture has. Raises CaptureError."""
+    return first_chain(beginning_of(about))
+
+
+def check_whole(about: About) -> None:
+    """Raise CaptureError for a cut: it lacks the frame that its run began with."""
+    if CUT in about.metadata:
+        source, tick = about.metadata[CUT], about.metadata.get(CUT_TICK)
+        raise CaptureError(
+            f"{about.path}: a cut of {source} from tick {tick} on; a run is verified from where it began: "
+            f"verify {source}, or this from its first frame on (--from-first-frame)"
+        )
+
+
+def layout_of(path: Path, deployment: Deployment, row: LayoutRow) -> Layout:
+    """Build the layout that a row names, and compare: what the numbers of its frames mean depends on it."""
+    try:
+        layout = build_layout(deployment, [(added.name, added.model) for added in row.added])
+    except KeyError as error:
+        raise CaptureError(f"{path}: the layout at tick {row.tick} has an unknown model {error}") from None
+    if layout.digest.hex() != row.digest or layout.size != row.size:
+        raise CaptureError(f"{path}: the layout at tick {row.tick} is not what this version builds")
+    return layout

@@ -1,0 +1,351 @@
+"""The rows of a capture: what is kept of every closed tick, as types of their own.
+
+A row is a JSON object; its JSON Schema is generated from its type. Viewers (Foxglove, Lichtblick) parse only a part of
+JSON Schema: objects of numbers, strings, booleans, objects and lists of these; no null, no choice between types, no
+reference, no list in a list. So a row has every field always, and -1 or an empty text where there is nothing to say.
+Fields that come from a clock of the real world have names that start with `wall_`: two runs differ in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from foosim.capture.mcap.checks import CaptureError
+from foosim.common import limits
+from foosim.common.struct_types import Counter
+from foosim.world.edits import Add, Disrupt, Edit, Freeze, Push, Remove, Thaw
+from foosim.world.robot_packets import Delivered
+
+FORMAT: Final = 2
+"""Version of the rows and of the capture's metadata; a reader refuses another one."""
+PROFILE: Final = "foosim"
+
+CounterOrNone = Annotated[int, Meta(ge=-1, le=limits.COUNTER_MAX)]
+"""-1 where there is nothing to say."""
+DigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+EntityDigestHex = Annotated[str, Meta(pattern="^[0-9a-f]{16}$")]
+ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
+WordHex = Annotated[str, Meta(extra_json_schema={"type": "string", "pattern": "^([0-9a-f]{16})?$"})]
+"""Checked by `capture_columns.word_of` and not with its row: that would take a reader as long as the row's decoding."""
+Fate = Literal["delivered", "dropped", "in_flight"]
+
+
+class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
+    """What every row shares: an object with all its fields, none unknown."""
+
+
+class EditRow(Row, frozen=True):
+    """A change of the world by an order. Lists are x, y, z in the world frame, empty where the kind has none."""
+
+    kind: Literal["add", "remove", "push", "freeze", "thaw", "network"]
+    name: str = ""
+    model: str = ""
+    position: list[float] = []
+    velocity: list[float] = []
+    impulse: list[float] = []
+    event: str = ""
+    """What happens to the network, as JSON."""
+
+
+class DeliveredRow(Row, frozen=True, omit_defaults=True):
+    """A packet that reached a robot."""
+
+    due_ns: Counter
+    source: str
+    sequence: Counter
+    copy: Counter
+    destination: str
+    channel: str
+    payload: bytes
+    payload_hash: bytes = b""
+
+
+class TickRow(Row, frozen=True):
+    """Frame `tick`: its digest D(tick), a 64-bit digest per entity in name order (all in hex), and what it came from:
+    edits and deliveries of tick - 1. `wall_closed_ns` is the vHub's monotonic clock."""
+
+    tick: Counter
+    digest: DigestHex
+    entities: list[EntityDigestHex]
+    edits: list[EditRow]
+    deliveries: list[DeliveredRow]
+    wall_closed_ns: Counter
+
+
+class EntityRow(Row, frozen=True):
+    """One entity of a layout: its slots are `start` to `stop` of the frame's values, from `split` on its owner's."""
+
+    name: str
+    model: str
+    start: Counter
+    split: Counter
+    stop: Counter
+
+
+class AddedRow(Row, frozen=True):
+    """An entity that is not in the deployment."""
+
+    name: str
+    model: str
+
+
+class LayoutRow(Row, frozen=True):
+    """The layout of frames from `tick` on."""
+
+    tick: Counter
+    digest: DigestHex
+    size: Counter
+    entities: list[EntityRow]
+    added: list[AddedRow]
+
+
+class OutboxRow(Row, frozen=True, omit_defaults=True):
+    """The outbox of the entity at `index` of the layout."""
+
+    index: Counter
+    packets: bytes
+    packets_hash: bytes = b""
+
+
+class FrameRow(Row, frozen=True):
+    """Frame `tick` itself: its values as little-endian float64, its outboxes that are not empty."""
+
+    tick: Counter
+    values: bytes
+    outboxes: list[OutboxRow]
+
+
+class DecidedRow(Row, frozen=True, omit_defaults=True):
+    """By what a packet was dropped, where its cause has numbers of its own.
+
+    A `collision` is `contention` (the medium's), `interference`, or `half_duplex`: its receiver was on air itself.
+    `by_factor_cdbm` is LoRa's interference by spreading factor from 7 on, 0 for none, whatever the fate. With
+    `duty_cycle` there is the airtime that was left; with `queue_full` and `queue_codel` how many packets waited, and of
+    CoDel for how long waits had been above its target, and which drop in a row it is; with `evicted` who took its
+    place (else -1), and how many were under way; with `rx_full` the bytes that its source had left of its share.
+    """
+
+    collision: Literal["", "contention", "interference", "half_duplex"] = ""
+    by_factor_cdbm: list[int] = []
+    duty_left_ns: Counter = 0
+    queue_packets: Counter = 0
+    codel_above_ns: Counter = 0
+    codel_drops: Counter = 0
+    evicted_by: CounterOrNone = -1
+    evicted_by_copy: Counter = 0
+    under_way: Counter = 0
+    room_left: Counter = 0
+    room_share: Counter = 0
+
+
+NOTHING_MORE: Final = DecidedRow()
+
+
+class PacketRow(Row, frozen=True, omit_defaults=True):
+    """One offered packet and its fate, with the cause of a drop and what the verdict came from.
+
+    Levels are hundredths of a dB or dBm. What no stage looked at has its default and is left out of the file.
+    `due_ns` and `arrival_tick` are -1 when it was dropped at sending. The words are the 64-bit draws that were used,
+    in hex. `stamp_ns` is the sender's own. `wall_released_ns` is the vHub's monotonic clock when the packet left
+    for its receiver, 0 when it did not. Where payloads are hashed `payload` is empty and `payload_hash` is there.
+    """
+
+    source: str
+    sequence: Counter
+    copy: Counter
+    destination: str
+    channel: str
+    sent_ns: Counter
+    stamp_ns: Counter
+    due_ns: CounterOrNone
+    arrival_tick: CounterOrNone
+    fate: Fate
+    cause: str
+    rule: str
+    loss_word: WordHex
+    jitter_word: WordHex
+    size: Counter
+    payload: bytes
+    wall_released_ns: Counter
+    radio: str = ""
+    published: bool = False
+    queue_bytes: Counter = 0
+    queue_ns: Counter = 0
+    access_ns: Counter = 0
+    airtime_ns: Counter = 0
+    propagation_ns: Counter = 0
+    jitter_ns: Counter = 0
+    held_ns: Counter = 0
+    model_ns: Counter = 0
+    phase_ns: Counter = 0
+    is_bad: bool = False
+    bits_flipped: Counter = 0
+    rate_bps: Counter = 0
+    distance_mm: Counter = 0
+    walls: list[str] = []
+    walls_cdb: int = 0
+    path_loss_cdb: int = 0
+    shadowing_cdb: int = 0
+    fading_cdb: int = 0
+    received_cdbm: int = 0
+    snr_cdb: int = 0
+    interference_cdbm: int = 0
+    error_ppm: Counter = 0
+    error_word: WordHex = ""
+    contenders: Counter = 0
+    retries: Counter = 0
+    decided_by: DecidedRow = NOTHING_MORE
+    payload_hash: bytes = b""
+
+
+class SubscriptionRow(Row, frozen=True):
+    """A channel of an endpoint that a client hears."""
+
+    source: str
+    channel: str
+
+
+class ClientRow(Row, frozen=True):
+    """A client that joins or leaves at `tick`; `period` (0: free-running) and `offset` are in ticks.
+
+    One with `arrivals` acts when a packet of these channels reaches it, and when it has not for a period. One that
+    `leaves_owing` was told its turn at that tick, and is gone without an answer.
+    """
+
+    tick: Counter
+    client: str
+    event: Literal["joins", "leaves", "leaves_owing"]
+    period: Counter
+    subscriptions: list[SubscriptionRow]
+    offset: Counter = 0
+    arrivals: list[SubscriptionRow] = []
+
+
+class AgeRow(Row, frozen=True):
+    """How old the newest packet of a channel was when its receiver acted, since the row before: told each second of
+    simulated time, up to the closing of `tick`, and at the end.
+
+    `uses` counts the ticks at which the client acted and had something of the channel; `p50_ns`, `p99_ns` and `most_ns`
+    are of these. `counts` says how often each of `ages_ns` was seen; ages of 64 ticks and more are rounded down to
+    1/32.
+    """
+
+    tick: Counter
+    client: str
+    source: str
+    channel: str
+    uses: Counter
+    p50_ns: Counter
+    p99_ns: Counter
+    most_ns: Counter
+    ages_ns: list[int]
+    counts: list[int]
+
+
+class OwnerRow(Row, frozen=True):
+    """A robot and the node that owns it."""
+
+    robot: str
+    node: str
+
+
+class EpochRow(Row, frozen=True):
+    """Who computes from frame `tick` on, whose digest D(tick) is named: the nodes, and the owner of every robot.
+
+    `arithmetic` is the digest of a fixed small run of the nodes' engine, in hex: where it differs, worlds may differ.
+    It is empty where nodes of several kinds take part.
+    """
+
+    tick: Counter
+    epoch: Counter
+    digest: DigestHex
+    roster: list[str]
+    owners: list[OwnerRow]
+    arithmetic: ArithmeticHex
+
+
+class RecoveryRow(Row, frozen=True):
+    """A process that was lost or came behind frame `tick`, and the `epoch` that is the first without or with it.
+
+    `what` is `node` (a node was lost), `join` (one came), `supervisor` (it was started again) or `vhub` (it was lost,
+    and is back). `wall_outage_ns` is the wall time without a commit, by the supervisor's clock.
+    """
+
+    what: str
+    name: str
+    reason: str
+    tick: Counter
+    epoch: Counter
+    wall_outage_ns: Counter
+
+
+EPOCHS: Final = "/epochs"
+RECOVERIES: Final = "/recoveries"
+TICK: Final = "/tick"
+LAYOUT: Final = "/layout"
+FRAME: Final = "/frame"
+AGES: Final = "/ages"
+PACKETS: Final = "/packets"
+CLIENTS: Final = "/clients"
+
+ROW_TYPES: Final[Mapping[str, type[Row]]] = {
+    EPOCHS: EpochRow,
+    RECOVERIES: RecoveryRow,
+    LAYOUT: LayoutRow,
+    CLIENTS: ClientRow,
+    TICK: TickRow,
+    FRAME: FrameRow,
+    AGES: AgeRow,
+    PACKETS: PacketRow,
+}
+"""The type of the rows of each topic."""
+
+
+def row_schema(kind: type[Row]) -> dict[str, Any]:
+    """Return the JSON Schema of a row, in the part of JSON Schema that viewers parse: everything in its place."""
+    schema = msgspec.json.schema(kind)
+    definitions: dict[str, Any] = schema["$defs"]
+    content: dict[str, Any] = _in_place(schema, definitions)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **content}
+
+
+def _in_place(schema: Any, definitions: Mapping[str, Any]) -> Any:
+    """Return a schema with references replaced by what they name, and the type said of every list of choices."""
+    if isinstance(schema, list):
+        return [_in_place(item, definitions) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    if "$ref" in schema:
+        return _in_place(definitions[schema["$ref"].rpartition("/")[2]], definitions)
+    typed = {"type": "string", **schema} if "enum" in schema else schema
+    return {key: _in_place(value, definitions) for key, value in typed.items() if key != "$defs"}
+
+
+def edit_of(row: EditRow) -> Edit:
+    """Return the edit that a row tells; the inverse of `to_rows.edit_row`."""
+    if row.kind == "add":
+        return Add(row.name, row.model, _vector(row.position), _vector(row.velocity))
+    if row.kind == "remove":
+        return Remove(row.name)
+    if row.kind == "push":
+        return Push(row.name, _vector(row.impulse))
+    if row.kind == "network":
+        return Disrupt(row.event)
+    return Freeze(row.name) if row.kind == "freeze" else Thaw(row.name)
+
+
+def delivered_of(row: DeliveredRow) -> Delivered:
+    """Return the delivery that a row tells. Raises CaptureError for one whose payload is hashed."""
+    if row.payload_hash:
+        raise CaptureError(f"{row.source} {row.sequence} to {row.destination}: its payload is hashed")
+    return Delivered(row.due_ns, row.source, row.sequence, row.copy, row.destination, row.channel, row.payload)
+
+
+def _vector(numbers: list[float]) -> tuple[float, float, float]:
+    if len(numbers) != 3:
+        raise CaptureError(f"an edit with a vector of {len(numbers)} numbers, it has 3")
+    return numbers[0], numbers[1], numbers[2]

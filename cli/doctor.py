@@ -1,0 +1,71 @@
+"""The command `foosim-doctor`: whether a deployment could run here, and what to do where it could not."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from itertools import groupby
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foosim.common.addresses import check_listen
+from foosim.common.json_text import encode_json
+from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.launcher.doctor.checks import HERE, Case, Finding, is_well
+from foosim.launcher.doctor.hosts import examine_all
+from foosim.runtime.command import DONE, FAILED, PkiOption, VersionOption, new_app, run_app
+
+app = new_app()
+
+MARKS = {"fine": "ok", "warning": "!", "problem": "NO"}
+
+
+@app.command()
+def doctor(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)],
+    listen: Annotated[
+        str | None, typer.Option(help="Where it would listen: HOST[:PORT], by default as deployed.")
+    ] = None,
+    insecure: Annotated[bool, typer.Option("--insecure", help="As for `up`.")] = False,
+    pki: PkiOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")] = False,
+    version: VersionOption = False,
+) -> None:
+    """Look whether a deployment could run on this machine and its hosts, before it does.
+
+    Checks versions, the players' classes, certificates (names, dates, keys, hosts), ports, the clock and disks, here
+    and, through ssh, on each host of the deployment: also whether it answers, whether the supervisor's port is reached
+    from there and the vHub's from here, how far its clock is off, and the units of systemd. For that, foosim imports
+    the modules of players and listens at these ports for a moment. Each line says what is fine, what is not, and what
+    to do. Exit codes: 0 nothing stands in the way, 1 something does, 2 bad input.
+    """
+    text = read_deployment_text(file)
+    deployment = load_deployment(text, str(file))
+    address = deployment.listen if listen is None else listen
+    check_listen(address, insecure, 2, pki is not None)
+    findings = examine_all(Case(deployment, address, insecure, pki), str(file), text)
+    if json:
+        content = {"well": is_well(findings), "findings": [asdict(finding) for finding in findings]}
+        print(encode_json(content).decode())
+    else:
+        for host, lines in groupby(findings, lambda finding: finding.host):
+            if host != HERE:
+                print(f"\non host {host}:")
+            print(*map(_line, lines), sep="\n")
+    raise typer.Exit(DONE if is_well(findings) else FAILED)
+
+
+def _line(finding: Finding) -> str:
+    remedy = f"\n{'':18}-> {finding.remedy}" if finding.remedy else ""
+    text = f": {finding.text}" if finding.text else ""
+    return f"{MARKS[finding.state]:3} {finding.check:13} {finding.subject}{text}{remedy}"
+
+
+def main() -> None:
+    """Entry of `foosim-doctor`."""
+    run_app(app, "foosim-doctor")
+
+
+if __name__ == "__main__":
+    main()

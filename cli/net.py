@@ -1,0 +1,328 @@
+"""The command `foosim-net`: what a network means, what became of a packet, and events on a running system.
+
+Each subcommand is a thin shell over typed functions: `vhub.lint`, `vhub.explain`, `links_shown`, `control`.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from contextlib import nullcontext
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+from rich.console import Console
+from rich.live import Live
+
+from foosim.analysis.explain import explain_packet, parse_packet
+from foosim.analysis.network_tables import RANGE_NOTE, link_line, link_table, links_shown, meaning_tables, use_text
+from foosim.analysis.sources import held
+from foosim.capture.reader import open_capture
+from foosim.common.errors import BadValue
+from foosim.common.json_text import encode_json
+from foosim.common.names import nearest_name
+from foosim.deployment.assets import pin_assets, read_files
+from foosim.deployment.loader import apply_sets, load_deployment, load_network, read_deployment_text
+from foosim.deployment.network.presets import PRESETS, provenance
+from foosim.deployment.network.traces import check_files, network_files
+from foosim.deployment.overrides import nested
+from foosim.deployment.schema import places
+from foosim.protocol.channels import VHUB
+from foosim.protocol.messages import Answer
+from foosim.runtime.command import VersionOption, new_app, run_app
+from foosim.runtime.process import Stop
+from foosim.supervisor import control
+from foosim.vhub.links.summary import Meaning, meaning_of, meanings, uses_alone
+from foosim.vhub.links.summary_text import meaning_lines
+from foosim.vhub.network.custom_models import check_link_models
+
+app = new_app()
+
+Run = Annotated[str | None, typer.Option("--run", help="The run that is meant; by default the newest live one.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+Lasts = Annotated[str | None, typer.Option("--for", help="How long in simulated time, e.g. 10s; else until a heal.")]
+Random = Annotated[bool, typer.Option("--random", help="--for is a mean: how long is drawn, exponential.")]
+EVERY_S: Final = 1.0
+ALONE: Final = (
+    "the network stands alone: whom its selectors match is not known; rules are shown over all radios that there are"
+)
+
+
+@app.callback()
+def foosim_net(version: VersionOption = False) -> None:
+    """Understand a network, and have things happen to the one of a running system.
+
+    `lint` and `presets` say what a configuration means, `explain` what became of one captured packet and why, `top`
+    what the links of a running system do. The others happen at a tick, which they name, are logged as orders are, and
+    so are in every re-simulation.
+
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 second Ctrl-C.
+    """
+
+
+@app.command()
+def lint(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A deployment, or a file with its network section alone.", show_default=False
+        ),
+    ],
+    sets: Annotated[list[str] | None, typer.Option("--set", help="Change the file; may be repeated.")] = None,
+    json: Json = False,
+) -> None:
+    """Print what a network means, per rule and radio, and warn of what looks wrong.
+
+    Mean loss beside geometry, mean bursts, delay, airtime, greatest throughput of one station and of ten, range,
+    duty cycle, and how long a full queue is. All problems of a file are shown at once, as by validate; a link model has
+    to be installed here, unless the deployment places the vHub on another machine.
+    """
+    found, is_alone = linted(file, sets or [])
+    if json:
+        print(encode_json({"alone": is_alone, "rules": [asdict(meaning) for meaning in found]}).decode())
+        return
+    console = Console()
+    if is_alone:
+        _say(console, ALONE)
+    if console.is_terminal:
+        for table in meaning_tables(found):
+            console.print(table, "")
+        for meaning in found:
+            for warning in meaning.warnings:
+                _say(console, f"warning: {meaning.name}: {warning}")
+    else:
+        for line in meaning_lines(found):
+            _say(console, line)
+    if any(meaning.range_los_m is not None for meaning in found):
+        _say(console, RANGE_NOTE)
+
+
+def linted(file: Path, sets: list[str]) -> tuple[list[Meaning], bool]:
+    """Return what a file's network means, and whether it stands alone. Raises DeploymentError or AssetError."""
+    name, text = str(file), read_deployment_text(file)
+    network = load_network(text, name, sets)
+    if network is None:
+        pinned, files = pin_assets(apply_sets(text, name, sets), name, file.parent)
+        deployment = load_deployment(pinned, name).with_assets(files)
+        if VHUB not in places(deployment):  # else its machine has them, and looks
+            check_link_models(deployment.network, text, name, sets)
+        return meanings(deployment), False
+    files = read_files(file.parent, ".", network_files(network))
+    check_files(network, files)
+    check_link_models(network, text, name, sets)
+    return [meaning_of(use, files) for use in uses_alone(network)], True
+
+
+@app.command()
+def presets(
+    name: Annotated[str | None, typer.Argument(help="Which preset; by default all.", show_default=False)] = None,
+    json: Json = False,
+) -> None:
+    """Print the values of presets, with the numbers that their media have beside, and where each comes from.
+
+    [S] read in a standard's reference code or a project's source, [M] measured in a cited paper, [C] computed from
+    such, [R] recalled from a standard that was not at hand: unverified, [J] judgement.
+    """
+    if name is not None and name not in PRESETS:
+        nearest = nearest_name(name, PRESETS)
+        raise BadValue(
+            f"no such preset, there are {', '.join(PRESETS)}", name, None if nearest is None else repr(nearest)
+        )
+    chosen = {one: [*provenance(one), *held(one)] for one in ([name] if name is not None else PRESETS)}
+    if json:
+        content = {
+            one: [{"key": key, "value": value, "source": source} for key, value, source in rows]
+            for one, rows in chosen.items()
+        }
+        print(encode_json(content).decode())
+        return
+    for one, rows in chosen.items():
+        print(one)
+        width = max(len(f"{key}: {value}") for key, value, _ in rows)
+        for key, value, source in rows:
+            print(f"  {f'{key}: {value}':{min(width, 48)}}  {source}")
+
+
+@app.command()
+def explain(
+    capture: Annotated[Path, typer.Argument(metavar="CAPTURE", help="A capture.", show_default=False)],
+    packet: Annotated[
+        str,
+        typer.Argument(metavar="PACKET", help="SOURCE:SEQUENCE[:DESTINATION[:COPY]].", show_default=False),
+    ],
+    json: Json = False,
+) -> None:
+    """Print the stages that a captured packet went through, with their numbers, and what became of it.
+
+    PACKET is SOURCE:SEQUENCE[:DESTINATION[:COPY]], e.g. camera:655360:player-red. The sequence number of a robot's
+    packet is its tick times 65536 plus its place among those of that tick. Where it had one receiver, the destination
+    may be left out; copy 1 is the one that the link made. Draws are made again from seed, link and number, and have
+    to agree with the capture.
+    """
+    which = parse_packet(packet)
+    explained = explain_packet(open_capture(capture), which)
+    if json:
+        print(encode_json(asdict(explained)).decode())
+        return
+    print(explained.head)
+    width = max(len(step.stage) for step in explained.steps)
+    for step in explained.steps:
+        print(f"  {step.stage:{width}}  {step.text}")
+    print(explained.verdict)
+
+
+@app.command()
+def top(
+    run: Run = None,
+    once: Annotated[bool, typer.Option("--once", help="Print the links once, since the start, and end.")] = False,
+    json: Json = False,
+) -> None:
+    """Show the links of a running system, those with the most traffic first, until Ctrl-C.
+
+    Traffic is packets offered in a second of simulated time. With --json, or without a terminal, a block a second.
+    """
+    console = Console()
+    with control.connect(run) as desk:
+        if once:
+            status = desk.status()
+            _show_links(console, None, status, links_shown(status), json)
+            return
+        ended = threading.Event()
+        Stop().then(ended.set)
+        before: dict[str, Any] | None = None
+        live = Live(console=console, auto_refresh=False) if console.is_terminal and not json else None
+        with live or nullcontext():
+            while not ended.is_set():
+                try:
+                    status = desk.status(give_up=ended.is_set)
+                except control.NoAnswer:
+                    if ended.is_set():
+                        return
+                    raise
+                _show_links(console, live, status, links_shown(status, before), json)
+                if status["state"] in ("ended", "failed"):
+                    return
+                before = status
+                ended.wait(EVERY_S)
+
+
+def _show_links(
+    console: Console, live: Live | None, status: dict[str, Any], links: list[dict[str, Any]], json: bool
+) -> None:
+    if json:
+        print(encode_json({"run": status["run"], "tick": status["ticks"], "links": links}).decode(), flush=True)
+        return
+    title = f"run {status['run']} · tick {status['ticks']} · {use_text(status)}"
+    if live is not None:
+        live.update(link_table(links[: max(1, console.height - 4)], title), refresh=True)
+        return
+    _say(console, title)
+    for link in links:
+        _say(console, f"  {link_line(link)}")
+    sys.stdout.flush()
+
+
+def _say(console: Console, line: str) -> None:
+    console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+# --- events ----------------------------------------------------------------------------------------------------------
+
+
+@app.command("set")
+def set_link(
+    link: Annotated[str, typer.Argument(help="The id of a link rule.", show_default=False)],
+    settings: Annotated[
+        list[str], typer.Argument(metavar="KEY=VALUE...", help="e.g. loss=5% delay='20 ms'.", show_default=False)
+    ],
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Change settings of a link rule, until a heal of settings.
+
+    Keys are those of a rule, with dots for what is inside: burst.loss=1% burst.mean_bad=20ms. A mapping is written
+    whole.
+    """
+    _show(control.network({"set": {**nested(settings), "link": link}}, run), json)
+
+
+@app.command()
+def partition(
+    groups: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="GROUP GROUP...", help="Endpoints with commas, or rest for all others.", show_default=False
+        ),
+    ],
+    lasts: Lasts = None,
+    random: Random = False,
+    one_way: Annotated[bool, typer.Option("--one-way", help="Cut only what the first group sends.")] = False,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Cut what endpoints of different groups send one another."""
+    event = {"partition": [_split(group) for group in groups], **_for(lasts, random)}
+    _show(control.network({**event, "symmetric": False} if one_way else event, run), json)
+
+
+@app.command()
+def clog(
+    source: Annotated[str, typer.Argument(metavar="FROM", help="Endpoints, with commas.", show_default=False)],
+    destination: Annotated[str, typer.Argument(metavar="TO", help="Endpoints, with commas.", show_default=False)],
+    lasts: Lasts = None,
+    random: Random = False,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Have packets wait until it is over; then all come at once, in their order."""
+    ends = {"from": _split(source), "to": _split(destination)}
+    _show(control.network({"clog": ends, **_for(lasts, random)}, run), json)
+
+
+@app.command()
+def chaos(
+    lasts: Annotated[str, typer.Option("--for", help="How long in simulated time, at most 1 h.", show_default=False)],
+    among: Annotated[str, typer.Option(help="Endpoints, with commas.")] = "*",
+    random: Random = False,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Have random delays, losses, copies, clogs and partitions, drawn by the run's seed."""
+    _show(control.network({"chaos": {"among": _split(among)}, **_for(lasts, random)}, run), json)
+
+
+@app.command()
+def heal(
+    what: Annotated[str, typer.Argument(help="all, partitions, clogs, chaos or settings.")] = "all",
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """End what lasts: at once, also what clogs hold."""
+    _show(control.network({"heal": what}, run), json)
+
+
+def _split(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",")]
+
+
+def _for(lasts: str | None, random: bool) -> dict[str, Any]:
+    if lasts is None:
+        if random:
+            raise BadValue("--random needs --for, the mean")
+        return {}
+    return {"for": {"exponential": lasts} if random else lasts}
+
+
+def _show(answer: Answer, json: bool) -> None:
+    print(encode_json({"tick": answer.tick, "text": answer.text}).decode() if json else answer.text)
+
+
+def main() -> None:
+    """Entry of `foosim-net`."""
+    run_app(app, "foosim-net")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,189 @@
+"""The command `foosim-rehearse`: a deployment in one process on virtual time. A shell over `rehearse`."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from contextlib import redirect_stdout
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from foosim.common import limits
+from foosim.common.addresses import LOOPBACK
+from foosim.common.errors import BadValue
+from foosim.common.json_text import encode_json
+from foosim.deployment.loader import load_deployment, read_deployment_text
+from foosim.launcher.new_capture import check_rooms
+from foosim.launcher.plan import Plan, check_models_here, check_players_here, make_plan
+from foosim.launcher.run_options import RunOptions
+from foosim.rehearsal.interrupts import Interrupts
+from foosim.rehearsal.onlooker import LINE_S
+from foosim.rehearsal.run import rehearse
+from foosim.rehearsal.swarm.campaign import Flown, fly
+from foosim.rehearsal.swarm.faults import TICKS
+from foosim.rehearsal.system import Settings
+from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.supervisor.status import score_text
+from foosim.vhub.links.summary import meanings
+from foosim.vhub.links.summary_text import start_lines
+
+app = new_app()
+
+
+@app.command()
+def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
+    file: Annotated[Path, typer.Argument(help="The deployment file.", show_default=False)],
+    duration: Annotated[str | None, typer.Option("--for", help="Simulated time to run, e.g. 20s.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of all random draws; short for --set seed=N.")] = None,
+    nodes: Annotated[int, typer.Option(help="Number of nodes, n1 to nN; each has an engine of its own.")] = 1,
+    engine: Annotated[str | None, typer.Option(help="bullet or pure; short for --set engine=NAME.")] = None,
+    sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
+    swarm: Annotated[bool, typer.Option("--swarm", help="Fly the random faults of --seed: see below.")] = False,
+    seeds: Annotated[int, typer.Option(help="With --swarm: how many seeds, from --seed (or 1) on.", min=1)] = 1,
+    branch: Annotated[
+        str | None,
+        typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
+    ] = None,
+    capture: Annotated[Path | None, typer.Option(help="Write a capture here; an existing one is refused.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
+    version: VersionOption = False,
+) -> None:
+    """Rehearse a deployment: supervisor, vHub, nodes and players in one process, as fast as it goes.
+
+    The same cores, messages and bytes as in the processes of `foosim-supervisor up`: with lockstep players the digests
+    are those of `up`, whatever the number of nodes.
+
+    With --swarm a seed decides the number of nodes (3 to 5), their clocks, the weather on the bus (delay, loss,
+    repeats) and 8 to 20 faults of at least three kinds in 208 ticks on the pure engine (--for: more of both): processes
+    killed, ended amid a turn, paused, slow, stopped, cut off one way or both, clogged; memory and clocks that jump; old
+    messages once more; in every eighth seed players lost; robots moved, balls added, removed and pushed, the run
+    paused. Everything that is written, said and closed is checked against the laws; then all heals, and everybody has
+    to be back.
+
+    A line of progress each second goes to standard error: simulated time, its speed, the score, and which process was
+    waited for the most. A Ctrl-C ends the rehearsal in order, a second one at once; the last line says how far it came
+    and where the capture is. A player that does not answer within `deadlines.lockstep_fast` ends the run.
+
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 the capture exists or cannot be created, or its
+    disk has no room, 130 second Ctrl-C.
+    """
+    if swarm:
+        raise typer.Exit(_swarm(file, duration, 1 if seed is None else seed, seeds, json))
+    if duration is None:
+        raise BadValue("--for is missing: how long is needed, e.g. --for 20s")
+    if not 1 <= nodes <= limits.NODES_MAX:
+        raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
+    settings = (*(sets or []), *([f"engine={engine}"] if engine is not None else []))
+    plan = make_plan(RunOptions(file, "fast", duration, seed, settings, LOOPBACK, branch=branch))
+    check_models_here(plan)
+    free = sorted(name for name, player in plan.deployment.players.items() if not player.lockstep)
+    if free:
+        raise BadValue("players that are not lockstep have no place in a rehearsal", ", ".join(free))
+
+    check_players_here(plan)
+    for warning in check_rooms(plan.deployment.capture, capture, None):
+        _note(f"warning: {warning}")
+    if not json:
+        for line in (*([plan.branch.text] if plan.branch else []), *start_lines(meanings(plan.deployment), str(file))):
+            typer.echo(line)
+    raise typer.Exit(_rehearse(plan, nodes, capture, json))
+
+
+def _rehearse(plan: Plan, nodes: int, capture: Path | None, json: bool) -> int:
+    """Rehearse what was asked for and show the result; return the exit code."""
+    output, file = sys.stdout, plan.options.file
+
+    def show(result: dict[str, Any]) -> int:
+        print(encode_json(result).decode() if json else _told(result), file=output, flush=True)
+        return FAILED if result["failed"] else DONE
+
+    def stuck(result: dict[str, Any]) -> None:
+        _note(result["reason"])
+        os._exit(show(result))
+
+    inputs: dict[str, Any] = {"capture": capture, "start": plan.start, "folder": file.parent}
+    # Players print to standard error: standard output has the result and nothing else.
+    with redirect_stdout(sys.stderr), Interrupts(_note) as interrupts:
+        settings = Settings(on_say=_show)
+        looks: dict[str, Any] = {"prepare": interrupts.attend, "progress": _note, "on_stuck": stuck}
+        try:
+            result = rehearse(plan.text, str(file), plan.ticks, nodes, settings=settings, **inputs, **looks).json
+        except KeyboardInterrupt:
+            _note(interrupts.last_line(capture, is_finished=False))
+            raise
+    code = show(result)
+    if interrupts.count:
+        _note(interrupts.last_line(capture, is_finished=True))
+    return code
+
+
+def _note(line: str) -> None:
+    """Say something beside the result."""
+    typer.echo(line, err=True)
+
+
+def _show(process: str, level: str, text: str) -> None:
+    if level != "info":
+        typer.echo(f"{process}: {level}: {text}", err=True)
+
+
+def _told(result: dict[str, Any]) -> str:
+    """Return a result for people."""
+    seconds = (result["ticks"] - result["first_tick"]) * result["tick_ns"] / 1e9
+    score = f", {score_text(result)}" if result["score"] else ""
+    packets = ", ".join(f"{count} {fate.replace('_', ' ')}" for fate, count in result["packets"].items())
+    handovers = f"{result['handovers']} hand-overs of the ball, " if result["score"] else ""
+    return (
+        f"{seconds:.2f} s simulated at {result['rtf']}x{score}\n"
+        f"{handovers}packets {packets}\n"
+        f"digest of all ticks {result['digest']['chain']}"
+        + (f"\nthe rehearsal has failed: {result['reason']}" if result["failed"] else "")
+        + (f"\ncapture {result['capture']}" if result["capture"] else "")
+    )
+
+
+def _swarm(file: Path, duration: str | None, first: int, count: int, json: bool) -> int:
+    """Rehearse under the faults of some seeds; return the exit code."""
+    text = read_deployment_text(file)
+    load_deployment(text, str(file))
+    ticks = TICKS if duration is None else make_plan(RunOptions(file, "fast", duration, None, ())).ticks
+    if ticks < TICKS:
+        raise BadValue(f"--for: with --swarm at least {TICKS} ticks are needed, for faults and healing", duration)
+    longer = "" if duration is None else f" --for {duration}"
+    flown: list[Flown] = []
+    told_s = time.monotonic()
+    for seed in range(first, first + count):
+        if time.monotonic() >= told_s + LINE_S:
+            told_s = time.monotonic()
+            _note(f"{len(flown)} of {count} seeds, {sum(bool(flight.broken) for flight in flown)} broke a law")
+        try:
+            flight = fly(text, str(file), seed, ticks=ticks)
+        except KeyboardInterrupt:
+            _note(f"interrupted at seed {seed}, after {len(flown)} of {count} seeds")
+            raise
+        flown.append(flight)
+        if flight.broken:
+            typer.echo(f"seed {seed}: {flight.broken}", err=True)
+            typer.echo(f"  foosim-rehearse {file} --swarm{longer} --seed {seed}", err=True)
+            for fault in flight.faults:
+                typer.echo(f"  {fault}", err=True)
+    broken = [flight.seed for flight in flown if flight.broken]
+    if json:
+        typer.echo(encode_json({"seeds": [asdict(flight) for flight in flown], "broken": broken}).decode())
+    else:
+        faults, losses = sum(len(flight.faults) for flight in flown), sum(flight.losses for flight in flown)
+        done, seen = sum(flight.ticks for flight in flown), sum(flight.seen for flight in flown)
+        typer.echo(
+            f"{count} seeds: {done} ticks, {faults} faults, {losses} nodes lost, {seen} things written and said, "
+            f"{len(broken)} seeds broke a law"
+        )
+    return FAILED if broken else DONE
+
+
+def main() -> None:
+    """The entry point of `foosim-rehearse`."""
+    run_app(app, "foosim-rehearse")

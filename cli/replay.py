@@ -1,0 +1,218 @@
+"""The command `foosim-replay`: what a capture holds, whether it repeats, and all else that is done with one.
+
+Here are `info`, `verify` and `recover`, shells over the reader, `verify` and the recovery.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import msgspec
+import typer
+
+from foosim.capture.damage import Damage, damage_of
+from foosim.capture.info import CaptureInfo, capture_info
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.parts import FAILED_RUN, NEXT
+from foosim.capture.payload_hash import HASHED
+from foosim.cli import replay_export, replay_play, replay_report, replay_view, replay_whatif
+from foosim.cli.options import Capture, Json, reading
+from foosim.common import limits
+from foosim.common.errors import BadValue, Failed
+from foosim.common.json_text import encode_json
+from foosim.replay.verify import Verified, verify_capture
+from foosim.runtime.command import DONE, FAILED, VersionOption, new_app, run_app
+from foosim.runtime.journal import JournalError
+from foosim.vhub.recording.recovery import recover_capture
+
+app = new_app()
+
+
+@app.callback()
+def foosim_replay(version: VersionOption = False) -> None:
+    """Look into a capture, play it, compare it, take parts of it, and simulate it again.
+
+    Exit codes: 0 done, 1 differs or failed, 2 bad input (no capture, a damaged one), 3 refused, or recovered with loss.
+    """
+
+
+@app.command()
+def info(capture: Capture, json: Json = False) -> None:
+    """Show what a capture holds: run, duration, digests, nodes and their arithmetic, packets by fate, cause and
+    channel, recoveries, topics, files and versions.
+    """
+    with reading():
+        found = capture_info(capture)
+    typer.echo(encode_json(msgspec.to_builtins(found)).decode() if json else _describe(found))
+
+
+HASHED_TEXT: Final = (
+    "  PAYLOADS ARE HASHED: in their place stands BLAKE2b of 16 bytes; it cannot be simulated again, nor its packets "
+    "played"
+)
+
+
+def _describe(found: CaptureInfo) -> str:
+    if NEXT in found.end:
+        state = f"it goes on in {found.end[NEXT]}, which is not here"
+    elif found.finished:
+        state = "whole, of a run that failed" if FAILED_RUN in found.end else "finished"
+    else:
+        state = f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
+    lines = [
+        f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
+        *([HASHED_TEXT] if found.payloads == HASHED else []),
+        *([f"  {len(found.parts)} files: {found.parts[0]} to {found.parts[-1]}"] if len(found.parts) > 1 else []),
+        *(f"  {key}: {value}" for key, value in sorted({**found.metadata, **found.end}.items())),
+        f"  {_span(found)} of {found.tick_ns / 1e6:g} ms, {found.duration_ns / 1e9:.2f} s simulated",
+        f"  digest of the last frame {found.digest}",
+        f"  digest of all ticks {found.chain}",
+        f"  nodes {', '.join(found.nodes) or 'not known'}",
+        f"  arithmetic {', '.join(found.arithmetic) or 'not known'}",
+        f"  clients {', '.join(found.clients) or 'none'}",
+        f"  packets {_counted(found.packets)}",
+        *([f"  dropped by {_counted(found.causes)}"] if found.causes else []),
+        *([f"  on channels {_counted(found.channels)}"] if found.channels else []),
+        f"  payloads {found.payload_bytes / 1e6:.1f} MB, {found.payloads}",
+        f"  recoveries {found.recoveries}",
+        "  topics",
+        *(f"    {topic}: {count}" for topic, count in found.topics.items()),
+        *(["  files of the deployment"] if found.files else []),
+        *(f"    {name}: {size} bytes" for name, size in found.files.items()),
+        "  versions",
+        *(f"    {name}: {number}" for name, number in sorted(found.versions.items())),
+    ]
+    return "\n".join(lines)
+
+
+def _counted(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
+
+
+def _span(found: CaptureInfo) -> str:
+    return f"{found.ticks} ticks" if not found.first_tick else f"ticks {found.first_tick} to {found.ticks}"
+
+
+@app.command()
+def verify(
+    capture: Capture,
+    nodes: Annotated[int, typer.Option(help="Number of nodes to simulate on.")] = 1,
+    from_first_frame: Annotated[
+        bool, typer.Option("--from-first-frame", help="Verify a cut: what follows on the first frame that it has.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Simulate a capture again from its orders and deliveries, and compare the digest of every tick.
+
+    A cut, and a later file of a run, is refused: how its first frame came is not in it. With --from-first-frame that
+    frame is taken as it is, and all behind it is verified.
+
+    Names the first tick and the entities that differ. The number of nodes need not be the capture's. Where ticks differ
+    and the capture comes from nodes with another arithmetic than this machine's, standard error says so.
+    """
+    if not 1 <= nodes <= limits.NODES_MAX:
+        raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
+    with reading():
+        found = verify_capture(capture, nodes, from_first_frame=from_first_frame)
+    typer.echo(encode_json(_as_json(found)).decode() if json else _verdict(found))
+    if found.tick >= 0 and found.other_arithmetic:
+        typer.echo(
+            f"the capture's arithmetic is {', '.join(found.other_arithmetic)}, this machine's is {found.arithmetic}: "
+            "they compute different worlds",
+            err=True,
+        )
+    raise typer.Exit(DONE if found.equal else FAILED)
+
+
+def _as_json(found: Verified) -> dict[str, Any]:
+    return {
+        "equal": found.equal,
+        "first_tick": found.first_tick,
+        "ticks": found.ticks,
+        "nodes": found.nodes,
+        "chain": found.chain.hex(),
+        "tick": found.tick if found.tick >= 0 else None,
+        "entities": list(found.entities),
+        "missing_tick": found.missing_tick if found.missing_tick >= 0 else None,
+    }
+
+
+def _verdict(found: Verified) -> str:
+    on = f"on {found.nodes} node{'s' if found.nodes > 1 else ''}"
+    if found.equal:
+        count = found.ticks - found.first_tick
+        since = f" behind frame {found.first_tick}" if found.first_tick else ""
+        return f"equal: {count} ticks{since} simulated again {on}, digest of all ticks {found.chain.hex()}"
+    if found.missing_tick >= 0:
+        return f"tick {found.missing_tick} is missing; {found.ticks - found.first_tick} ticks before it are equal {on}"
+    return f"differs at tick {found.tick} in {', '.join(found.entities)}; the ticks before it are equal {on}"
+
+
+@app.command()
+def recover(
+    capture: Capture,
+    journals: Annotated[
+        Path | None, typer.Option(help="The folder of its vHub's journal, e.g. RUN/journals.", show_default=False)
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Make a capture valid that its writer left unfinished; what a journal has is added.
+
+    It is changed in place: cut behind the last whole chunk, completed, and ended. Bytes that are damaged and not just
+    cut are only given up when the journal has what they held. `foosim-supervisor up` does this by itself with what
+    earlier ones of the same user left. Of a capture that has its end and is damaged it says what is damaged and which
+    ticks are whole. Exit codes: 0 the capture has all that was recorded, 1 it could not be recovered, or is damaged,
+    and is as it was, 3 it is a capture again, without what no journal told.
+    """
+    try:
+        found = recover_capture(capture, journals)
+        damage = damage_of(capture) if found is None else None
+    except (CaptureError, JournalError) as error:
+        damage = _damage_of(capture)
+        if damage is None:
+            raise Failed(str(error)) from None
+    if damage is not None:
+        if json:
+            content = {"finished_before": True, "whole": False, **msgspec.to_builtins(damage), "problem": str(damage)}
+            typer.echo(encode_json(content).decode())
+            raise typer.Exit(FAILED)
+        raise Failed(str(damage))
+    if json:
+        content = {
+            "finished_before": found is None,
+            "whole": found is None or found.is_whole,
+            "tick": None if found is None else found.tick,
+            "torn_bytes": 0 if found is None else found.torn_bytes,
+            "added_ticks": 0 if found is None else found.added_ticks,
+            "problem": "" if found is None else found.problem,
+        }
+        typer.echo(encode_json(content).decode())
+    else:
+        typer.echo(f"capture {capture} is finished already" if found is None else str(found))
+    raise typer.Exit(DONE if found is None or found.is_whole else WITH_LOSS)
+
+
+def _damage_of(capture: Path) -> Damage | None:
+    """Return what is damaged in a capture that cannot be read; None where it has no end, or is none."""
+    try:
+        return damage_of(capture)
+    except CaptureError:
+        return None
+
+
+WITH_LOSS: Final = 3
+
+_COMMANDS: Final = (
+    *(replay_play.play, replay_play.control),
+    *(replay_export.export, replay_export.cut, replay_export.diff),
+    *(replay_whatif.whatif, replay_report.report, replay_view.view),
+)
+for command in _COMMANDS:
+    app.command()(command)
+
+
+def main() -> None:
+    """The entry point of `foosim-replay`."""
+    run_app(app, "foosim-replay")

@@ -1,0 +1,151 @@
+"""The commands `foosim-replay export`, `cut` and `diff`.
+
+They are shells over `export.export_capture`, `vhub.capture_cut.cut_capture` and `diff.diff_captures`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+import typer
+
+from foosim.analysis.diff import Diff, Difference, diff_captures
+from foosim.analysis.export import STANDARD_OUTPUT, Format, export_capture
+from foosim.analysis.tables import table_names
+from foosim.capture.cut import cut_capture
+from foosim.cli.options import Capture, Json, reading, time_of
+from foosim.common.errors import BadValue, show
+from foosim.common.json_text import encode_json
+from foosim.common.names import nearest_name
+from foosim.runtime.command import DONE, FAILED
+
+_TABLES = ", ".join(table_names())
+
+
+def export(
+    capture: Capture,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="The file to write, - for standard output.", show_default=False)
+    ],
+    what: Annotated[str, typer.Option(help=f"The table: {_TABLES}.")] = "packets",
+    form: Annotated[
+        str | None, typer.Option("--format", help="csv or parquet; by default as the file's name ends, csv for -.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a table of a capture as CSV or Parquet.
+
+    `packets` has a row per offered packet, `commands` those that were to move robots, with their numbers, `poses` a row
+    per link and captured pose; any other kind of row is a table, too. Times are whole ns of simulated time. Parquet
+    needs pyarrow: pip install 'foosim[parquet]'. An existing file is not overwritten.
+    """
+    with reading():
+        done = export_capture(capture, what, out, _format(form))
+    if json:
+        columns = [asdict(column) for column in done.columns]
+        content = {"path": str(done.path), "table": what, "rows": done.rows, "columns": columns}
+        typer.echo(encode_json(content).decode(), err=out == STANDARD_OUTPUT)
+    elif out != STANDARD_OUTPUT:
+        typer.echo(f"{done.path}: {done.rows} rows of {what}, {len(done.columns)} columns")
+
+
+def _format(text: str | None) -> Format | None:
+    formats: tuple[Format, ...] = get_args(Format)
+    for known in formats:
+        if text == known:
+            return known
+    if text is None:
+        return None
+    nearest = nearest_name(text, formats)
+    raise BadValue(f"--format: not one of {', '.join(formats)}", text, None if nearest is None else show(nearest))
+
+
+def cut(
+    capture: Capture,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The capture to write.", show_default=False)],
+    begin: Annotated[str | None, typer.Option("--from", help="Where it begins, e.g. 10s.")] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Where it ends, e.g. 20s.")] = None,
+    json: Json = False,
+) -> None:
+    """Write a part of a capture as a capture of its own.
+
+    It begins with the newest captured frame at or before --from and has all that was recorded up to --to, times being
+    the capture's own. A run can begin with its frames (`up --from`); `verify` takes it with
+    --from-first-frame, since a run is verified from where it began.
+    """
+    from_ns, to_ns = time_of("--from", begin), time_of("--to", end)
+    with reading():
+        done = cut_capture(capture, out, from_ns, to_ns)
+    if json:
+        typer.echo(encode_json({**asdict(done), "path": str(done.path)}).decode())
+        return
+    first, last = (tick * done.tick_ns / 1e9 for tick in (done.first_tick, done.last_tick))
+    typer.echo(
+        f"{done.path}: frames {done.first_tick} to {done.last_tick}, {first:g} s to {last:g} s, "
+        f"{done.messages} messages, {done.bytes / 1e6:.1f} MB"
+    )
+
+
+def diff(
+    one: Annotated[Path, typer.Argument(metavar="A", help="A capture.", show_default=False)],
+    other: Annotated[Path, typer.Argument(metavar="B", help="Another one.", show_default=False)],
+    ignore: Annotated[
+        list[str] | None,
+        typer.Option(help="A field (digest) or a channel (/epochs) that is not compared; may be repeated."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Compare two captures: the first difference of each channel, and how many rows both have.
+
+    Fields that begin with `wall_`, and `/log`, come from clocks of the real world and are not compared. What the two
+    say of themselves (run, versions, deployment) is named where it differs, and decides nothing. Exit codes: 0 equal,
+    1 different, 2 one of them cannot be read.
+    """
+    with reading():
+        found = diff_captures(one, other, ignore or ())
+    typer.echo(encode_json(_diff_json(found)).decode() if json else _diff_text(found))
+    raise typer.Exit(DONE if found.equal else FAILED)
+
+
+def _diff_json(found: Diff) -> dict[str, Any]:
+    channels = {
+        topic: {"rows": channel.rows, "equal": channel.equal, "first": _difference_json(channel.first)}
+        for topic, channel in found.channels.items()
+    }
+    return {
+        "equal": found.equal,
+        "first": _difference_json(found.first),
+        "channels": channels,
+        "about": list(found.about),
+    }
+
+
+def _difference_json(difference: Difference | None) -> dict[str, Any] | None:
+    return None if difference is None else asdict(difference)
+
+
+def _diff_text(found: Diff) -> str:
+    lines = []
+    if found.first is None:
+        rows = sum(channel.equal for channel in found.channels.values())
+        lines.append(f"equal: {rows} rows of {len(found.channels)} channels")
+    else:
+        lines += ["different, first here:", *_difference_lines(found.first)]
+    lines.append("channels")
+    for topic, channel in found.channels.items():
+        a, b = channel.rows
+        count = f"{a} rows" if a == b else f"{a} rows and {b}"
+        state = "equal" if channel.first is None else f"the first {channel.equal} equal"
+        lines.append(f"  {topic}: {count}, {state}")
+        if channel.first is not None and channel.first is not found.first:
+            lines += [f"  {line}" for line in _difference_lines(channel.first)]
+    if found.about:
+        lines.append(f"they say otherwise of themselves: {', '.join(found.about)}")
+    return "\n".join(lines)
+
+
+def _difference_lines(found: Difference) -> list[str]:
+    place = f"{found.topic} at {found.time_ns / 1e9:.9g} s (tick {found.tick}), row {found.row}"
+    return [f"  {place}{f', {found.field}' if found.field else ''}", f"    A: {found.a}", f"    B: {found.b}"]

@@ -1,0 +1,39 @@
+"""The command `foosim-replay report`: a shell over `report.gather` and `report_page.page`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foosim.analysis.new_file import check_name, new_file
+from foosim.capture.reader import open_capture
+from foosim.cli.options import Capture, Json, reading
+from foosim.common.json_text import encode_json
+from foosim.console.report.collect import gather
+from foosim.console.report.page import page
+
+
+def report(
+    capture: Capture,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write, NAME.html.", show_default=False)],
+    json: Json = False,
+) -> None:
+    """Write a page about the network of a captured run.
+
+    Packets by fate and cause, links, delay and loss over time, causes of losses, age of information, queues and
+    airtime, events, what was configured beside what was measured, and a map. The page is one file that needs nothing
+    else. --json prints what is on it. An existing file is not overwritten.
+    """
+    check_name("--out", out, "the page", (".html", ".htm"))
+    with reading():
+        found = gather(open_capture(capture), capture.name)
+    with new_file(out) as part:
+        part.write_text(page(found), encoding="utf-8")
+    if json:
+        typer.echo(encode_json(asdict(found)).decode())
+    else:
+        packets, dropped = found.fates["offered"], found.fates["dropped"]
+        typer.echo(f"{out}: {packets} packets on {len(found.links)} links, {dropped} dropped")

@@ -1,0 +1,478 @@
+"""The command `foosim-supervisor`: runs a deployment, and controls a run from another terminal.
+
+Each subcommand is a thin shell over a typed function: `up.Up`, `main.serve`, `control`, `protocol.deployment_file`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from foosim.common.errors import BadValue, Refused, read_at
+from foosim.common.json_text import encode_json
+from foosim.common.units import parse_pace
+from foosim.deployment.schema import places
+from foosim.launcher.console_child import Page, page_of
+from foosim.launcher.crash_recovery import recover_leftovers
+from foosim.launcher.detach import detach
+from foosim.launcher.display import Display, render_text
+from foosim.launcher.hosts.install import install, is_root_there, write_units
+from foosim.launcher.hosts.ssh import Remote, unit_name
+from foosim.launcher.hosts.systemd_units import units_of
+from foosim.launcher.journal_check import supervisor_records
+from foosim.launcher.new_capture import check_capture, check_rooms, default_capture
+from foosim.launcher.outcome import Outcome, detached_outcome, ended_outcome, refused_result
+from foosim.launcher.pki.hosts import files_for, send_files
+from foosim.launcher.plan import (
+    Plan,
+    check_certificates,
+    check_models_here,
+    check_players_here,
+    make_plan,
+    plan_again,
+)
+from foosim.launcher.run_options import RunOptions
+from foosim.launcher.up import Killed, Up
+from foosim.protocol.channels import VHUB
+from foosim.protocol.messages import Answer
+from foosim.runtime.command import DONE, FAILED, INTERRUPTED, PkiOption, VersionOption, new_app, run_app
+from foosim.runtime.health import ProgressOption
+from foosim.runtime.process import has_launcher
+from foosim.runtime.run_folder import RunFolder, create_run, open_run, run_exists, runs_folder
+from foosim.runtime.usage import BadUsage
+from foosim.supervisor import control
+from foosim.supervisor.main import serve
+
+app = new_app()
+
+File = Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
+Run = Annotated[str | None, typer.Option("--run", help="The run that is meant; by default the newest live one.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+PaceOption = Annotated[str | None, typer.Option("--pace", help="realtime, fast, or a factor such as 2x.")]
+For = Annotated[str | None, typer.Option("--for", help="End after this much simulated time, e.g. 20s.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of all random draws; short for --set seed=N.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Change the deployment, e.g. --set table.ball.mass='27 g'; may be repeated."),
+]
+Engine = Annotated[str | None, typer.Option("--engine", help="bullet or pure; short for --set engine=NAME.")]
+Listen = Annotated[
+    str | None,
+    typer.Option("--listen", help="HOST[:PORT], by default as deployed; the radio plane listens at PORT + 1."),
+]
+Insecure = Annotated[bool, typer.Option("--insecure", help="Listen where other machines reach it.")]
+From = Annotated[
+    str | None,
+    typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
+]
+OptionalFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
+ConsoleOption = Annotated[
+    bool, typer.Option("--console", help="Serve a page that shows the run; its address is printed.")
+]
+Second = Annotated[
+    Path | None,
+    typer.Option(metavar="CAPTURE|CSV", help="What the console shows beside the run, on its clock."),
+]
+Offset = Annotated[str | None, typer.Option(help="The time of --second at which the run has time 0, e.g. 2.5s or -1s.")]
+Balance = Annotated[bool, typer.Option("--balance", help="Move robots from busy nodes to idle ones.")]
+RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
+
+
+@app.callback()
+def foosim_supervisor(version: VersionOption = False) -> None:
+    """Run a distributed simulation, and control one that runs.
+
+    `up` starts everything that a deployment file declares and shows it. The other commands control a
+    run from another terminal; each names the tick at which it takes effect.
+
+    Exit codes: 0 done, 1 failed, 2 bad input, 3 refused, 130 second Ctrl-C.
+    """
+
+
+@app.command()
+def up(  # noqa: PLR0913, PLR0917  # a command's options
+    file: OptionalFile = None,
+    pace: PaceOption = None,
+    duration: For = None,
+    seed: Seed = None,
+    branch: From = None,
+    capture: Annotated[Path | None, typer.Option(help="By default captures/WORLD-TIME.mcap.")] = None,
+    no_capture: Annotated[bool, typer.Option("--no-capture", help="Write no capture.")] = False,
+    sets: Sets = None,
+    engine: Engine = None,
+    listen: Listen = None,
+    insecure: Insecure = False,
+    pki: PkiOption = None,
+    run: RunName = None,
+    balance: Balance = False,
+    detached: Annotated[bool, typer.Option("--detach", help="Run in the background; down ends it.")] = False,
+    resumed: Annotated[str | None, typer.Option("--resume", help="Go on with this run, whose launcher died.")] = None,
+    console: ConsoleOption = False,
+    open_browser: Annotated[bool, typer.Option("--open", help="--console, and show it in the browser.")] = False,
+    second: Second = None,
+    offset: Offset = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
+) -> None:
+    """Run all that a deployment declares, here and on its hosts, until Ctrl-C or --for.
+
+    Supervisor, vHub, nodes and players are processes of their own, each with a log; they end with this command. Ctrl-C
+    ends the run in order and leaves a finished capture; a second one kills everything. What the deployment places on
+    another host is started there through ssh. Nodes that it declares as `launch: manual` are waited for; their command
+    line is printed.
+
+    With --from the world begins with the newest captured frame at or before that time (without a time: the last one),
+    and time goes on from there; --for counts from there, too. The deployment may differ from the captured one in
+    everything but its robots, their sensors, and the tick.
+
+    --resume RUN goes on with a run whose launcher died, from its last committed frame, with the options that it had.
+    """
+    display = Display(sys.stderr if json else sys.stdout)
+    begun: Up | Outcome | None = None
+    try:
+        page = page_of(console, open_browser, second, offset, detached)
+        if resumed is not None:
+            own = {"FILE": file, "--pace": pace, "--for": duration, "--seed": seed, "--set": sets, "--engine": engine}
+            own |= {"--listen": listen, "--insecure": insecure, "--from": branch, "--balance": balance, "--run": run}
+            own |= {"--capture": capture, "--no-capture": no_capture, "--detach": detached}
+            if given := [name for name, value in own.items() if value is not None and value is not False]:
+                raise BadValue(f"--resume takes FILE and options from the run, it goes without {', '.join(given)}")
+            begun = _go_on(open_run(resumed), display, page)
+        elif file is None:
+            raise BadValue("a deployment FILE is needed, such as deploy/table.yaml, or --resume RUN")
+        elif no_capture and capture is not None:
+            raise BadValue("--capture and --no-capture exclude each other", str(capture))
+        else:
+            options = _options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance)
+            begun = _begin(options, capture, not no_capture, run, detached, display, page)
+        outcome = begun.run() if isinstance(begun, Up) else begun
+    except Killed as killed:
+        print(killed, file=sys.stderr)
+        _print_result(killed.result, json)
+        raise typer.Exit(INTERRUPTED) from None
+    except (Refused, MemoryError) as error:
+        reason = "too little memory" if isinstance(error, MemoryError) else str(error)
+        result = begun.unended(reason) if isinstance(begun, Up) else refused_result(resumed, run, reason)
+        _print_result(result, json)
+        raise
+    for line in outcome.lines:
+        display.say(line)
+    _print_result(outcome.result, json)
+    raise typer.Exit(FAILED if outcome.failed else DONE)
+
+
+def _print_result(result: Mapping[str, Any], json: bool) -> None:
+    if json:
+        print(encode_json(result).decode())
+
+
+def _begin(
+    options: RunOptions,
+    capture: Path | None,
+    captures: bool,
+    run: str | None,
+    detached: bool,
+    display: Display,
+    console: Page | None,
+) -> Up | Outcome:
+    """Return a run of a deployment to be run, or leave it running; without a `capture` it is where captures go by
+    default, where any is wanted (`captures`)."""
+    plan = make_plan(options)
+    check_models_here(plan)
+    check_players_here(plan)
+    found = capture or default_capture(plan.deployment.world)
+    path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
+    _look_for_room(plan, path, runs_folder(), display)
+    _prepare(plan, display, None)
+    if detached:
+        return detached_outcome(detach(plan, path, run), plan.deployment, path)
+    return Up(plan, path, display, run, console=console)
+
+
+def _go_on(folder: RunFolder, display: Display, console: Page | None) -> Up | Outcome:
+    """Return a run that is to go on; of one that has ended return how."""
+    if folder.result() is not None:
+        recover_leftovers(display.say)
+        return ended_outcome(folder)
+    plan, path = plan_again(folder)
+    check_players_here(plan)
+    _look_for_room(plan, path, folder.path, display)
+    _prepare(plan, display, folder.name)
+    return Up(plan, path, display, None, folder, console)
+
+
+def _look_for_room(plan: Plan, capture: Path | None, runs: Path, display: Display) -> None:
+    """Raise Refused where a run would end at once, and warn where it soon might."""
+    captured_here = None if VHUB in places(plan.deployment) else capture
+    for warning in check_rooms(plan.deployment.capture, captured_here, runs):
+        display.say(warning)
+
+
+def _prepare(plan: Plan, display: Display, resumed: str | None) -> None:
+    for warning in check_certificates(plan):
+        display.say(warning)
+    recover_leftovers(display.say, but=resumed)
+
+
+@app.command("run")
+def run_supervisor(  # noqa: PLR0913, PLR0917  # a command's options
+    file: File,
+    pace: PaceOption = None,
+    duration: For = None,
+    seed: Seed = None,
+    branch: From = None,
+    sets: Sets = None,
+    engine: Engine = None,
+    listen: Listen = None,
+    insecure: Insecure = False,
+    pki: PkiOption = None,
+    run: RunName = None,
+    balance: Balance = False,
+    progress_file: ProgressOption = None,
+) -> None:
+    """Run a supervisor alone.
+
+    vHub, nodes and players are started by hand or by other means; `up` starts all of them, this one first. The run's
+    folder has the run file, logs and journals.
+    """
+    plan = make_plan(_options(file, pace, duration, seed, sets, engine, listen, insecure, pki, branch, balance))
+    if not has_launcher():  # which has looked, and ends a run in order whose room gets lost meanwhile
+        _look_for_room(plan, None, runs_folder(), Display(sys.stderr))
+    folder = open_run(run) if run is not None and run_exists(run) else create_run(plan.deployment.world, run)
+    settings, records = plan.settings(folder.name), partial(supervisor_records, folder, plan.options)
+    raise typer.Exit(serve(settings, plan.address, plan.options.pki, folder, records, progress_file))
+
+
+def _options(  # noqa: PLR0913, PLR0917  # a command's options
+    file: Path,
+    pace: str | None,
+    duration: str | None,
+    seed: int | None,
+    sets: list[str] | None,
+    engine: str | None,
+    listen: str | None,
+    insecure: bool,
+    pki: Path | None,
+    branch: str | None,
+    balance: bool,
+) -> RunOptions:
+    settings = [*(sets or []), *([f"engine={engine}"] if engine is not None else [])]
+    return RunOptions(file, pace, duration, seed, tuple(settings), listen, insecure, pki, branch, balance)
+
+
+@app.command()
+def status(run: Run = None, json: Json = False) -> None:
+    """Show the state of a run: time, lag, nodes, links, score."""
+    content = control.status(run)
+    print(encode_json(content).decode() if json else render_text(content).rstrip())
+
+
+@app.command()
+def pause(run: Run = None, json: Json = False) -> None:
+    """Stop simulated time; what is released is still computed."""
+    _show(control.pause(run), json)
+
+
+@app.command()
+def resume(run: Run = None, json: Json = False) -> None:
+    """Go on after a pause."""
+    _show(control.resume(run), json)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
+def step(
+    count: Annotated[int, typer.Argument(help="How many ticks.", min=1)] = 1, run: Run = None, json: Json = False
+) -> None:
+    """Let a number of ticks pass, then pause."""
+    _show(control.step(count, run), json)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
+def rate(
+    pace: Annotated[str, typer.Argument(help="realtime, fast, or a factor such as 2x.", show_default=False)],
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Change how fast simulated time passes."""
+    read_at("foosim-supervisor rate PACE", parse_pace, pace)
+    _show(control.rate(pace, run), json)
+
+
+Numbers = tuple[float, float, float]
+Words = tuple[str, str, str]
+
+
+@app.command()
+def add(
+    name: Annotated[str | None, typer.Argument(help="Its name; by default the next free one.")] = None,
+    position: Annotated[Words | None, typer.Option(metavar="X Y Z", help="Where, in m.")] = None,
+    velocity: Annotated[Words | None, typer.Option(metavar="X Y Z", help="How fast, in m/s.")] = None,
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Add a ball; by default it rests at the kick-off spot."""
+    place = None if position is None else _three("position", "m", position)
+    _show(control.add(name, place, None if velocity is None else _three("velocity", "m/s", velocity), run), json)
+
+
+@app.command()
+def remove(
+    name: Annotated[str, typer.Argument(help="Which ball.", show_default=False)], run: Run = None, json: Json = False
+) -> None:
+    """Remove a ball that was added."""
+    _show(control.remove(name, run), json)
+
+
+@app.command()
+def move(
+    robot: Annotated[str, typer.Argument(help="Which robot.", show_default=False)],
+    node: Annotated[str, typer.Argument(help="To which node.", show_default=False)],
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Have another node own a robot; the world does not notice."""
+    _show(control.move(robot, node, run), json)
+
+
+@app.command()
+def balance(run: Run = None, json: Json = False) -> None:
+    """Move robots from busy nodes to idle ones, once; the answer says which, and by which loads."""
+    _show(control.balance(run), json)
+
+
+Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
+
+
+@app.command()
+def stop(node: Node, run: Run = None, json: Json = False) -> None:
+    """Have a node end; its robots move to the others first."""
+    _show(control.stop(node, run), json)
+
+
+@app.command()
+def start(node: Node, run: Run = None, json: Json = False) -> None:
+    """Let a node take part again, with its robots: one that was stopped, or that its launcher has given up.
+
+    `up` starts the processes of local nodes, with a new count of their ends; one that is launched by hand has to be
+    started by hand.
+    """
+    _show(control.start(node, run), json)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
+def push(
+    impulse: Annotated[
+        list[str], typer.Argument(metavar="X Y Z", help="Impulse in N s along x, y and z.", show_default=False)
+    ],
+    name: Annotated[str, typer.Option(help="Which ball.")] = "ball",
+    run: Run = None,
+    json: Json = False,
+) -> None:
+    """Give a ball an impulse.
+
+    On a ball of 21 g, 0.021 N s are 1 m/s.
+    """
+    _show(control.push(_three("impulse", "N s", impulse), name, run), json)
+
+
+def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
+    """Return three numbers; raises BadValue, since typer does not say which ones are needed."""
+    needed = f"{what}: three numbers are needed, X Y Z in {unit}"
+    if len(words) != 3:
+        raise BadValue(f"{needed}; here are {len(words)}", " ".join(words))
+    try:
+        x, y, z = map(float, words)
+    except ValueError:
+        raise BadValue(f"{needed}; not all of these are numbers", " ".join(words)) from None
+    return x, y, z
+
+
+@app.command()
+def down(run: Run = None, json: Json = False) -> None:
+    """End a run in order."""
+    _show(control.down(run), json)
+
+
+def _show(answer: Answer, json: bool) -> None:
+    """Print what the supervisor answered."""
+    print(encode_json({"tick": answer.tick, "text": answer.text}).decode() if json else answer.text)
+
+
+@app.command()
+def validate(file: File, json: Json = False) -> None:
+    """Check a deployment file.
+
+    All problems are shown at once, one a line: file:line:column: what, value, nearest valid name. Of a file without
+    any the classes of the players that run here are imported, in a process of its own.
+    """
+    plan = make_plan(RunOptions(file))
+    check_players_here(plan)
+    deployment = plan.deployment
+    content = {
+        "world": deployment.world,
+        "robots": len(deployment.robots),
+        "nodes": sorted(deployment.nodes),
+        "players": sorted(deployment.players),
+    }
+    described = f"{len(deployment.robots)} robots on {len(deployment.nodes)} nodes, {len(deployment.players)} players"
+    print(encode_json(content).decode() if json else f"{file}: valid, world {deployment.world}, {described}")
+
+
+@app.command("install")
+def install_units(  # a command's options
+    host: Annotated[str, typer.Argument(help="A host of the deployment.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")] = Path("deploy/cluster.yaml"),
+    listen: Annotated[str | None, typer.Option(help="HOST:PORT of the supervisor, by default as deployed.")] = None,
+    user: Annotated[bool, typer.Option("--user", help="Of a user's own systemd; with --print or --output.")] = False,
+    show: Annotated[bool, typer.Option("--print", help="Print the units and change nothing.")] = False,
+    output: Annotated[Path | None, typer.Option(help="Write them into this folder, not onto the host.")] = None,
+    pki: PkiOption = None,
+    sets: Sets = None,
+) -> None:
+    """Write a unit of systemd for each node of a host, onto the host.
+
+    A unit restarts a node that ends or hangs. `up` starts the units of nodes with `launch: systemd`. As root on the
+    host they are units of the system; any other user gets units of its own systemd, which run without a login after
+    `loginctl enable-linger`.
+
+    With --pki the units are for runs with certificates: a node has its own from the folder that the deployment names
+    as the host's `pki`. What belongs there is brought there as by `foosim-pki send`.
+    """
+    plan = make_plan(RunOptions(file, sets=tuple(sets or []), listen=listen, insecure=pki is None, pki=pki))
+    deployment = plan.deployment
+    units = units_of(deployment, host, plan.address, user)
+    if show:
+        print("\n".join(f"# {name}\n{text}" for name, text in units.items()).rstrip())
+    elif output is not None:
+        print(*write_units(output, units), sep="\n")
+    elif user:
+        raise BadValue("--user goes with --print or --output; onto a host, whoever ssh logs in as decides", host)
+    else:
+        remote = Remote(host, deployment.hosts[host])
+        is_users = not is_root_there(remote)
+        if pki is not None:
+            print(*send_files(remote, pki, files_for(deployment, host)), sep="\n")
+        print(*install(remote, units_of(deployment, host, plan.address, is_users), is_users), sep="\n")
+    for name, node in deployment.nodes.items():
+        if unit_name(name) in units and node.launch != "systemd":
+            hint = "with `launch: systemd` `up` starts its unit"
+            print(f"node {name} has `launch: {node.launch}`; {hint}", file=sys.stderr)
+
+
+def _refuse_usage(words: Sequence[str], problem: BadUsage) -> None:
+    """Print the one object of `up --json` also where its options cannot be read."""
+    if words[:1] == ["up"]:
+        _print_result(refused_result(None, None, str(problem)), "--json" in words)
+
+
+def main() -> None:
+    """Entry of `foosim-supervisor`."""
+    run_app(app, "foosim-supervisor", _refuse_usage)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,102 @@
+"""The players that share a session, as one core: what comes is that player's whom it names, and all speak together.
+
+So they have one loop and one thread: players that are due at the same tick would take the interpreter from each other
+at every message. To the run each of them is what it would be alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from foosim.client.core import ClientCore
+from foosim.client.errors import PlayerError
+from foosim.client.failing import tell_failure
+from foosim.client.loading import load_player
+from foosim.client.player import PlayerFactory, PlayerLoop
+from foosim.protocol.actions import Action, Say
+from foosim.protocol.channels import Channel
+from foosim.runtime.command import DONE, FAILED, REFUSED
+
+
+class Crew:
+    """One core out of several. `actions` is what the shell performs next; `step` after every message and wake."""
+
+    def __init__(self, cores: Sequence[ClientCore], load: Callable[[str], PlayerFactory] = load_player) -> None:
+        assert cores, "a crew of nobody"
+        self.actions: list[Action] = []
+        self.cores = tuple(cores)
+        self._players = {core.name: PlayerLoop(core, load) for core in cores}
+        self._stirred: dict[str, PlayerLoop] = {}
+        """Those for whom something has come since the last step, in that order."""
+
+    # --- what the shell calls ----------------------------------------------------------------------------------------
+
+    def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+        """Hand a message to whom it names; of what names nobody here the first one keeps the account."""
+        player = self._players.get(name)
+        if player is None:
+            player = self._players[self.cores[0].name]
+        player.core.receive(channel, name, payload, now_ns)
+        self._stirred[player.core.name] = player
+
+    def wake(self, now_ns: int) -> None:
+        """Say again what has not been answered, when it is due."""
+        for core in self.cores:
+            core.wake(now_ns)
+        self._stirred = dict(self._players)
+
+    def step(self, now_ns: int) -> None:
+        """Let those act whose turn it is. Raises PlayerError for the first one that fails; the vHub is told why."""
+        stirred, self._stirred = self._stirred, {}
+        for player in stirred.values():
+            try:
+                player.step(now_ns)
+            except PlayerError as error:
+                tell_failure(player.core, error)
+                raise
+            finally:
+                self._speak(player.core)
+
+    def _speak(self, core: ClientCore) -> None:
+        """Take what a core has to say; of several, a line for people says whose it is."""
+        if len(self.cores) == 1:
+            self.actions += core.actions
+        else:
+            self.actions += [
+                Say(action.level, f"{core.name}: {action.text}") if isinstance(action, Say) else action
+                for action in core.actions
+            ]
+        core.actions.clear()
+
+    def hub_alive(self, is_alive: bool, now_ns: int) -> None:
+        """The vHub's presence has begun or ended."""
+        for core in self.cores:
+            (core.hub_here if is_alive else core.hub_gone)(now_ns)
+        self._stirred = dict(self._players)
+
+    def rest(self, stood_ns: int, now_ns: int) -> None:
+        """The loop of all of them stood still for so long."""
+        for core in self.cores:
+            core.rest(stood_ns, now_ns)
+
+    def deadline_ns(self) -> int:
+        """When `wake` has something to do next, or somebody acts."""
+        return min(min(player.core.deadline_ns(), player.deadline_ns()) for player in self._players.values())
+
+    # --- the end -----------------------------------------------------------------------------------------------------
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the run has ended for all of them, or one is refused or lost, which ends it for the others."""
+        cores = self.cores
+        return all(core.ended for core in cores) or any(core.lost or core.refusal for core in cores)
+
+    def leave(self) -> int:
+        """Say who has lost the vHub; return the exit code."""
+        for core in self.cores:
+            if core.lost:
+                core.actions.append(Say("error", "lost the vHub"))
+            self._speak(core)
+        if any(core.refusal for core in self.cores):
+            return REFUSED
+        return DONE if all(core.ended for core in self.cores) else FAILED

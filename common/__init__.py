@@ -1,0 +1,1 @@
+"""What everything uses: errors, names, limits, units, keyed draws, exact arithmetic. Imports no other package."""

@@ -1,0 +1,97 @@
+"""Errors that the world causes: bad input, a refused request, a broken rule of a peer.
+
+A programmer's error is an assertion. Everything that comes from outside (a file, a packet, a request, an argument)
+and is not acceptable raises a `Refused` or a class made from it, whose text names the place, the value and the valid
+choices, so that it can be shown to a person as it is. Each part of the project adds its own classes beside its code.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import ClassVar, Final, TypeVar
+
+from foosim.common.names import nearest_name
+
+CHOICES_MAX: Final = 24
+ABSENT: Final = object()
+"""Stands for a value that was not given, so that there is none to show."""
+
+Read = TypeVar("Read")
+
+
+class Refused(Exception):
+    """Something from outside is not accepted; the text says what, where, and what would be."""
+
+    exit_code: ClassVar[int] = 3
+    """What a command exits with that it ends: 1 failed, 2 bad input, 3 refused."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(what)
+        self.what = what
+
+
+class Failed(Refused):
+    """What was asked for is in order and could not be done; the text says what stood in the way."""
+
+    exit_code = 1
+
+
+class BadValue(Refused):
+    """A value that is not valid: what is wrong with it, the value as it was given, the nearest valid one if any."""
+
+    exit_code = 2
+
+    def __init__(self, what: str, value: object = ABSENT, nearest: str | None = None) -> None:
+        super().__init__(describe(what, value, nearest))
+        self.problem = what
+        self.value = value
+        self.nearest = nearest
+
+
+def read_at(place: str, read: Callable[[str], Read], text: str) -> Read:
+    """Return what `read` makes of a text; the BadValue that it raises names the place, such as an option."""
+    try:
+        return read(text)
+    except BadValue as bad:
+        raise BadValue(f"{place}: {bad.problem}", bad.value, bad.nearest) from None
+
+
+class DeploymentError(Refused):
+    """A deployment file with problems, all of them, one a line: `file:line:column: what, value, nearest name`."""
+
+    exit_code = 2
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        assert problems, "an error without a problem"
+        super().__init__("\n".join(problems))
+        self.problems = tuple(problems)
+
+
+def describe(what: str, value: object, nearest: str | None = None) -> str:
+    """`what, value, nearest is X` on one line, whatever the value holds."""
+    text = what if value is ABSENT else f"{what}, {show(value)}"
+    return text if nearest is None else f"{text}, nearest is {nearest}"
+
+
+def show(value: object, length: int = 48) -> str:
+    """A value as it may stand in a message: one line, bounded, with control characters escaped."""
+    if isinstance(value, dict):
+        return f"a mapping of {len(value)}"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    text = ascii(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= length else text[: length - 4] + "..." + text[-1]
+
+
+class Malformed(Refused):
+    """Bytes, or a message made of them, that do not fit the schema or the world they claim to be about."""
+
+
+class UnknownName(BadValue):
+    """A robot, channel, destination or class that does not exist; the text lists those that do."""
+
+    def __init__(self, what: str, value: str, choices: Iterable[str]) -> None:
+        names = sorted(set(choices))
+        nearest = nearest_name(value, names)
+        shown = ", ".join(names[:CHOICES_MAX]) + (", ..." if len(names) > CHOICES_MAX else "")
+        super().__init__(f"{what} (there are: {shown or 'none'})", value, None if nearest is None else show(nearest))

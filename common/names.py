@@ -1,0 +1,92 @@
+"""Names: what one may be called, and the nearest valid name for an error message.
+
+Names end up in file names, keys of the wire, captures and terminals: so they are short, lower case and plain.
+"""
+
+import difflib
+import re
+from collections.abc import Iterable
+from itertools import takewhile
+from typing import Final, Literal
+
+from foosim.common.limits import NAME_LENGTH_MAX
+
+SELECTOR_LENGTH_MAX: Final = 64
+
+NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*$"
+NAME_RULE: Final = (
+    f"a name is a lower case letter, then lower case letters, digits, - and _, at most {NAME_LENGTH_MAX} in all"
+)
+"""The same for people."""
+ROBOT_NAME_PATTERN: Final = r"^[a-z][a-z0-9_-]*(\.[a-z0-9_-]+)*$"
+SELECTOR_PATTERN: Final = r"^[a-z0-9_.*?-]+$"
+CLASS_PATTERN: Final = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$"
+
+LineName = Literal["goal", "defence", "midfield", "attack"]
+LINE_NAMES: Final[tuple[LineName, ...]] = ("goal", "defence", "midfield", "attack")
+Team = Literal["red", "blue"]
+TEAMS: Final[tuple[Team, ...]] = ("red", "blue")
+
+# The entities of the world that are no robots, and the processes that are neither node nor player: no robot may be
+# called like the first, no node, player or client like the second.
+ENTITY_NAMES_RESERVED: Final = ("ball", "world")
+PROCESS_NAMES_RESERVED: Final = ("supervisor", "vhub")
+# Channels that every robot, every rod, or every rover has: no sensor may be called so.
+CHANNEL_ECHO: Final = "echo"
+CHANNEL_POSITION: Final = "position"
+CHANNEL_DRIVE: Final = "drive"
+CHANNEL_NAMES_RESERVED: Final = (CHANNEL_ECHO, CHANNEL_POSITION, CHANNEL_DRIVE)
+
+SIMILAR: Final = 0.6
+"""From here on two texts are alike: 0 is nothing in common, 1 is equal but for capitals."""
+
+_NAME = re.compile(NAME_PATTERN)
+_SELECTOR = re.compile(SELECTOR_PATTERN)
+_ROBOT_NAME = re.compile(ROBOT_NAME_PATTERN)
+
+
+def is_name(text: str) -> bool:
+    """True for the name of a node, player, client, channel, world or link rule."""
+    return len(text) <= NAME_LENGTH_MAX and _NAME.fullmatch(text) is not None
+
+
+def is_robot_name(text: str) -> bool:
+    """True for the name of a robot: names joined by dots, as in `red.goal`."""
+    return len(text) <= NAME_LENGTH_MAX and _ROBOT_NAME.fullmatch(text) is not None
+
+
+def is_selector(text: str) -> bool:
+    """True for what may select endpoints: a name in which * and ? stand for anything."""
+    return len(text) <= SELECTOR_LENGTH_MAX and _SELECTOR.fullmatch(text) is not None
+
+
+def class_path_of(text: str) -> str | None:
+    """Return the class path that `module.Class` was meant to be; None where it names no class: those have capitals."""
+    module, _, name = text.rpartition(".")
+    path = f"{module}:{name}"
+    return path if name[:1].isupper() and re.fullmatch(CLASS_PATTERN, path) else None
+
+
+def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR) -> str | None:
+    """The choice that looks most like the value; None when none does.
+
+    Among equals it is the one that begins most like the value, then the first by name.
+    """
+    text = str(value)[: 2 * SELECTOR_LENGTH_MAX]
+    best, best_likeness = None, (0.0, 0)
+    matcher = difflib.SequenceMatcher(autojunk=False)
+    matcher.set_seq2(text.lower())
+    for choice in sorted(set(choices)):
+        matcher.set_seq1(choice.lower())
+        if matcher.real_quick_ratio() < similar or matcher.quick_ratio() < similar:
+            continue
+        likeness = (matcher.ratio(), _common_start(choice.lower(), text.lower()))
+        if likeness[0] >= similar and likeness > best_likeness:
+            best, best_likeness = choice, likeness
+    return best
+
+
+def _common_start(one: str, other: str) -> int:
+    """How many first characters two texts share."""
+    pairs = zip(one, other, strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))

@@ -1,0 +1,1 @@
+"""The deployment file: its schema, how it is read and checked, overrides, hosts, assets."""

@@ -1,0 +1,118 @@
+"""Events of the network that are asked for while a run goes on: from plain data to the text that an order carries.
+
+An event of a request is one of a deployment without its time: it happens at the tick of its answer. What is wrong with
+it is said as of a file, by path, value and nearest valid name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from typing import Final
+
+from pydantic import ValidationError
+
+from foosim.common import limits, units
+from foosim.common.errors import Refused, describe
+from foosim.common.finding import Finding, Location
+from foosim.common.json_text import encode_json
+from foosim.deployment.checks import View, path_text
+from foosim.deployment.network.impairments import Trace
+from foosim.deployment.network.rules import Event, Network
+from foosim.deployment.network.traces import file_settings
+from foosim.deployment.network_checks import event_findings
+from foosim.deployment.radio_checks import set_findings
+from foosim.deployment.schema import Deployment
+from foosim.deployment.schema_errors import schema_findings
+
+PROBLEMS_MAX: Final = 20
+_UNDER: Final[Location] = ("network", "events", 0)
+
+
+class BadEvent(Refused):
+    """An event with problems, one a line: `path: what, value, nearest name`."""
+
+    exit_code = 2
+
+
+def event_text(deployment: Deployment, data: object, at_ns: int) -> str:
+    """Return an event as JSON, without spaces; `at_ns` is the simulated time at which it would happen.
+
+    Raises BadEvent with all that is wrong with it, of what is in the deployment, too.
+    """
+    if not isinstance(data, dict):
+        raise BadEvent(describe("not an event, which is a mapping", data))
+    findings = [*islice(_findings(deployment, data, at_ns), PROBLEMS_MAX)]
+    if findings:
+        raise BadEvent("\n".join(dict.fromkeys(map(_line, findings))))
+    text = encode_json(data).decode()
+    if len(text.encode()) > limits.EVENT_BYTES_MAX:
+        raise BadEvent(f"an event of {len(text.encode())} bytes, at most {limits.EVENT_BYTES_MAX} are allowed")
+    return text
+
+
+def _findings(deployment: Deployment, data: dict[str, object], at_ns: int) -> list[Finding]:
+    if "at" in data:
+        return [Finding(("at",), "an event that is asked for happens at the next tick, it has no time", "at", at="key")]
+    links = [rule.id for rule in deployment.network.links]
+    found = list(event_findings(View(data), (), data, deployment.endpoints(), links))
+    try:
+        event = Event.model_validate({**data, "at": f"{at_ns} ns"})
+    except ValidationError as error:
+        return found + [_relative(finding) for finding in schema_findings(error, _UNDER)]
+    found += set_findings(deployment.network, event, (), deployment.endpoints(), deployment.carriers())
+    found += _files(deployment, event)
+    if event.until_ns is not None and event.until_ns <= at_ns:
+        what = f"not after the present simulated time, {units.format_ns(at_ns)}"
+        found.append(Finding(("until",), what, data["until"]))
+    return found
+
+
+def _files(deployment: Deployment, event: Event) -> Iterator[Finding]:
+    """Nobody brings files with a request: it may name those that the network was made with, for the same."""
+    known = {(type(setting), setting.file) for _, setting in file_settings(deployment.network)}
+    for _, setting in file_settings(Network(events=[event])):
+        if (type(setting), setting.file) not in known or setting.digest is not None:
+            key = "trace" if isinstance(setting, Trace) else "jitter"
+            what = "not one of the files of its kind that this deployment's network names, or with a digest"
+            yield Finding(("set", key, "file"), what, setting.file)
+
+
+def _relative(finding: Finding) -> Finding:
+    return Finding(finding.location[len(_UNDER) :], finding.what, finding.value, finding.nearest, finding.at)
+
+
+def _line(finding: Finding) -> str:
+    location = finding.location if finding.at == "value" else finding.location[:-1]
+    text = describe(finding.what, finding.value, finding.nearest)
+    path = path_text(location)
+    return f"{path}: {text}" if path else text
+
+
+def told(event: Event) -> str:
+    """Return in a few words what an event does: `partition of player-red from rest for 10 s`."""
+    if event.heal is not None:
+        return f"heal of {event.heal}"
+    if event.set is not None:
+        fields = type(event.set).model_fields
+        changed = sorted(fields[key].alias or key for key in event.set.model_fields_set - {"link"})
+        return f"{event.set.link}: {', '.join(changed)} set"
+    if event.partition is not None:
+        groups = [", ".join(group) for group in event.partition]
+        way = " from " if event.symmetric else ", one way, from "
+        what = f"partition of {way.join((groups[0], ' from '.join(groups[1:])))}"
+    elif event.clog is not None:
+        what = f"clog from {', '.join(event.clog.from_)} to {', '.join(event.clog.to)}"
+    else:
+        assert event.chaos is not None, "one action"
+        what = f"chaos among {', '.join(event.chaos.among)}"
+    return what + _until(event)
+
+
+def _until(event: Event) -> str:
+    if event.until_ns is not None:
+        return f" until {units.format_ns(event.until_ns)}"
+    if event.lasts is None:
+        return ""
+    mean = " (mean, exponential)" if event.lasts.is_random else ""
+    return f" for {units.format_ns(event.lasts.ns)}{mean}"

@@ -1,0 +1,1 @@
+"""The network part of a deployment: rules of links, impairments, radios, presets, traces."""

@@ -1,0 +1,183 @@
+"""Settings of a command line, `--set a.b=VALUE`, placed in the tree of a deployment file.
+
+The path is made of keys joined by dots, as messages print it: `robots.red.goal.sensors.encoder.rate`. Where names hold
+dots themselves, the longest key that fits is meant; a new one is written in double quotes. An entry of a list is named
+by its number, `[0]` or `.0`, or by its `id`. The value is YAML. Settings apply in order; what they hold is placed at
+`--set:N:COLUMN`, N counting settings from 1.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Any, Final
+
+from foosim.common.errors import DeploymentError, describe, show
+from foosim.common.names import nearest_name
+from foosim.deployment.schema import Deployment
+from foosim.deployment.yaml import Fields, Items, Leaf, Place, Problem, Tree, plain, read_tree
+
+ENTRIES_SHOWN_MAX: Final = 8
+SETS_MAX: Final = 256
+SET_LENGTH_MAX: Final = 4096
+
+_STEP = re.compile(r'(?:"(?P<quoted>[^"]*)"|(?P<plain>[^".=\[\]]+))')
+_INDEX = re.compile(r"\[(?P<index>[0-9]+)\]")
+
+
+class _Misplaced(Exception):
+    """A setting cannot be placed."""
+
+    def __init__(self, column: int, text: str) -> None:
+        super().__init__(text)
+        self.column = column
+        self.text = text
+
+
+def place_sets(tree: Tree, sets: Sequence[str]) -> tuple[Tree, list[Problem]]:
+    """The tree with all settings that could be placed, and the problems of the others. `tree` itself is changed."""
+    problems: list[Problem] = []
+    if len(sets) > SETS_MAX:
+        return tree, [Problem(_place(SETS_MAX + 1, 1), describe(f"more than {SETS_MAX} settings", len(sets)))]
+    for number, text in enumerate(sets, 1):
+        try:
+            steps, start = _read_path(text)
+            value, value_problems = _read_value(text, start, number)
+            problems += value_problems
+            if value is not None:
+                _put(tree, steps, value, number)
+        except _Misplaced as misplaced:
+            problems.append(Problem(_place(number, misplaced.column), misplaced.text))
+    return tree, problems
+
+
+def nested(sets: Sequence[str]) -> dict[str, Any]:
+    """Return arguments `a.b=VALUE` as nested plain data; raises DeploymentError with all problems."""
+    tree = Fields(_place(1, 1))
+    problems: list[str] = []
+    for number, text in enumerate(sets, 1):
+        try:
+            steps, start = _read_path(text)
+            value, value_problems = _read_value(text, start, number)
+            problems += [_of_argument(text, problem.text) for problem in value_problems]
+            node = tree
+            for step, column in steps[:-1]:
+                inner = node.values.setdefault(step, Fields(_place(number, column)))
+                if not isinstance(inner, Fields):
+                    raise _Misplaced(column, describe("set inside a value that is no mapping", step))
+                node = inner
+            if value is not None:
+                node.values[steps[-1][0]] = value
+        except _Misplaced as misplaced:
+            problems.append(_of_argument(text, misplaced.text))
+    if problems:
+        raise DeploymentError(problems)
+    content = plain(tree)
+    assert isinstance(content, dict), "a mapping"
+    return content
+
+
+def _of_argument(text: str, problem: str) -> str:
+    """Say what is wrong with an argument, which is shown once."""
+    line = f"KEY=VALUE: {problem}"
+    return line if line.endswith(show(text)) else f"{line}, {show(text)}"
+
+
+def _place(number: int, column: int) -> Place:
+    return Place(number, number, column, "--set")
+
+
+def _read_path(text: str) -> tuple[list[tuple[str, int]], int]:
+    """The steps of the path with their columns, and the index at which the value starts."""
+    if len(text) > SET_LENGTH_MAX:
+        raise _Misplaced(1, describe(f"more than {SET_LENGTH_MAX} characters", len(text)))
+    steps = []
+    index = 0
+    while (match := _STEP.match(text, index)) is not None:
+        while match is not None:
+            steps.append((next(part for part in match.groups() if part is not None), index + 1))
+            index = match.end()
+            match = _INDEX.match(text, index)
+        if text[index : index + 1] == "=":
+            return steps, index + 1
+        if text[index : index + 1] != ".":
+            break
+        index += 1
+    raise _Misplaced(index + 1, describe("not of the form key.key=VALUE", text))
+
+
+def _read_value(text: str, start: int, number: int) -> tuple[Tree | None, list[Problem]]:
+    def locate(index: int, line: int, column: int) -> Place:
+        return _place(number, start + index + 1)
+
+    value = text[start:]
+    if not value.strip():
+        return Leaf(_place(number, start + 1), None), []
+    return read_tree(value, locate)
+
+
+def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int) -> None:
+    """Replace or add the value at the path."""
+    node = tree
+    index = 0
+    while True:
+        if isinstance(node, Items):
+            entry = _entry(node, *steps[index])
+            if index + 1 == len(steps):
+                node.items[entry] = value
+                return
+            node = node.items[entry]
+            index += 1
+            continue
+        if not isinstance(node, Fields):
+            raise _Misplaced(steps[index][1], describe("set inside a value that is no mapping", steps[index][0]))
+        key, used = _key(node, steps, index)
+        if index + used == len(steps):
+            node.keys[key] = _place(number, steps[index][1])
+            node.values[key] = value
+            return
+        if key not in node.values:
+            _open(tree, node, key, steps, index, number)
+        node = node.values[key]
+        index += used
+
+
+def _key(node: Fields, steps: Sequence[tuple[str, int]], index: int) -> tuple[str, int]:
+    """The longest key of the mapping that the path goes on with, and how many steps it takes."""
+    for used in range(len(steps) - index, 0, -1):
+        key = ".".join(step for step, _ in steps[index : index + used])
+        if key in node.values:
+            return key, used
+    return steps[index][0], 1
+
+
+def _open(tree: Tree, node: Fields, key: str, steps: Sequence[tuple[str, int]], index: int, number: int) -> None:
+    """Add an empty mapping for a section that the file leaves out; any other missing key on the way is an error."""
+    if node is tree and key in Deployment.model_fields:
+        node.keys[key] = _place(number, steps[index][1])
+        node.values[key] = Fields(_place(number, steps[index][1]))
+        return
+    nearest = None
+    for stop in range(len(steps) - 1, index, -1):
+        name = ".".join(step for step, _ in steps[index:stop])
+        if nearest is None and (nearest := nearest_name(name, node.values)) is not None:
+            key = name
+    path = ".".join(step for step, _ in steps[:index])
+    text = describe("unknown key", key, None if nearest is None else repr(nearest))
+    raise _Misplaced(steps[index][1], f"{path}: {text}" if path else text)
+
+
+def _entry(node: Items, step: str, column: int) -> int:
+    """The index of a list's entry, from its number or its id."""
+    if step.isascii() and step.isdigit() and len(step) < 6 and int(step) < len(node.items):
+        return int(step)
+    ids: dict[str, int] = {}
+    for index, item in enumerate(node.items):
+        name = item.values.get("id") if isinstance(item, Fields) else None
+        if isinstance(name, Leaf) and isinstance(name.value, str):
+            ids.setdefault(name.value, index)
+    if step in ids:
+        return ids[step]
+    named = {index: name for name, index in ids.items()}
+    entries = [f"{index} (id {named[index]})" if index in named else str(index) for index in range(len(node.items))]
+    more = ", ..." if len(entries) > ENTRIES_SHOWN_MAX else ""
+    choices = f"the list has {', '.join(entries[:ENTRIES_SHOWN_MAX])}{more}" if entries else "the list is empty"
+    raise _Misplaced(column, f"no such entry, {show(step)}: {choices}")

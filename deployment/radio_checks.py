@@ -1,0 +1,221 @@
+"""What radios are asked for that they do not do: settings of a radio, of rules over it, of events that change these.
+
+What a radio says by itself is checked as plain data, like all in `network_references`; what rules ask of radios is
+checked when the network is whole, for then it is known which radio the packets of a pair go by.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from foosim.common import units
+from foosim.common.errors import BadValue
+from foosim.common.finding import Finding, Location
+from foosim.deployment.checks import BODILESS, View
+from foosim.deployment.network.impairments import Impairments
+from foosim.deployment.network.presets import PRESETS, preset_settings
+from foosim.deployment.network.radios import Radio, lora_longest
+from foosim.deployment.network.rules import Event, LinkRule, Network
+from foosim.deployment.schema import Deployment
+
+BANDWIDTHS: Final = {"802.11a/g": ("20 MHz", "10 MHz"), "802.11n": ("20 MHz",)}
+"""Of Wi-Fi: those whose rates are known here; 10 MHz is 802.11p."""
+_RATES: Final = {
+    "wifi": "a radio's bit rate is its own: write `rates: fixed` and `fixed_rate` there",
+    "ieee802154": "a radio's bit rate is 250 kbit/s",
+    "lora": "a radio's bit rate is that of its `spreading_factor`",
+    "lte": "a radio's bit rate is that of its signal and `bandwidth`",
+}
+"""Media with bit rates of their own, and what decides these."""
+_OWN_HEADERS: Final = ("wifi", "ieee802154", "lora")
+_OF_MEDIUM: Final = {
+    "rates": "wifi",
+    "fixed_rate": "wifi",
+    "standard": "wifi",
+    "access": "wifi",
+    "spreading_factor": "lora",
+    "coding_rate": "lora",
+    "gateway": "lora",
+}
+"""Keys that one medium alone reads."""
+_LIMITING: Final = {"rate_bps": "rate", "trace": "trace", "overhead_bytes": "overhead", "payload_max": "mtu"}
+"""Fields of a rule that not every medium heeds, and their keys."""
+
+
+def unheeded(key: str, medium: str) -> str | None:
+    """Return why a key has no effect on a medium; None where it has."""
+    if key in _OF_MEDIUM and medium != _OF_MEDIUM[key]:
+        return f"has no effect on {medium}, it is of {_OF_MEDIUM[key]}"
+    if key in ("rate", "trace") and medium in _RATES:
+        return f"has no effect over {medium}: {_RATES[medium]}"
+    if key == "trace" and medium == "radio":
+        return "has no effect over radio: write `rate`"
+    if key == "overhead" and medium in _OWN_HEADERS:
+        return f"has no effect over {medium}, whose headers count already"
+    return None
+
+
+# --- what a radio says by itself --------------------------------------------------------------------------------------
+
+
+def inherited(view: View, location: Location) -> dict[str, Any]:
+    """Return what a radio, as it is written at a location, has from its preset."""
+    preset = view.mapping(*location).get("preset", "perfect")
+    return preset_settings(preset) if isinstance(preset, str) and preset in PRESETS else {}
+
+
+def is_on_air(view: View, radio: str) -> bool:
+    """Return whether a radio, as it is written, sends by radio."""
+    settings = {**inherited(view, ("network", "radios", radio)), **view.mapping("network", "radios", radio)}
+    return settings.get("medium", "none") not in ("none", "wired")
+
+
+def radio_findings(view: View, location: Location) -> Iterator[Finding]:
+    """Return what is written of a radio that it does not do."""
+    written = view.mapping(*location)
+    settings = {**inherited(view, location), **written}
+    medium = settings.get("medium", "none")
+    if not isinstance(medium, str):
+        return
+    asked = [key for key in settings if settings[key] is not None and (key in written or key not in _OF_MEDIUM)]
+    for key in asked:
+        what = unheeded(key, medium)
+        if what is None and key == "fixed_rate" and key in written and settings.get("rates", "ideal") != "fixed":
+            what = "has no effect without `rates: fixed`"
+        if what is not None:
+            yield Finding((*location, key), what, settings[key])
+    if medium == "wifi":
+        yield from _bandwidth(location, settings)
+    yield from _duty(location, settings, medium)
+    longest = lora_longest(settings.get("spreading_factor", 7)) if medium == "lora" else None
+    try:
+        if longest is not None and units.parse(written.get("mtu"), units.SIZE) > longest:
+            yield Finding((*location, "mtu"), _too_long(settings.get("spreading_factor", 7), longest), written["mtu"])
+    except BadValue:
+        return
+
+
+def _too_long(factor: int, longest: int) -> str:
+    return f"more than the {longest} B of LoRaWAN at spreading factor {factor}"
+
+
+def _bandwidth(location: Location, settings: Mapping[str, Any]) -> Iterator[Finding]:
+    """Rates and sensitivities are those of some bandwidths."""
+    standard, bandwidth = settings.get("standard", "802.11a/g"), settings.get("bandwidth", "20 MHz")
+    known = BANDWIDTHS.get(standard, ()) if isinstance(standard, str) else ()
+    try:
+        hertz = units.parse(bandwidth, units.FREQUENCY)
+    except BadValue:
+        return
+    if known and hertz not in [units.parse(text, units.FREQUENCY) for text in known]:
+        what = f"not a bandwidth of {standard} here, which has {' or '.join(known)}"
+        yield Finding((*location, "bandwidth"), what, bandwidth, repr(known[0]))
+
+
+def _duty(location: Location, settings: Mapping[str, Any], medium: str) -> Iterator[Finding]:
+    """A duty cycle counts airtime that is known before it is used."""
+    try:
+        share = units.parse(settings.get("duty_cycle"), units.PROBABILITY)
+    except BadValue:
+        return
+    if share >= 1 or medium == "lora" or (medium == "radio" and settings.get("rate") is not None):
+        return
+    if medium == "radio":
+        what = "has no effect without `rate`: packets take no time"
+    elif medium in ("none", "wired"):
+        what = f"has no effect on {medium}, it is of lora, and of radio with a rate"
+    else:
+        what = f"not to be had on {medium}, whose airtime is not known before it is used; lora has it, and radio"
+    yield Finding((*location, "duty_cycle"), what, settings["duty_cycle"])
+
+
+# --- what rules and events ask of radios ------------------------------------------------------------------------------
+
+
+def rule_findings(network: Network, ends: Sequence[str], carriers: Mapping[str, str]) -> Iterator[Finding]:
+    """Return which settings of rules, and of events for them, the radios do not heed by which packets go.
+
+    `ends` are the endpoints, none where they are not known: then only what a rule says by `via` is.
+    """
+    for number, rule in enumerate(network.links):
+        yield from _asked(network, rule, rule, ("network", "links", number), ends, carriers)
+    for number, event in enumerate(network.events):
+        yield from set_findings(network, event, ("network", "events", number), ends, carriers)
+
+
+def set_findings(
+    network: Network, event: Event, location: Location, ends: Sequence[str], carriers: Mapping[str, str]
+) -> Iterator[Finding]:
+    """Return which settings of an event the radios do not heed by which the packets go of the rule that it changes."""
+    change = event.set
+    rule = None if change is None else next((rule for rule in network.links if rule.id == change.link), None)
+    if change is not None and rule is not None:
+        yield from _asked(network, rule, change, (*location, "set"), ends, carriers)
+
+
+def _asked(
+    network: Network,
+    rule: LinkRule,
+    settings: Impairments,
+    location: Location,
+    ends: Sequence[str],
+    carriers: Mapping[str, str],
+) -> Iterator[Finding]:
+    asked = [field for field in _LIMITING if field in settings.model_fields_set and getattr(settings, field)]
+    ways = list(dict.fromkeys(_ways(network, rule, ends, carriers))) if asked else []
+    for field in asked:
+        key = _LIMITING[field]
+        for way in ways:
+            radio = _radio(network, way)
+            what = unheeded(key, radio.medium)
+            if key == "mtu" and radio.medium == "lora":
+                longest = lora_longest(radio.spreading_factor) or 0
+                what = _too_long(radio.spreading_factor, longest) if (settings.payload_max or 0) > longest else None
+            if what is not None:
+                by = way or network.defaults.preset
+                yield Finding((*location, key), f"via {by}, {what}", key, at="key")
+                break
+
+
+def _radio(network: Network, way: str) -> Radio:
+    return network.radios[way] if way else Radio.model_validate({"preset": network.defaults.preset})
+
+
+def _ways(network: Network, rule: LinkRule, ends: Sequence[str], carriers: Mapping[str, str]) -> Iterator[str]:
+    """Yield by which radios packets go that meet a rule; the empty name is that of the defaults.
+
+    Where there are but wires, which all heed the same, only what a rule says by `via`.
+    """
+    if rule.via is not None:
+        yield rule.via
+        return
+    if not any(_radio(network, way).is_on_air for way in ("", *network.radios)):
+        return
+    for source in ends:
+        for destination in ends:
+            if source != destination and any(met is rule for met in network.rules_for(source, destination)):
+                way = network.way(rule, source, destination, carriers)
+                if way is not None:
+                    yield way
+
+
+def place_findings(deployment: Deployment) -> Iterator[Finding]:
+    """Return who is nowhere and yet on air, by a rule's `via` or by the defaults: it carries no radio itself."""
+    network, ends, carriers = deployment.network, deployment.endpoints(), deployment.carriers()
+    on_air = {way for way in ("", *network.radios) if _radio(network, way).is_on_air}
+    for end in ends if on_air else ():
+        robot = deployment.robots.get(carriers.get(end, end))
+        has_body = robot is not None and (deployment.is_hall or robot.model != BODILESS)
+        if has_body or network.place_of(end) is not None:
+            continue
+        pairs = [pair for other in ends if other != end for pair in ((end, other), (other, end))]
+        met = ((rule, network.way(rule, *pair, carriers)) for pair in pairs for rule in network.rules_for(*pair))
+        found = next(((rule, way) for rule, way in met if way in on_air), None)
+        if found is not None:
+            rule, way = found
+            number = network.links.index(rule) if rule is not None else 0
+            location: Location = ("network", "links", number, "via") if way and rule is not None else (
+                "network", "defaults", "preset"
+            )  # fmt: skip
+            on_board = "" if end in deployment.robots else " or its `on`"
+            what = f"goes by radio to or from {end}, which is nowhere: write network.places.{end}{on_board}"
+            yield Finding(location, what, way or network.defaults.preset)

@@ -1,0 +1,247 @@
+"""The deployment: everything that a run is made from, as one frozen value.
+
+This is the schema. Text becomes a `Deployment` in deployment_file.py only, because what one field cannot know (every
+robot has one owner, every selector matches an endpoint, every rate is a whole number of ticks) is checked there too,
+by references.py. Quantities are strings with units in the file and SI numbers here; times are integer nanoseconds
+whose names end in `_ns` (see units.py). The table's parameters are in table.py, a hall's in hall.py.
+"""
+
+import json
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, JsonValue, StringConstraints
+
+from foosim.common import limits, names, units
+from foosim.common.addresses import LOOPBACK
+from foosim.common.errors import BadValue
+from foosim.common.spec_base import Name, Offset, Rate, RobotName, SpecBase, default
+from foosim.common.units import PaceField, Quantity, custom_error
+from foosim.deployment.hosts import Host, Listen, Placed
+from foosim.deployment.network.rules import Network, Selector
+from foosim.deployment.network.traces import check_files, network_files
+from foosim.world.scenery import mesh_files, read_contents
+from foosim.world.spec import WorldSpec
+
+OperatorName = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.OPERATOR_LENGTH_MAX)]
+ClassPath = Annotated[str, StringConstraints(pattern=names.CLASS_PATTERN, max_length=200)]
+
+Size = Annotated[int, Quantity(units.SIZE, "64 KiB", "1000 TiB")]
+Span = Annotated[int, Quantity(units.TIME, "10 ms", "10000 h")]
+Deadline = Annotated[int, Quantity(units.TIME, "1 ms", "24 h")]
+
+
+class NodeSpec(Placed):
+    """A process that computes: where, who starts it, whether the run needs it, the robots that it owns at the start."""
+
+    launch: Literal["local", "manual", "systemd"] = "local"
+    required: bool = False
+    robots: list[RobotName] = Field(max_length=limits.ENTITIES_MAX)
+
+
+class Player(Placed):
+    """A controller that `up` starts: a class with `act(tick, samples) -> commands`.
+
+    It may command its `robots` and hears their channels, and those of others that `hears` selects. One that is `on` a
+    robot is on board of it: its packets leave from and come to where the robot is. Players that name the same `process`
+    share one; else each has its own. One that acts at `arrival` is called at each tick at which a packet arrives of
+    what `arrivals` selects, and when it has not been called for the period of its rate.
+    """
+
+    class_: ClassPath = Field(alias="class")
+    rate_hz: Rate = Field(alias="rate")
+    offset_ns: Offset = default("0 s", "offset")
+    lockstep: bool = True
+    act: Literal["period", "arrival"] = "period"
+    arrivals: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    on: RobotName | None = None
+    process: Name | None = None
+    restart: bool = True
+    """Whether its process is started again when a signal has ended it, or it was lost with its machine; before the
+    first tick, when it has no memory to lose, it always is."""
+    robots: dict[RobotName, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    hears: dict[Selector, list[Name]] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
+
+
+class VHubSpec(Placed):
+    """The process that judges every packet and writes the capture: where it runs."""
+
+
+class ClientSpec(SpecBase):
+    """An endpoint that is started by hand, on board of a robot or anywhere.
+
+    One in lockstep is waited for before tick 0 and has a rate.
+    """
+
+    on: RobotName | None = None
+    lockstep: bool = False
+    rate_hz: Rate | None = Field(default=None, alias="rate")
+    offset_ns: Offset = default("0 s", "offset")
+
+
+class Capture(SpecBase):
+    """How much of a run the capture keeps beside its packets, orders and digests."""
+
+    frames_every: Annotated[int, Quantity(units.TICKS, "1 tick", "1000000 ticks")] = default("10 ticks")
+    poses_hz: Rate = default("50 Hz", "poses")
+    flush_ns: Annotated[int, Quantity(units.TIME, "1 ms", "100 ms")] = default("100 ms", "flush")
+    on_full: Literal["stop_world", "continue_unlogged"] = "stop_world"
+    """What follows when the disk has less than the reserve left, or the capture has reached `max_bytes`."""
+    reserve_bytes: Size = default("64 MiB", "reserve")
+    """Kept free on the disks of capture and journals, so that what has to be written in the end still fits."""
+    bytes_max: Size | None = Field(default=None, alias="max_bytes")
+    split_bytes: Size | None = Field(default=None, alias="split_size")
+    split_ns: Span | None = Field(default=None, alias="split_time")
+    """Another file is begun, with the next captured frame, when one has so many bytes, or so much simulated time."""
+    last_ns: Span | None = Field(default=None, alias="last")
+    """Of a capture that is split, files are removed that hold nothing of so much simulated time."""
+    payloads: Literal["exact", "hashed"] = "exact"
+    """`hashed`: a hash of 16 bytes stands for each payload, and what needs payloads cannot be done with the capture."""
+
+    @property
+    def is_split(self) -> bool:
+        """Whether the capture goes on in further files."""
+        return self.split_bytes is not None or self.split_ns is not None
+
+
+class AccessSpec(SpecBase):
+    """Who may control the run, who may look at it, and how clients prove who they are, in a run with certificates."""
+
+    operators: list[OperatorName] = Field(default=["admin"], max_length=limits.OPERATORS_MAX)
+    viewers: list[OperatorName] = Field(default=[], max_length=limits.OPERATORS_MAX)
+    radio: Literal["certificate", "password"] = "certificate"
+
+
+class Deadlines(SpecBase):
+    """How long the run waits for whom, in wall time."""
+
+    heartbeat_ns: Deadline = default("1 s", "heartbeat")
+    tick_named_ns: Deadline = default("500 ms", "tick_named")
+    tick_lost_ns: Deadline = default("1 s", "tick_lost")
+    lockstep_fast_ns: Deadline = default("10 s", "lockstep_fast")
+    lockstep_realtime_ns: Deadline = default("2 s", "lockstep_realtime")
+    start_ns: Deadline = default("60 s", "start")
+    orphan_ns: Deadline = default("30 s", "orphan")
+    """Nodes and vHub end when their supervisor has been gone for so long."""
+    vhub_back_ns: Deadline = default("30 s", "vhub_back")
+    client_back_ns: Deadline = default("2 s", "client_back")
+    close_ns: Deadline = default("30 s", "close")
+
+
+def _int_only(value: object) -> object:
+    """Literal[1] alone would take `true` and `1.0` for 1."""
+    if type(value) is not int:
+        raise custom_error(BadValue("not one of 1", value))
+    return value
+
+
+class Deployment(WorldSpec):
+    """A whole run: the world, who computes it, who plays in it, what lies between, and how it is recorded.
+
+    The world is a football table or a hall with mobile robots: one of `table` and `hall` is given.
+    """
+
+    format: Annotated[Literal[1], BeforeValidator(_int_only, json_schema_input_type=Literal[1])]
+    pace: PaceField
+    mixed_cpu: bool = False
+    on_node_loss: Literal["adopt", "freeze", "stop"] = "adopt"
+    listen: Listen = LOOPBACK
+    hosts: dict[Name, Host] = Field(default={}, max_length=limits.NODES_MAX)
+    nodes: dict[Name, NodeSpec] = Field(min_length=1, max_length=limits.NODES_MAX)
+    vhub: VHubSpec = Field(default_factory=VHubSpec)
+    players: dict[Name, Player] = Field(default={}, max_length=limits.CLIENTS_MAX)
+    clients: dict[Name, ClientSpec] = Field(default={}, max_length=limits.CLIENTS_MAX)
+    network: Network = Field(default_factory=Network)
+    capture: Capture = Field(default_factory=Capture)
+    access: AccessSpec = Field(default_factory=AccessSpec)
+    deadlines: Deadlines = Field(default_factory=Deadlines)
+
+    def with_assets(self, files: Mapping[str, bytes]) -> Self:
+        """The same with the contents of the files that scenery and network name; raises AssetError."""
+        deployment = self.with_contents(read_contents(self.scenery, files, network_files(self.network)))
+        check_files(self.network, files)
+        return deployment
+
+    def files(self) -> dict[str, str | None]:
+        """The files that it names, by path, each with the digest that is written beside it."""
+        return mesh_files(self.scenery) | network_files(self.network)
+
+    def endpoints(self) -> list[str]:
+        """The names that packets go from and to, sorted: robots, players and clients."""
+        return sorted([*self.robots, *self.players, *self.clients])
+
+    def carriers(self) -> dict[str, str]:
+        """The robot on whose board each player and client is that is on one."""
+        on_board = [(name, player.on) for name, player in self.players.items()]
+        on_board += [(name, client.on) for name, client in self.clients.items()]
+        return {name: robot for name, robot in on_board if robot is not None}
+
+    def player_processes(self) -> dict[str, list[str]]:
+        """The players of each process that `up` starts for them, by its name: a player's own if it shares none."""
+        found: dict[str, list[str]] = {}
+        for name, player in sorted(self.players.items()):
+            found.setdefault(player.process or name, []).append(name)
+        return dict(sorted(found.items()))
+
+    def heard_by(self, name: str) -> list[tuple[str, str]]:
+        """The (endpoint, channel) that a player subscribes to, sorted: its robots' and what `hears` selects."""
+        player = self.players[name]
+        heard = {(robot, channel) for robot, channels in player.robots.items() for channel in channels}
+        for glob, channels in player.hears.items():
+            for other in self.endpoints():
+                if other != name and fnmatchcase(other, glob):
+                    heard.update((other, channel) for channel in channels if self._has(other, channel))
+        return sorted(heard)
+
+    def arrivals_of(self, name: str) -> list[tuple[str, str]]:
+        """The (endpoint, channel) at the arrival of whose packets a player acts, sorted; none for one by period."""
+        player = self.players.get(name)
+        if player is None or player.act != "arrival":
+            return []
+        chosen = player.arrivals.items()
+        return [
+            (source, channel)
+            for source, channel in self.heard_by(name)
+            if any(channel in channels and fnmatchcase(source, glob) for glob, channels in chosen)
+        ]
+
+    def _has(self, endpoint: str, channel: str) -> bool:
+        """Whether an endpoint may say something on a channel: players and clients on any, robots on their own."""
+        robot = self.robots.get(endpoint)
+        return robot is None or channel in (*robot.sensors, names.CHANNEL_ECHO)
+
+    def owners(self) -> dict[str, str]:
+        """The node of each robot at the start, in the robots' name order."""
+        owner = {robot: node for node, spec in self.nodes.items() for robot in spec.robots}
+        return dict(sorted(owner.items()))
+
+
+def places(deployment: Deployment) -> dict[str, str]:
+    """Return the host of each process that has one: nodes, players and the vHub, by name; players that share one, too.
+
+    Of the hosts with a label, each process in name order gets the one that has the fewest by then, ties by name.
+    """
+    shared = {process: deployment.players[names[0]] for process, names in deployment.player_processes().items()}
+    processes: dict[str, Placed] = {**deployment.nodes, **shared, "vhub": deployment.vhub}
+    found = {name: placed.host for name, placed in sorted(processes.items()) if placed.host is not None}
+    for name, placed in sorted(processes.items()):
+        if placed.label is not None:
+            fitting = [host for host, about in sorted(deployment.hosts.items()) if placed.label in about.labels]
+            found[name] = min(fitting, key=lambda host: sum(taken == host for taken in found.values()))
+    for process, players in deployment.player_processes().items():
+        if process in found:
+            found.update(dict.fromkeys(players, found[process]))
+    return dict(sorted(found.items()))
+
+
+def deployment_schema() -> dict[str, Any]:
+    """The JSON Schema of a deployment file, for editors and for people; deploy/deployment.schema.json is its text."""
+    schema = Deployment.model_json_schema(by_alias=True, mode="validation")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "foosim deployment"}
+
+
+def deployment_schema_text() -> str:
+    """What deploy/deployment.schema.json holds."""
+    return json.dumps(deployment_schema(), indent=2) + "\n"

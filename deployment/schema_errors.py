@@ -1,0 +1,182 @@
+"""What pydantic found wrong with a deployment's data, in the words and places of this project.
+
+pydantic says where in the *models* a value failed: that path has union tags and markers for keys in it, which are in
+no file. The path is followed through the JSON Schema of the deployment, which knows what each step is, and which names
+and choices are valid there.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any, Final
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from foosim.common import names
+from foosim.common.finding import Finding, Location
+from foosim.common.names import nearest_name
+from foosim.deployment import hosts
+from foosim.deployment.checks import quoted
+from foosim.deployment.schema import deployment_schema
+
+_NAME = "lower case letters, digits, - and _, a letter first"
+_PATTERNS: Final = {
+    names.NAME_PATTERN: f"not a name ({_NAME})",
+    names.ROBOT_NAME_PATTERN: f"not a robot's name (names joined by dots; {_NAME})",
+    names.SELECTOR_PATTERN: "not a selector (a name, in which * and ? stand for anything)",
+    names.CLASS_PATTERN: "not a class (module:Class)",
+    hosts.ADDRESS_PATTERN: "not the name or the IP address of a machine",
+    hosts.SSH_PATTERN: "not a destination for ssh (HOST, USER@HOST or ssh://USER@HOST:PORT)",
+    hosts.FOLDER_PATTERN: "not an absolute path",
+    hosts.OPTION_PATTERN: "not an argument for ssh",
+}
+_KINDS: Final = {
+    "string_type": "not a text",
+    "int_type": "not a whole number",
+    "float_type": "not a number",
+    "bool_type": "not true or false",
+    "list_type": "not a list",
+    "dict_type": "not a mapping",
+    "model_type": "not a mapping",
+    "model_attributes_type": "not a mapping",
+}
+_BOOLEANS: Final = {"on": "true", "yes": "true", "off": "false", "no": "false"}
+# pydantic says this of a field whose default depends on another one that is wrong: that one is reported anyway.
+_CONSEQUENCES: Final = frozenset({"default_factory_not_called"})
+
+
+def schema_findings(error: ValidationError, under: Location = ()) -> Iterator[Finding]:
+    """One finding for each of pydantic's errors, worked out as they are asked for.
+
+    `under` is where in a deployment the part stands that was checked.
+    """
+    details = error.errors(include_url=False)
+    return (_finding(detail, under) for detail in details if detail["type"] not in _CONSEQUENCES)
+
+
+def _finding(detail: ErrorDetails, under: Location) -> Finding:
+    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
+    path = (*under, *detail["loc"])
+    location, schema, is_key = _follow(path)
+    if kind == "extra_forbidden":
+        return _unknown(location, _follow(path[:-1])[1])
+    translate = _TRANSLATIONS.get(kind)
+    if translate is not None:
+        finding = translate(location, schema, value, context)
+        return replace(finding, at="key") if is_key else finding
+    nearest = context.get("nearest")
+    if kind == "bool_type" and isinstance(value, str):
+        nearest = _BOOLEANS.get(value.lower())
+    if context.get("pattern") == names.CLASS_PATTERN:
+        nearest = quoted(names.class_path_of(str(value)))
+    what = _PATTERNS.get(context.get("pattern", "")) or _KINDS.get(kind) or _bounds(kind, context) or detail["msg"]
+    return Finding(location, what, location[-1] if is_key else value, nearest, "key" if is_key else "value")
+
+
+def _bounds(kind: str, context: Mapping[str, Any]) -> str | None:
+    match kind:
+        case "greater_than_equal":
+            return f"less than the least that is valid, {context['ge']}"
+        case "less_than_equal":
+            return f"more than the most that is valid, {context['le']}"
+        case "string_too_long":
+            return f"longer than {context['max_length']} characters"
+        case "too_long":
+            return f"more than {context['max_length']} entries"
+        case "too_short":
+            least = context.get("min_length", 1)
+            return "empty" if least == 1 else f"fewer than {least} entries"
+    return None
+
+
+def _missing(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
+    return Finding(location, "missing key", location[-1], at="missing")
+
+
+def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
+    key = location[-1]
+    nearest = nearest_name(key, parent.get("properties", ()))
+    return Finding(location, "unknown key", key, None if nearest is None else repr(nearest), "key")
+
+
+def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
+    choices = schema.get("enum", [schema.get("const")])
+    finding = _not_a_choice(location, value, [str(choice) for choice in choices])
+    # A choice that is no text is not written in quotes.
+    return finding if isinstance(choices[0], str) else replace(finding, nearest=None)
+
+
+def _tag(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
+    key = str(context["discriminator"]).strip("'")
+    tag = value.get(key) if isinstance(value, dict) else value
+    return _not_a_choice((*location, key), tag, sorted(schema["discriminator"]["mapping"]))
+
+
+def _no_tag(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
+    key = str(context["discriminator"]).strip("'")
+    return Finding((*location, key), "missing key", key, at="missing")
+
+
+def _not_a_choice(location: Location, value: object, choices: Sequence[str]) -> Finding:
+    nearest = nearest_name(value, choices) if isinstance(value, str) else None
+    return Finding(location, f"not one of {', '.join(choices)}", value, None if nearest is None else repr(nearest))
+
+
+_TRANSLATIONS: Final[dict[str, Callable[[Location, Mapping[str, Any], object, Mapping[str, Any]], Finding]]] = {
+    "missing": _missing,
+    "literal_error": _choice,
+    "union_tag_invalid": _tag,
+    "union_tag_not_found": _no_tag,
+}
+
+
+@cache
+def _root() -> Mapping[str, Any]:
+    return deployment_schema()
+
+
+def _follow(path: Sequence[str | int]) -> tuple[Location, Mapping[str, Any], bool]:
+    """The location in the data of a path through the models, its schema, and whether the key there is meant.
+
+    Of a key that is meant, the schema is that of keys.
+    """
+    location: list[str | int] = []
+    keys: Mapping[str, Any] = {}
+    schema = _resolve(_root())
+    for step in path:
+        if step == "[key]":
+            return tuple(location), _resolve(keys), True
+        if "discriminator" in schema and step in schema["discriminator"]["mapping"]:
+            schema = _resolve({"$ref": schema["discriminator"]["mapping"][step]})
+            continue
+        location.append(step)
+        keys = schema.get("propertyNames", {})
+        schema = _child(schema, step)
+    return tuple(location), schema, False
+
+
+def _child(schema: Mapping[str, Any], step: str | int) -> Mapping[str, Any]:
+    if isinstance(step, int):
+        several = schema.get("prefixItems", ())
+        found = several[step] if step < len(several) else schema.get("items", {})
+    else:
+        named, patterns = schema.get("properties", {}), schema.get("patternProperties", {})
+        found = named.get(step) or next(iter(patterns.values()), schema.get("additionalProperties"))
+    return _resolve(found if isinstance(found, dict) else {})
+
+
+def _resolve(schema: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The schema itself behind references, and behind `or null` and `or a list of them`."""
+    while True:
+        if "$ref" in schema:
+            schema = _root()["$defs"][schema["$ref"].removeprefix("#/$defs/")]
+        elif "anyOf" in schema:
+            inner = [s for s in schema["anyOf"] if _has_parts(s)]
+            schema = next(iter(inner or [s for s in schema["anyOf"] if s.get("type") != "null"]), {})
+        else:
+            return schema
+
+
+def _has_parts(schema: Mapping[str, Any]) -> bool:
+    return not schema.keys().isdisjoint({"$ref", "discriminator"}) or schema.get("type") in ("array", "object")

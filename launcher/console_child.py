@@ -1,0 +1,121 @@
+"""The console beside a run: a process that `up` starts and ends, and that may die without harm to the run.
+
+It is no process of the run: nobody waits for it, and nobody starts it again. It writes the addresses of its page into
+the run's folder, where only the owner can read them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from foosim.common.errors import BadValue, Failed, read_at
+from foosim.common.units import parse_offset_ns
+from foosim.launcher.processes import Launcher
+from foosim.runtime.run_folder import UNREADABLE, RunFolder
+
+CONSOLE: Final = "console"
+ADDRESSES: Final = "console.json"
+"""In the run's folder: the addresses of the page, and the line that says them."""
+LEAVE_S: Final = 3.0
+"""How long a console has to tell pages how the run has ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A page that is to show the run."""
+
+    open: bool = False
+    """Have the browser of this machine show it."""
+    second: Path | None = None
+    """The recording that follows the run."""
+    offset: str | None = None
+    """The recording's time at which the run has time 0."""
+
+    def options(self) -> list[str]:
+        """Return the options of the command that serves it."""
+        options = ["--open"] if self.open else []
+        if self.second is not None:
+            options += ["--second", str(self.second.absolute())]
+        return options if self.offset is None else [*options, f"--offset={self.offset}"]
+
+
+def page_of(console: bool, opens: bool, second: Path | None, offset: str | None, detached: bool) -> Page | None:
+    """Return the page that the options of `up` are for, None without one. Raises BadValue where they do not fit."""
+    if not (console or opens):
+        for option, value in (("--second", second), ("--offset", offset)):
+            if value is not None:
+                raise BadValue(f"{option} goes with --console", str(value))
+        return None
+    if detached:
+        raise BadValue("--console and --detach exclude each other; foosim-console shows a run in the background")
+    if offset is not None:
+        if second is None:
+            raise BadValue("--offset needs --second", offset)
+        read_at("--offset", parse_offset_ns, offset)
+    if second is not None and not second.is_file():
+        raise BadValue("--second: no such file", str(second))
+    return Page(opens, second, offset)
+
+
+class ConsoleChild:
+    """The console of one run."""
+
+    def __init__(self, folder: RunFolder, say: Callable[[str], None], page: Page | None) -> None:
+        self._folder, self._say, self._page = folder, say, page
+        self._launcher = Launcher(folder.name)
+        self._has_addresses = self._has_ended = False
+        """What was said of it."""
+
+    def start(self) -> None:
+        """Start it, if there is to be one: the run can be found by now."""
+        if self._page is None:
+            return
+        path = self._folder.path / ADDRESSES
+        path.unlink(missing_ok=True)
+        command = [
+            "foosim-console",
+            self._folder.name,
+            "--announce",
+            str(path),
+            *self._page.options(),
+        ]
+        try:
+            self._launcher.start(CONSOLE, command, self._folder.log(CONSOLE))
+        except Failed as failed:
+            self._say(f"{failed}; the run goes on without it")
+
+    def look(self) -> None:
+        """Say its addresses as soon as it has some, and how it ended when it has."""
+        child = self._launcher.children.get(CONSOLE)
+        if child is None or self._has_ended:
+            return
+        text = "" if self._has_addresses else self._addresses()
+        if text:
+            self._has_addresses = True
+            self._say(text)
+        if child.exit_code is not None:
+            self._has_ended = True
+            self._say(
+                f"console {child.ending}, and the run goes on; foosim-console {self._folder.name} starts another one; "
+                f"its log is {child.log}"
+            )
+
+    def __enter__(self) -> ConsoleChild:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """End it, once it has told its pages how the run has ended."""
+        self._launcher.stop(LEAVE_S)
+        self._launcher.close()
+        (self._folder.path / ADDRESSES).unlink(missing_ok=True)
+
+    def _addresses(self) -> str:
+        try:
+            return str(msgspec.json.decode((self._folder.path / ADDRESSES).read_bytes())["text"])
+        except UNREADABLE:
+            return ""

@@ -1,0 +1,1 @@
+"""Examines whether a deployment can run, here and on its hosts."""

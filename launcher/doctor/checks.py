@@ -1,0 +1,378 @@
+"""Looks whether a deployment could run here, before it does: what is fine, what is not, and what to do.
+
+Each check is a function that gives findings about one subject, and a row of `CHECKS`; nothing is changed, nothing is
+started. Checks are about the machine they run on, which is the supervisor's or a host of the deployment: they run on
+each host, too, and their findings come home.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.metadata
+import os
+import platform
+import shutil
+import socket
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, Literal
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from packaging.requirements import Requirement
+
+from foosim.client.class_check import player_findings
+from foosim.common import limits, wall_clock
+from foosim.common.addresses import Address, check_listen
+from foosim.common.errors import Refused, describe
+from foosim.deployment.schema import Deployment, places
+from foosim.launcher.hosts.install import SYSTEM_FOLDER, USER_FOLDER
+from foosim.launcher.hosts.port_check import REMEDIES, listen
+from foosim.launcher.hosts.ssh import unit_name
+from foosim.launcher.hosts.systemd_units import units_of
+from foosim.launcher.new_capture import place_of
+from foosim.launcher.pki.hosts import identities_on, passwords_of
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.fingerprint import is_compiled, library_fingerprint
+from foosim.runtime.run_folder import hosted_folder, runs_folder
+from foosim.runtime.transport.certificate_files import (
+    check_certificate,
+    check_key,
+    hosts_of,
+    read_ca,
+    read_certificate,
+)
+from foosim.runtime.transport.certificate_folder import (
+    CA_FILE,
+    CA_KEY_FILE,
+    KEY_SUFFIX,
+    PASSWORD_SUFFIX,
+    CertificateError,
+)
+from foosim.runtime.transport.certificates import certificate_path, key_path, load_credentials, read_password
+
+State = Literal["fine", "warning", "problem"]
+
+HERE: Final = "here"
+TIME_ERROR: Final = 5
+"""What `adjtimex` returns of a clock that nothing keeps in time."""
+PYTHON_TESTED: Final = (3, 11)
+IMPORT_S: Final = 20.0
+"""How long the players' modules may take: half of what a host may take for all its answers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at, on one host. `remedy` says what to do; it is empty when all is fine."""
+
+    check: str
+    subject: str
+    state: State
+    text: str
+    remedy: str = ""
+    host: str = HERE
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What is to be run: the deployment, where it would listen, and its certificates if any."""
+
+    deployment: Deployment
+    listen: str
+    insecure: bool = False
+    pki: Path | None = None
+    captures: Path = Path("captures")
+    host: str | None = None
+    """Which host of the deployment this machine is; None is the supervisor's."""
+    ca: str = ""
+    """On a host: the fingerprint of the root that the run has; empty for a run without certificates."""
+
+    @property
+    def is_there(self) -> bool:
+        return self.host is not None
+
+    @property
+    def address(self) -> Address:
+        """Where the supervisor would listen."""
+        return check_listen(self.listen, self.insecure, 2, self.pki is not None or bool(self.ca))
+
+    @property
+    def radio(self) -> Address:
+        """Where the vHub would."""
+        address, place = self.address.next_port(), places(self.deployment).get(VHUB)
+        return address if place is None else replace(address, host=self.deployment.hosts[place].address)
+
+    @property
+    def has_vhub(self) -> bool:
+        """Whether the vHub is to run on this machine."""
+        return places(self.deployment).get(VHUB) == self.host
+
+    def issued(self, remedy: str) -> str:
+        """Return a remedy that is carried out where certificates are issued, which a host is not."""
+        return f"{remedy}, then foosim-pki send DIR {self.host} FILE" if self.is_there else remedy
+
+
+def examine(case: Case) -> list[Finding]:
+    """Return the findings of all checks on this machine, in the order of the checks."""
+    return [Finding(name, *said, host=case.host or HERE) for name, check in CHECKS.items() for said in check(case)]
+
+
+def is_well(findings: Iterable[Finding]) -> bool:
+    """Whether nothing stands in the way; warnings do not."""
+    return all(finding.state != "problem" for finding in findings)
+
+
+_Said = tuple[str, State, str, str]
+"""Subject, state, text, remedy."""
+
+
+# --- versions --------------------------------------------------------------------------------------------------------
+
+
+def _versions(case: Case) -> Iterator[_Said]:
+    """foosim, Python and each library against what this foosim asks for; whether the hot path is compiled."""
+    yield "foosim", "fine", f"{importlib.metadata.version('foosim')}, protocol {limits.PROTOCOL_VERSION}", ""
+    python = platform.python_version()
+    if sys.version_info[:2] == PYTHON_TESTED:
+        yield "python", "fine", python, ""
+    else:
+        tested = ".".join(map(str, PYTHON_TESTED))
+        yield "python", "warning", f"{python}; foosim is tested with {tested}", f"install Python {tested}"
+    slower = "interpreted: the same bits, more slowly; installed by pip, where there is a C compiler, it is compiled"
+    yield "hot path", "fine", "compiled" if is_compiled() else slower, ""
+    for line in importlib.metadata.requires("foosim") or ():
+        wanted = Requirement(line)
+        if wanted.marker is None or wanted.marker.evaluate({"extra": ""}):
+            yield _library(wanted)
+
+
+def _library(wanted: Requirement) -> _Said:
+    try:
+        found = importlib.metadata.version(wanted.name)
+    except importlib.metadata.PackageNotFoundError:
+        return wanted.name, "problem", "not installed", f"pip install '{wanted}'"
+    if not wanted.specifier.contains(found, prereleases=True):
+        return wanted.name, "problem", f"{found} is not {wanted.specifier}", f"pip install '{wanted}'"
+    return wanted.name, "fine", found, ""
+
+
+def _arithmetic(case: Case) -> Iterator[_Said]:
+    """Nodes whose fingerprints differ are refused, unless the deployment says `mixed_cpu: true`."""
+    yield "fingerprint", "fine", f"{library_fingerprint().hex()[:16]} on {platform.machine()}", ""
+
+
+# --- certificates ----------------------------------------------------------------------------------------------------
+
+
+def _certificates(case: Case) -> Iterator[_Said]:
+    """The certificate or password of everybody here: there, of this root, its own key, valid, for the right host."""
+    folder = case.pki
+    if folder is None and case.ca:
+        remedy = (
+            f"say in hosts.{case.host}.pki in which folder they are to be, then foosim-pki send DIR {case.host} FILE"
+        )
+        yield "folder", "problem", "the deployment does not say where they are on this host", remedy
+        return
+    if folder is None:
+        yield "folder", "fine", "none: only this machine can take part, or whoever reaches it with --insecure", ""
+        return
+    try:
+        ca = read_ca(folder, wall_clock.now_utc())
+    except CertificateError as error:
+        remedy = f"foosim-pki send DIR {case.host} FILE" if case.is_there else f"foosim-pki init {folder}"
+        yield CA_FILE, "problem", error.what, remedy
+        return
+    if case.ca not in ("", fingerprint(ca)):
+        yield CA_FILE, "problem", "another root than the run's", f"foosim-pki send DIR {case.host} FILE"
+        return
+    yield CA_FILE, "fine", "", ""
+    if (folder / CA_KEY_FILE).exists():
+        remedy = "remove it there" if case.is_there else "keep it where certificates are issued"
+        yield CA_KEY_FILE, "problem" if case.is_there else "warning", "is beside the certificates", remedy
+    here = identities_on(case.deployment, case.host)
+    passwords = passwords_of(case.deployment, here)
+    for who in dict.fromkeys([*here, *passwords]):
+        yield _password(folder, who, case) if who in passwords else _certificate(folder, who, case)
+    for path in sorted((*folder.glob(f"*{KEY_SUFFIX}"), *folder.glob(f"*{PASSWORD_SUFFIX}"))):
+        if path.stat().st_mode & 0o077:
+            yield path.name, "problem", "can be read by others", f"chmod 600 {path}"
+
+
+def fingerprint(certificate: x509.Certificate) -> str:
+    """Return what tells a certificate from all others, in hex."""
+    return certificate.fingerprint(hashes.SHA256()).hex()
+
+
+def _password(folder: Path, who: str, case: Case) -> _Said:
+    """Look at a client's password, and that it has no certificate beside it."""
+    try:
+        read_password(folder / f"{who}{PASSWORD_SUFFIX}")
+    except CertificateError as error:
+        return who, "problem", error.what, case.issued(f"foosim-pki issue {_folder(case)} {who} --password")
+    if certificate_path(folder, who).exists():
+        return who, "problem", "has a password and a certificate, which this run does not take", "remove its .pem"
+    return who, "fine", "has a password", ""
+
+
+def _folder(case: Case) -> Path:
+    """Return the folder in which certificates are issued, as a remedy names it."""
+    assert case.pki is not None
+    return Path("DIR") if case.is_there else case.pki
+
+
+def _certificate(folder: Path, who: str, case: Case) -> _Said:
+    """Look at the certificate that one of the run shows."""
+    path, issuing = certificate_path(folder, who), _folder(case)
+    if not path.exists():
+        remedy = f"foosim-pki send DIR {case.host} FILE" if case.is_there else f"foosim-pki issue {issuing} {who}"
+        return who, "problem", "no certificate", remedy
+    try:
+        now = wall_clock.now_utc()
+        found = read_certificate(path)
+        check_certificate(path, found, who, read_ca(folder, now), now)
+        check_key(key_path(folder, who), found)
+        credentials = load_credentials(folder, who)
+    except CertificateError as error:
+        remedy = f"foosim-pki renew {issuing} {who}, or remove both files and issue anew"
+        return who, "problem", error.what, case.issued(remedy)
+    assert credentials is not None
+    address = {SUPERVISOR: case.address, VHUB: case.radio}.get(who)
+    hosts = [host.lower() for host in hosts_of(found)]
+    if address is not None and not address.is_wildcard and address.host.strip("[]").lower() not in hosts:
+        remedy = case.issued(f"foosim-pki renew {issuing} {who} --host {address.host}")
+        return who, "problem", f"is for {', '.join(hosts)}, not for {address.host}", remedy
+    soon = credentials.ends_soon(wall_clock.now_utc())
+    if soon:
+        return who, "warning", soon, case.issued(f"foosim-pki renew {issuing} {who}")
+    return who, "fine", f"until {found.not_valid_after_utc:%Y-%m-%d}", ""
+
+
+# --- this machine ----------------------------------------------------------------------------------------------------
+
+
+def _ports(case: Case) -> Iterator[_Said]:
+    """Whether those who listen on this machine can, where they are asked to."""
+    if not case.is_there:
+        yield _port("simulation plane", case.address)
+    if case.has_vhub:
+        yield _port("radio plane", case.radio)
+
+
+def _port(plane: str, address: Address) -> _Said:
+    try:
+        listen(address).close()
+    except socket.gaierror as error:
+        return plane, "problem", f"{address}: no such host, {error.strerror}", "give a name or address of this machine"
+    except OSError as error:
+        return plane, "problem", f"{address}: {error.strerror}", REMEDIES.get(error.errno or 0, "take another address")
+    return plane, "fine", f"{address} is free" if address.port else f"{address}: the system chooses a free port", ""
+
+
+def _clock(case: Case) -> Iterator[_Said]:
+    """Clocks of machines need not agree, but certificates and file names go by them."""
+    now = wall_clock.now_utc()
+    text = f"{now:%Y-%m-%d %H:%M:%S} UTC"
+    if _clock_state() == TIME_ERROR:
+        remedy = "start a time service (chrony, systemd-timesyncd); the dates of certificates go by this clock"
+        yield "clock", "warning", f"{text}, and nothing keeps it in time", remedy
+    else:
+        yield "clock", "fine", text, ""
+
+
+def _clock_state() -> int:
+    """Ask the kernel how it keeps time; TIME_ERROR where it does not, 0 where it cannot be asked."""
+    if sys.platform != "linux":
+        return 0
+    nothing_to_set = ctypes.create_string_buffer(512)
+    return int(ctypes.CDLL(None).adjtimex(nothing_to_set))
+
+
+def _disk(case: Case) -> Iterator[_Said]:
+    """Room and the right to write where runs keep journals and captures go."""
+    here = {"runs": runs_folder(), "captures": case.captures}
+    for subject, folder in ({"runs": hosted_folder()} if case.is_there else here).items():
+        place = place_of(case.deployment.capture, folder.absolute(), is_capture=subject == "captures")
+        text = f"{place.there}: {place.room} (capture.reserve)"
+        if not os.access(place.there, os.W_OK | os.X_OK):
+            remedy = "let this user write there, or start elsewhere"
+            yield subject, "problem", f"{place.there} cannot be written", remedy
+        elif place.is_refused:
+            yield subject, "problem", text, f"make room, or lower the reserve: at it {place.then}, and none is started"
+        elif place.is_low:
+            yield subject, "warning", text, f"make room: at the reserve {place.then}"
+        else:
+            yield subject, "fine", text, ""
+
+
+def _commands(case: Case) -> Iterator[_Said]:
+    """The processes that `up` starts."""
+    for name in ("foosim-supervisor", "foosim-vhub", "foosim-node", "foosim-player"):
+        beside = Path(sys.executable).with_name(name)
+        found = str(beside) if beside.is_file() else shutil.which(name)
+        if found is None:
+            yield name, "problem", "not found beside this Python or on PATH", "install foosim in this environment"
+        else:
+            yield name, "fine", found, ""
+
+
+def is_users_systemd() -> bool:
+    """Whether this user's units are those of a user's own systemd."""
+    return os.geteuid() != 0
+
+
+def _units(case: Case) -> Iterator[_Said]:
+    """On a host: the units of the nodes that systemd is to run there, as they would be written now."""
+    nodes, own = case.deployment.nodes, case.host
+    if own is None:
+        return
+    wanted = [name for name, host in places(case.deployment).items() if host == own and name in nodes]
+    wanted = [name for name in wanted if nodes[name].launch == "systemd"]
+    if not wanted:
+        return
+    secured = " --pki DIR" if case.ca else ""
+    remedy = f"foosim-supervisor install {case.host} FILE{secured}, with the run's --listen and --set"
+    is_users = is_users_systemd()
+    folder = Path(os.path.expandvars(USER_FOLDER if is_users else SYSTEM_FOLDER))
+    try:
+        units = units_of(case.deployment, own, case.address, is_users)
+    except Refused as refused:
+        yield "units", "problem", refused.what, remedy
+        return
+    for name in map(unit_name, wanted):
+        try:
+            is_same = (folder / name).read_text() == units[name]
+        except OSError:
+            yield name, "problem", f"not in {folder}", remedy
+            continue
+        yield (name, "fine", "", "") if is_same else (name, "warning", "is not as it would be written now", remedy)
+
+
+def _players(case: Case) -> Iterator[_Said]:
+    """Whether the classes of the players that are to run on this machine can be imported here."""
+    deployment, elsewhere = case.deployment, places(case.deployment)
+    here = [name for name in sorted(deployment.players) if elsewhere.get(name) == case.host]
+    wrong = {finding.location[1]: finding for finding in player_findings(deployment, here, IMPORT_S)}
+    for name in here:
+        found, path = wrong.get(name), deployment.players[name].class_
+        if found is None:
+            yield name, "fine", path, ""
+            continue
+        text = describe(found.what, path, found.nearest)
+        where = f"as ssh to {case.host} has it: in a file that its shell reads" if case.is_there else "of `up`"
+        yield name, "problem", text, f"correct players.{name}.class, or put the module's folder on PYTHONPATH {where}"
+
+
+CHECKS: Final[dict[str, Callable[[Case], Iterator[_Said]]]] = {
+    "versions": _versions,
+    "arithmetic": _arithmetic,
+    "commands": _commands,
+    "players": _players,
+    "certificates": _certificates,
+    "ports": _ports,
+    "clock": _clock,
+    "disk": _disk,
+    "units": _units,
+}
+"""Every check by its name, in the order in which they are shown."""

@@ -1,0 +1,61 @@
+"""Whether a machine reaches a port of another one: a listener that answers nothing, a connection that says nothing.
+
+That a port is closed by a firewall is known only by trying, with something that listens there.
+"""
+
+from __future__ import annotations
+
+import errno
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from foosim.common.addresses import Address
+
+REACH_S: Final = 3.0
+BACKLOG: Final = 64
+REMEDIES: Final = {
+    errno.EADDRINUSE: "end what listens there, or take another port",
+    errno.EADDRNOTAVAIL: "give an address of this machine, see `ip address`",
+    errno.EACCES: "take a port above 1023",
+}
+
+
+def listen(address: Address) -> socket.socket:
+    """Return a socket that listens at an address. Raises OSError."""
+    family, kind, number, _, place = socket.getaddrinfo(
+        address.host.strip("[]"), address.port, type=socket.SOCK_STREAM
+    )[0]
+    listener = socket.socket(family, kind, number)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(place)
+        listener.listen(BACKLOG)  # the system takes connections; nobody else does
+    except OSError:
+        listener.close()
+        raise
+    return listener
+
+
+@contextmanager
+def listening(address: Address) -> Iterator[None]:
+    """Have an address listened at, by us where nobody does so already and we can."""
+    try:
+        listener = listen(address)
+    except OSError:
+        yield
+        return
+    with listener:
+        yield
+
+
+def why_not_reached(address: Address, timeout_s: float = REACH_S) -> str:
+    """Return why nothing can be connected to at an address, an empty text when it can."""
+    try:
+        with socket.create_connection((address.host.strip("[]"), address.port), timeout_s):
+            return ""
+    except TimeoutError:
+        return f"no answer within {timeout_s:g} s"
+    except OSError as error:
+        return error.strerror or str(error)

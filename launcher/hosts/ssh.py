@@ -1,0 +1,128 @@
+"""How a process is started on another machine: the command line of the system's ssh, and what its end means.
+
+`ssh` is the user's own: keys, agents, jump hosts and ~/.ssh/config are as they are; it never asks for anything. On the
+other side `foosim-guard` (`guard`) starts the process and ends it when the connection does. Pure: `launcher` runs the
+commands, `hosts` fetches what a run left on a machine.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Final
+
+from foosim.common.errors import BadValue
+from foosim.common.names import nearest_name
+from foosim.deployment.hosts import Host
+from foosim.deployment.schema import Deployment, places
+from foosim.runtime.children import BY_SIGNAL, GUARD, OTHER_VERSION
+
+SSH_FAILED: Final = 255
+NOT_FOUND: Final = 127
+NOT_RUNNABLE: Final = 126
+OWN_BUS: Final = "export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-/run/user/$(id -u)}"
+"""Where a user's own systemd is found; a login by ssh does not always say."""
+CAPTURE: Final = "capture.mcap"
+"""What a vHub on another machine calls its capture, in the run's folder there."""
+
+# A user's option of the same name comes first and holds; that nothing is asked for always does.
+_ALWAYS: Final = ("-T", "-o", "BatchMode=yes")
+_DEFAULTS: Final = ("ConnectTimeout=10", "ServerAliveInterval=5", "ServerAliveCountMax=3")
+
+# What OpenSSH says, and what it means: the first that fits.
+_SAID: Final[Sequence[tuple[str, str]]] = (
+    ("Permission denied", "it refused the key: `{ssh}` has to work without a password (ssh-copy-id, or an agent)"),
+    ("Host key verification failed", "its host key is not known: type `{ssh}` once, and compare the key"),
+    ("REMOTE HOST IDENTIFICATION HAS CHANGED", "its host key has changed: find out why before anything else"),
+    ("Could not resolve hostname", "its name is not known: correct hosts.{host}.address or hosts.{host}.ssh"),
+    ("Bad configuration option", "ssh does not know an option: correct hosts.{host}.ssh_options"),
+    ("unknown option", "ssh does not know an option: correct hosts.{host}.ssh_options"),
+)
+_AWAY: Final = (
+    "Connection refused", "No route to host", "Network is unreachable", "timed out", "Connection closed",
+    "closed by remote host", "Connection reset", "Broken pipe", "not responding", "Invalid argument",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Remote:
+    """A machine by its name in the deployment, with what the deployment says of it."""
+
+    name: str
+    host: Host
+
+    def ssh(self, words: Sequence[str]) -> list[str]:
+        """Return the command line that has the machine's login shell run these words."""
+        defaults = [part for option in _DEFAULTS for part in ("-o", option)]
+        return ["ssh", *_ALWAYS, *self.host.ssh_options, *defaults, self.host.destination, shlex.join(words)]
+
+    @property
+    def typed(self) -> str:
+        """How a person connects to the machine."""
+        return shlex.join(["ssh", *self.host.ssh_options, self.host.destination])
+
+    def path(self, command: str) -> str:
+        """Return one of foosim's commands as it is called there."""
+        return command if self.host.commands is None else f"{self.host.commands.rstrip('/')}/{command}"
+
+    def pki_arguments(self) -> list[str]:
+        """Return where the certificates are there, as a process of a run with certificates is told it."""
+        return [] if self.host.pki is None else ["--pki", self.host.pki]
+
+    def guarded(self, run: str, name: str, command: Sequence[str]) -> list[str]:
+        """Return the command line that starts a process of a run there, and ends it when the connection ends."""
+        guard = [self.path(GUARD), "run", "--version-of-launcher", version("foosim"), run, name, *command]
+        return self.ssh(guard)
+
+    def unit_started(self, name: str) -> list[str]:
+        """Return the command line that starts a node's unit: the system's for root, else the user's own."""
+        script = f'if [ "$(id -u)" = 0 ]; then user=; else user=--user; {OWN_BUS}; fi'
+        return self.ssh(["sh", "-c", f"{script}; exec systemctl $user --no-block start {unit_name(name)}"])
+
+    def why(self, code: int, lines: Sequence[str]) -> str:
+        """Return why ssh, or what it ran, ended with this code, for people; `lines` are the last ones of its log."""
+        if code == NOT_FOUND:
+            text = f"there is no {self.path(GUARD)} on host {self.name}"
+            return f"{text}: install foosim there, and say in hosts.{self.name}.commands in which folder"
+        if code == NOT_RUNNABLE:
+            return f"{self.path(GUARD)} cannot be run on host {self.name}"
+        if code == OTHER_VERSION:
+            found = next((line for line in reversed(lines) if line.startswith(GUARD)), "another version of foosim")
+            return f"host {self.name}: {found.removeprefix(GUARD + ': ')}; install {version('foosim')} there"
+        if code > BY_SIGNAL and code != SSH_FAILED:
+            return f"was killed by signal {code - BY_SIGNAL} on host {self.name}"
+        if code != SSH_FAILED:
+            return f"ended with exit code {code} on host {self.name}"
+        where = f"host {self.name} ({self.host.destination})"
+        for said, meaning in _SAID:
+            if any(said in line for line in lines):
+                return f"{where}: {meaning.format(host=self.name, ssh=self.typed)}"
+        if self.is_away(code, lines):
+            said_last = next(line for line in reversed(lines) if any(said in line for said in _AWAY))
+            return f"{where} cannot be reached: {said_last.strip()}"
+        return f"{where}: the connection ended, or the guard there was killed"
+
+    @staticmethod
+    def is_away(code: int, lines: Sequence[str]) -> bool:
+        """Whether it was the network: the machine may come back by itself."""
+        return code == SSH_FAILED and any(said in line for line in lines for said in _AWAY)
+
+
+def unit_name(node: str) -> str:
+    """Return the name of the unit of systemd that runs a node."""
+    return f"foosim-{node}.service"
+
+
+def remote_of(deployment: Deployment, host: str) -> Remote:
+    """Return a host by its name. Raises BadValue, with the hosts that there are, for a name that none has."""
+    if host not in deployment.hosts:
+        declared = ", ".join(sorted(deployment.hosts)) or "none"
+        raise BadValue(f"unknown host (declared: {declared})", host, nearest_name(host, deployment.hosts))
+    return Remote(host, deployment.hosts[host])
+
+
+def remotes(deployment: Deployment) -> dict[str, Remote]:
+    """Return the machine of each process that runs on one of the deployment's hosts, by the process's name."""
+    return {name: Remote(host, deployment.hosts[host]) for name, host in places(deployment).items()}

@@ -1,0 +1,125 @@
+"""How a run ended, as one JSON object, whoever is left to say it.
+
+The supervisor writes the result of a run that it ends. Where it did not, the launcher says what it knows: the last
+status that it was shown, why the run ended, and what is in the capture's file. What is not known is null.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from foosim.capture.foxglove import LOG
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.parts import first_there, has_end, is_complete, parts_at
+from foosim.capture.reader import Scan
+from foosim.capture.rows import EPOCHS, PACKETS, TICK
+from foosim.deployment.schema import Deployment
+from foosim.launcher.display import recording_text
+from foosim.runtime.run_folder import RunFolder, open_run, run_exists
+from foosim.supervisor.status import NO_PACKETS, NOT_RECORDED, UNFINISHED
+
+_UNKNOWN: Final[Mapping[str, Any]] = {
+    **dict.fromkeys(("run", "world", "seed", "ticks", "first_tick", "tick_ns", "rtf", "lag_ms", "lateness_ms")),
+    "digest": None,
+    "packets": NO_PACKETS,
+    "recording": NOT_RECORDED,
+    "from": None,
+    "nodes": {},
+    "recoveries": [],
+    "moves": 0,
+    "handovers": 0,
+    "score": None,
+    "capture": None,
+    "reason": None,
+    "failed": True,
+}
+
+
+def result_without_supervisor(known: Mapping[str, Any], reason: str) -> dict[str, Any]:
+    """Return the result of a run of which no supervisor says how it ended; `known` is what was seen of it last."""
+    seen = {key: known[key] for key in _UNKNOWN if key in known}
+    return {**_UNKNOWN, **seen, "reason": reason, "failed": True}
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a run ended: the JSON of its result, and what people should know."""
+
+    result: dict[str, Any]
+    failed: bool
+    lines: tuple[str, ...]
+
+
+def ended_outcome(folder: RunFolder) -> Outcome:
+    """Return how a run ended that has a result."""
+    ended, launch = folder.result(), folder.launch()
+    assert ended is not None, f"run {folder.name} has not ended"
+    capture = None if launch is None or not launch.capture else Path(launch.capture)
+    result = ended if capture is None else with_capture(ended, capture)
+    lines = f"run {folder.name} has ended: {result['reason']}", *capture_lines(capture, result)
+    return Outcome(result, bool(result["failed"]), lines)
+
+
+def refused_result(resumed: str | None, run: str | None, reason: str) -> dict[str, Any]:
+    """Return the result of what was not begun: of a run that was to be resumed, with its capture, or of a new one."""
+    if resumed is None or not run_exists(resumed):
+        return result_without_supervisor({"run": resumed or run}, reason)
+    launch = open_run(resumed).launch()
+    capture = None if launch is None or not launch.capture else Path(launch.capture)
+    return with_capture(result_without_supervisor({"run": resumed}, reason), capture)
+
+
+def detached_outcome(folder: RunFolder, deployment: Deployment, capture: Path | None) -> Outcome:
+    """Return what is known of a run that was left running."""
+    known = {"run": folder.name, **plan_facts(deployment), "capture": None if capture is None else str(capture)}
+    name = folder.name
+    line = f"run {name} is up; foosim-supervisor status --run {name} shows it, down --run {name} ends it"
+    return Outcome({**_UNKNOWN, **known, "failed": False}, False, (line,))
+
+
+def capture_lines(capture: Path | None, result: dict[str, Any] | None, journals: Path | None = None) -> list[str]:
+    """Say where a capture is, whether it has its end, and what the result says to be wrong with it.
+
+    Of a run that has ended also how one without an end is completed from `journals`.
+    """
+    files = {} if capture is None else parts_at(capture)
+    if not files:
+        return []
+    wrong = "" if result is None else recording_text(result)
+    count = f", {len(files)} files" if len(files) > 1 else ""
+    there, is_finished = [*files.values()], capture is not None and is_complete(capture)
+    lines = [f"capture {there[0]}{count}" if is_finished else f"capture {there[0]}{count} (unfinished)"]
+    if not is_finished and result is not None and journals is not None:
+        lines.append(f"complete it with: foosim-replay recover {there[0]} --journals {journals}")
+    return [*lines, wrong] if wrong else lines
+
+
+def plan_facts(deployment: Deployment) -> dict[str, Any]:
+    """Return what is known of a run before it begins."""
+    return {"world": deployment.world, "seed": deployment.seed, "tick_ns": deployment.tick_ns}
+
+
+def with_capture(result: Mapping[str, Any], capture: Path | None) -> dict[str, Any]:
+    """Return a result that names the capture's first file where there is one, with the final count of its rows."""
+    files = {} if capture is None else parts_at(capture)
+    if capture is None or not files:
+        return {**result, "capture": None}
+    named = {**result, "capture": str(first_there(capture))}
+    if result["recording"]["state"] not in (UNFINISHED, NOT_RECORDED["state"]):
+        return named
+    try:
+        rows = _rows_in(first_there(capture))
+        state = "on" if has_end(files[max(files)]) else UNFINISHED
+    except CaptureError as error:
+        return {**named, "recording": {**result["recording"], "state": UNFINISHED, "problem": str(error)}}
+    recording = {**result["recording"], "state": state, "written": rows}
+    recording["offered"] = max(recording["offered"], rows + recording["refused"])
+    return {**named, "recording": recording}
+
+
+def _rows_in(path: Path) -> int:
+    """Return how many ticks, packets, epochs and lines a capture has: what its writer counts."""
+    return sum(1 for _ in Scan(path).messages(frozenset({TICK, PACKETS, EPOCHS, LOG})))

@@ -1,0 +1,338 @@
+"""Makes certificates: a root, and one for each process, client and operator under it.
+
+Elliptic curve P-256. The root lasts ten years and may issue no further authority; what it issues lasts 90 days, names
+one identity, and serves both sides of a connection, since every process connects and two listen. Files are never
+overwritten but by `renew`, and keys can be read by their owner only.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import socket
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Final
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from foosim.common import wall_clock
+from foosim.common.errors import BadValue, Refused
+from foosim.protocol.identity import parse_identity
+from foosim.runtime.transport.certificate_files import (
+    check_certificate,
+    check_key,
+    common_name,
+    hosts_of,
+    read_ca,
+    read_certificate,
+    read_key,
+)
+from foosim.runtime.transport.certificate_folder import CA_FILE, CA_KEY_FILE, PASSWORD_SUFFIX, CertificateError
+from foosim.runtime.transport.certificates import certificate_path, check_password, identities_in, key_path
+
+ROOT_DAYS: Final = 3650
+LEAF_DAYS: Final = 90
+LEAF_DAYS_MAX: Final = 825
+"""More than this some libraries refuse."""
+SLACK: Final = timedelta(hours=1)
+"""How far clocks of machines may be behind: from so long before now a certificate is valid."""
+LOCAL_HOSTS: Final = ("localhost", "127.0.0.1", "::1")
+HOST_LENGTH_MAX: Final = 253
+
+
+class FileExists(Refused):
+    """A certificate, key or password that is there already and is not overwritten."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """One certificate, for people and scripts. `problem` is empty when its holder would be let in."""
+
+    identity: str
+    path: str
+    begins: datetime
+    ends: datetime
+    hosts: tuple[str, ...]
+    fingerprint: str
+    problem: str
+
+    def days_left(self, now: datetime) -> float:
+        return (self.ends - now) / timedelta(days=1)
+
+
+def init(folder: Path, name: str = "foosim") -> Path:
+    """Make the folder with a root, and return the root's path. Raises FileExists, BadValue."""
+    if not name.isprintable() or not 0 < len(name) <= 64:
+        raise BadValue("not a name for a root (1 to 64 printable characters)", name)
+    _make_folder(folder)
+    _refuse_existing(folder / CA_FILE, folder / CA_KEY_FILE)
+    key = ec.generate_private_key(ec.SECP256R1())
+    subject = _subject(name)
+    root = (
+        _builder(subject, subject, key.public_key(), ROOT_DAYS)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(_usage(is_ca=True), critical=True)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    _write(folder / CA_KEY_FILE, _key_bytes(key))
+    _write(folder / CA_FILE, root.public_bytes(serialization.Encoding.PEM))
+    return folder / CA_FILE
+
+
+def issue(folder: Path, identities: Sequence[str], hosts: Sequence[str] = (), days: int = LEAF_DAYS) -> list[Path]:
+    """Issue a certificate and key to each identity; all of them, or none. Raises BadValue, CertificateError.
+
+    `hosts`: names and addresses by which others reach it, beside those of this machine.
+    """
+    names = _alternatives(hosts)
+    days = _checked_days(days)
+    for identity in identities:
+        parse_identity(identity)
+    _refuse_existing(*(path(folder, identity) for identity in identities for path in (certificate_path, key_path)))
+    root, root_key = _authority(folder)
+    made = []
+    for identity in identities:
+        key = ec.generate_private_key(ec.SECP256R1())
+        own = [x509.DNSName(identity), *names]
+        _write(key_path(folder, identity), _key_bytes(key))
+        certificate = _leaf(identity, key.public_key(), own, days, root, root_key)
+        _write(certificate_path(folder, identity), certificate.public_bytes(serialization.Encoding.PEM))
+        made.append(certificate_path(folder, identity))
+    return made
+
+
+def issue_password(folder: Path, identity: str, password: str = "") -> str:
+    """Give a client a password, by default a random one, and return it. Raises BadValue, FileExists."""
+    role, _ = parse_identity(identity)
+    if role != "client":
+        raise BadValue("only clients have passwords (client.NAME)", identity)
+    password = password or base64.urlsafe_b64encode(os.urandom(24)).decode()
+    check_password("password", password)
+    path = folder / f"{identity}{PASSWORD_SUFFIX}"
+    _refuse_existing(path)
+    _write(path, password.encode() + b"\n")
+    return password
+
+
+def issue_passwords(folder: Path, identities: Sequence[str]) -> list[Path]:
+    """Give each client that has none a random password, and return where these are."""
+    paths = {identity: folder / f"{identity}{PASSWORD_SUFFIX}" for identity in identities}
+    made = [identity for identity, path in paths.items() if not path.exists()]
+    for identity in made:
+        issue_password(folder, identity)
+    return [paths[identity] for identity in made]
+
+
+def renew(
+    folder: Path, identities: Iterable[str] = (), within_days: int | None = None, hosts: Sequence[str] = ()
+) -> list[Path]:
+    """Issue certificates anew, for the same keys, names and lengths of time; by default all in the folder.
+
+    `within_days`: only those that end within so many days. `hosts`: further ones, by which others reach the holder.
+    A process takes the new one when it is started again. Raises CertificateError, BadValue.
+    """
+    root, root_key = _authority(folder)
+    now = wall_clock.now_utc()
+    further = [_alternative(host) for host in hosts]
+    made = []
+    for identity in list(identities) or identities_in(folder):
+        parse_identity(identity)
+        path = certificate_path(folder, identity)
+        if not path.exists():
+            known = ", ".join(identities_in(folder)) or "none"
+            raise CertificateError(f"{folder} has no certificate of {identity}; it has: {known}")
+        old = read_certificate(path)
+        check_key(key_path(folder, identity), old)
+        if within_days is not None and old.not_valid_after_utc - now > timedelta(days=within_days):
+            continue
+        days = max(1, (old.not_valid_after_utc - old.not_valid_before_utc).days)
+        alternatives = old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+        key = old.public_key()
+        assert isinstance(key, ec.EllipticCurvePublicKey), "issued here"
+        names = list(dict.fromkeys([*alternatives, *further]))
+        certificate = _leaf(identity, key, names, days, root, root_key)
+        fresh = path.with_name(f"{path.name}.new")
+        fresh.unlink(missing_ok=True)
+        _write(fresh, certificate.public_bytes(serialization.Encoding.PEM))
+        fresh.replace(path)
+        made.append(path)
+    return made
+
+
+def show_folder(folder: Path) -> list[Shown]:
+    """Return what the folder has: the root first, then by identity. Raises CertificateError when there is no root."""
+    now = wall_clock.now_utc()
+    ca = read_certificate(folder / CA_FILE)
+    shown = [_shown("", folder / CA_FILE, ca, _problem(lambda: read_ca(folder, now)))]
+    for identity in identities_in(folder):
+        path = certificate_path(folder, identity)
+        try:
+            found = read_certificate(path)
+        except CertificateError as error:
+            shown.append(Shown(identity, str(path), now, now, (), "", error.what))
+            continue
+
+        def check(identity: str = identity, path: Path = path, found: x509.Certificate = found) -> None:
+            check_certificate(path, found, identity, ca, now)
+            check_key(key_path(folder, identity), found)
+
+        shown.append(_shown(identity, path, found, _problem(check)))
+    return shown
+
+
+# --- inside ----------------------------------------------------------------------------------------------------------
+
+
+def _authority(folder: Path) -> tuple[x509.Certificate, ec.EllipticCurvePrivateKey]:
+    """Return the root and its key. Raises CertificateError."""
+    root = read_ca(folder, wall_clock.now_utc())
+    path = folder / CA_KEY_FILE
+    if not path.exists():
+        raise CertificateError(f"{folder} has no {CA_KEY_FILE}: issue and renew where the root's key is kept")
+    check_key(path, root)
+    key = read_key(path)
+    if not isinstance(key, ec.EllipticCurvePrivateKey):
+        raise CertificateError(f"{path}: not a key of an elliptic curve")
+    return root, key
+
+
+def _leaf(
+    identity: str,
+    key: ec.EllipticCurvePublicKey,
+    names: Sequence[x509.GeneralName],
+    days: int,
+    root: x509.Certificate,
+    root_key: ec.EllipticCurvePrivateKey,
+) -> x509.Certificate:
+    sides = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
+    return (
+        _builder(_subject(identity), root.subject, key, days)
+        .add_extension(x509.SubjectAlternativeName(names), critical=False)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(_usage(is_ca=False), critical=True)
+        .add_extension(x509.ExtendedKeyUsage(sides), critical=False)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key), critical=False)
+        .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(root_key.public_key()), critical=False)
+        .sign(root_key, hashes.SHA256())
+    )
+
+
+def _builder(
+    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePublicKey, days: int
+) -> x509.CertificateBuilder:
+    now = wall_clock.now_utc()
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(issuer)
+        .public_key(key)
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - SLACK)
+        .not_valid_after(now - SLACK + timedelta(days=days))
+    )
+
+
+def _subject(name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+
+
+def _usage(is_ca: bool) -> x509.KeyUsage:
+    return x509.KeyUsage(
+        digital_signature=not is_ca,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        key_cert_sign=is_ca,
+        crl_sign=is_ca,
+        encipher_only=False,
+        decipher_only=False,
+    )
+
+
+def _alternatives(hosts: Sequence[str]) -> list[x509.GeneralName]:
+    """Return the hosts, those of this machine first, as a certificate says them. Raises BadValue."""
+    return [_alternative(host) for host in dict.fromkeys([*LOCAL_HOSTS, *_own_names(), *hosts])]
+
+
+def _alternative(host: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ip_address(host))
+    except ValueError:
+        pass
+    labels = host.split(".")
+    if not host.isascii() or len(host) > HOST_LENGTH_MAX or not all(_is_label(label) for label in labels):
+        raise BadValue("not a host name or an IP address", host)
+    return x509.DNSName(host)
+
+
+def _is_label(label: str) -> bool:
+    return 0 < len(label) <= 63 and label.replace("-", "a").isalnum() and label[0] != "-" and label[-1] != "-"
+
+
+def _own_names() -> list[str]:
+    """Return this machine's name where others could use it."""
+    name = socket.gethostname().lower()
+    return [name] if name.isascii() and all(map(_is_label, name.split("."))) else []
+
+
+def _checked_days(days: int) -> int:
+    if not 1 <= days <= LEAF_DAYS_MAX:
+        raise BadValue(f"days of a certificate are from 1 to {LEAF_DAYS_MAX}", days)
+    return days
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise CertificateError(f"{folder}: cannot be made, {error.strerror}") from None
+
+
+def _refuse_existing(*paths: Path) -> None:
+    existing = [str(path) for path in paths if path.exists()]
+    if existing:
+        raise FileExists(f"exists already, and is not overwritten: {', '.join(existing)}")
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a new file that only its owner reads. Raises FileExists, CertificateError."""
+    try:
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+    except FileExistsError:
+        raise FileExists(f"exists already, and is not overwritten: {path}") from None
+    except OSError as error:
+        raise CertificateError(f"{path}: cannot be made, {error.strerror}") from None
+    with os.fdopen(file, "wb") as stream:
+        stream.write(content)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def _key_bytes(key: ec.EllipticCurvePrivateKey) -> bytes:
+    return key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    )
+
+
+def _problem(check: Callable[[], object]) -> str:
+    try:
+        check()
+    except CertificateError as error:
+        return error.what
+    return ""
+
+
+def _shown(identity: str, path: Path, found: x509.Certificate, problem: str) -> Shown:
+    fingerprint = found.fingerprint(hashes.SHA256()).hex()
+    begins, ends = found.not_valid_before_utc, found.not_valid_after_utc
+    hosts = tuple(host for host in hosts_of(found) if host != identity)
+    return Shown(identity or common_name(found), str(path), begins, ends, hosts, fingerprint, problem)

@@ -1,0 +1,87 @@
+"""What the processes on a host need of a folder of certificates, and how it comes there: through ssh.
+
+The root, and for each process that the deployment places there its own certificate and key, or its password; the vHub
+needs the passwords of all clients, to compare them. Nothing else is ever sent.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from foosim.common import wall_clock
+from foosim.common.errors import Failed
+from foosim.deployment.schema import Deployment, places
+from foosim.launcher.hosts.install import run_there
+from foosim.launcher.hosts.ssh import Remote
+from foosim.protocol import identity
+from foosim.protocol.channels import VHUB
+from foosim.runtime.transport.certificate_folder import CA_FILE, PASSWORD_SUFFIX, CertificateError
+from foosim.runtime.transport.certificates import certificate_path, key_path, load_credentials, read_password
+
+
+def identities_on(deployment: Deployment, host: str | None) -> list[str]:
+    """Return who of a run is on a host, in the order of `identities_of`; None: who is on none."""
+    where = places(deployment)
+    known = {VHUB: where.get(VHUB)}
+    known |= {identity.node(name): where.get(name) for name in deployment.nodes}
+    known |= {identity.client(name): where.get(name) for name in deployment.players}
+    return [who for who in identity.identities_of(deployment) if known.get(who) == host]
+
+
+def passwords_of(deployment: Deployment, identities: Sequence[str]) -> list[str]:
+    """Return whose passwords have to be where these identities are: their own, and all clients' where the vHub is."""
+    if deployment.access.radio != "password":
+        return []
+    clients = [who for who in identity.identities_of(deployment) if who.startswith("client.")]
+    return clients if VHUB in identities else [who for who in clients if who in identities]
+
+
+def files_for(deployment: Deployment, host: str) -> list[str]:
+    """Return the names of the files that a host needs, keys before their certificates. Raises Failed for none."""
+    identities = identities_on(deployment, host)
+    if not identities:
+        raise Failed(f"nothing is placed on host {host}")
+    passwords = passwords_of(deployment, identities)
+    names = [CA_FILE]
+    for who in identities:
+        if who not in passwords:
+            names += [key_path(Path(), who).name, certificate_path(Path(), who).name]
+    return [*names, *(f"{who}{PASSWORD_SUFFIX}" for who in passwords)]
+
+
+def send_files(remote: Remote, folder: Path, names: Sequence[str]) -> list[str]:
+    """Bring files of a folder of certificates into that of a host, and return their paths there.
+
+    All are checked before the first is sent: raises CertificateError for one with which nobody would be let in, Failed
+    when the host names no folder or cannot be reached.
+    """
+    if remote.host.pki is None:
+        raise Failed(f"host {remote.name} names no folder for certificates: say it in hosts.{remote.name}.pki")
+    contents = {name: _checked(folder, name) for name in names}
+    paths = []
+    for name, content in contents.items():
+        path = f"{remote.host.pki.rstrip('/')}/{name}"
+        there, target = shlex.quote(remote.host.pki), shlex.quote(path)
+        script = f"umask 077; mkdir -p {there} && cat >{target}.new && mv {target}.new {target}"
+        run_there(remote, script, content)
+        paths.append(path)
+    return paths
+
+
+def _checked(folder: Path, name: str) -> str:
+    """Return what is in a file of a folder of certificates. Raises CertificateError."""
+    path = folder / name
+    if name == CA_FILE:
+        from foosim.runtime.transport.certificate_files import read_ca
+
+        read_ca(folder, wall_clock.now_utc())
+    elif path.suffix == PASSWORD_SUFFIX:
+        read_password(path)
+    else:
+        load_credentials(folder, path.stem)
+    try:
+        return path.read_text("ascii")
+    except (OSError, UnicodeDecodeError) as error:
+        raise CertificateError(f"{path}: cannot be read, {error}") from None

@@ -1,0 +1,127 @@
+"""What a run is asked for, and the same checked, before anything is started."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from foosim.capture.start_frame import Branch, read_branch
+from foosim.client.class_check import player_findings
+from foosim.common import wall_clock
+from foosim.common.addresses import Address, check_listen
+from foosim.common.errors import BadValue, Refused, read_at
+from foosim.common.units import Pace, parse_ns, parse_pace
+from foosim.deployment.assets import pin_assets
+from foosim.deployment.loader import apply_sets, load_deployment, read_deployment_text, refuse_findings
+from foosim.deployment.schema import Deployment, places
+from foosim.deployment.table_clearance import clearance_findings
+from foosim.launcher.resumable import check_resumable
+from foosim.launcher.run_options import RunOptions, options_of
+from foosim.node.engines.mesh_trial import check_models
+from foosim.protocol import identity
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.runtime.run_folder import RunFolder
+from foosim.runtime.transport.certificates import load_credentials, operator_credentials
+from foosim.supervisor.settings import RunSettings
+from foosim.vhub.network.custom_models import check_link_models
+from foosim.world.initial_state import Start
+from foosim.world.scenes.hall_start import start_findings
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Options that were checked: the canonical text and what is in it, and when it ends (0 ticks: when asked to).
+
+    `branch` is the captured frame that it begins with, None for frame 0.
+    """
+
+    options: RunOptions
+    text: str
+    deployment: Deployment
+    pace: Pace
+    ticks: int
+    address: Address
+    branch: Branch | None = None
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+
+    @property
+    def start(self) -> Start | None:
+        return None if self.branch is None else self.branch.start
+
+    def settings(self, run: str) -> RunSettings:
+        """Return what the supervisor of the run with this name is started with."""
+        name, balance = str(self.options.file), self.options.balance
+        return RunSettings(run, name, self.text, self.pace, self.ticks, self.start, balance, self.files)
+
+
+def check_certificates(plan: Plan) -> list[str]:
+    """Return which certificates end soon, of everybody whom `up` starts here and of the operator that it is itself.
+
+    Raises CertificateError when somebody would not be let in. Those on other machines have theirs there.
+    """
+    pki, deployment = plan.options.pki, plan.deployment
+    elsewhere = places(deployment)
+    local = [name for name, node in deployment.nodes.items() if node.launch == "local" and name not in elsewhere]
+    players = [identity.client(name) for name in deployment.players if name not in elsewhere]
+    servers = [SUPERVISOR] if VHUB in elsewhere else [SUPERVISOR, VHUB]
+    everybody = (*servers, *map(identity.node, local), *players)
+    found = [*(load_credentials(pki, who) for who in everybody), operator_credentials(pki)]
+    warnings = [credentials.ends_soon(wall_clock.now_utc()) for credentials in found if credentials is not None]
+    return [warning for warning in warnings if warning]
+
+
+def check_models_here(plan: Plan) -> None:
+    """Raise DeploymentError for a link model that cannot be had, unless the vHub, which looks again, runs elsewhere."""
+    if VHUB not in places(plan.deployment):
+        file, network = plan.options.file, plan.deployment.network
+        check_link_models(network, read_deployment_text(file), str(file), plan.options.all_sets)
+
+
+def check_players_here(plan: Plan) -> None:
+    """Raise DeploymentError for players' classes that cannot be had. Those on other machines have theirs there."""
+    deployment, elsewhere = plan.deployment, places(plan.deployment)
+    findings = player_findings(deployment, [name for name in deployment.players if name not in elsewhere])
+    if findings:
+        file = plan.options.file
+        refuse_findings(read_deployment_text(file), str(file), findings, plan.options.all_sets)
+
+
+def check_meshes(deployment: Deployment, options: RunOptions) -> None:
+    """Raise DeploymentError for meshes, whose files have been read by now, that bodies start in or pass through."""
+    findings = [*start_findings(deployment), *clearance_findings(deployment)]
+    if findings:
+        refuse_findings(read_deployment_text(options.file), str(options.file), findings, options.all_sets)
+
+
+def make_plan(options: RunOptions) -> Plan:
+    """Check everything that was asked for before anything is started; raises Refused."""
+    name = str(options.file)
+    text = apply_sets(read_deployment_text(options.file), name, options.all_sets)
+    text, files = pin_assets(text, name, options.file.parent)
+    deployment = load_deployment(text, name).with_assets(files)
+    check_models(deployment, name, text)
+    check_meshes(deployment, options)
+    listen = deployment.listen if options.listen is None else options.listen
+    address = check_listen(listen, options.insecure, ports=2, secured=options.pki is not None)
+    pace = deployment.pace if options.pace is None else read_at("--pace", parse_pace, options.pace)
+    ticks = 0
+    if options.duration is not None:
+        ticks = -(-read_at("--for", parse_ns, options.duration) // deployment.tick_ns)
+        if ticks == 0:
+            raise BadValue("--for: a run has at least one tick", options.duration)
+    branch = None if options.branch is None else read_branch(options.branch, deployment)
+    return Plan(options, text, deployment, pace, ticks, address, branch, files)
+
+
+def plan_again(folder: RunFolder) -> tuple[Plan, Path | None]:
+    """Return the plan and the capture of a run whose launcher is gone. Raises Refused when it cannot go on."""
+    if folder.is_live() or not folder.is_left():
+        raise Refused(f"run {folder.name} is alive: its processes are started again by themselves")
+    launch = folder.launch()
+    if launch is None:
+        raise Refused(f"run {folder.name} has no launcher that was lost: what was started by hand is so again")
+    capture = Path(launch.capture) if launch.capture else None
+    plan = make_plan(options_of(launch))
+    check_resumable(folder, plan.options, capture, has_hub_here=VHUB not in places(plan.deployment))
+    return plan, capture

@@ -1,0 +1,228 @@
+"""Starts the processes of a run, on this machine and through ssh on others, and ends them.
+
+Each child stands in a process group of its own, so that a Ctrl-C in the terminal reaches the launcher alone, has a log
+file, and dies with the launcher (`protocol.process` is the child's side of that). Children are started from the main
+thread: the kernel's signal at the parent's end is tied to the thread that forked. Of a process on another machine the
+child here is ssh, and its log is what that brings home: it ends with its standard input, which only the launcher holds.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shlex
+import signal
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from foosim.common.errors import Failed
+from foosim.launcher.hosts.ssh import Remote
+from foosim.launcher.memory import OomKills, oom_kills
+from foosim.runtime.children import GRACE_S, child_environment, script
+from foosim.runtime.process import STACK_SIGNAL
+from foosim.supervisor.ending import Ending
+
+POLL_S: Final = 0.02
+PLAYER: Final = "foosim-player"
+STACK_S: Final = 1.0
+"""How long a player that hangs may take to show where."""
+LINES: Final = 30
+"""How much of a log's end tells why ssh ended."""
+
+
+@dataclass(slots=True)
+class Child:
+    """One process of the run."""
+
+    name: str
+    command: tuple[str, ...]
+    log: Path
+    process: subprocess.Popen[bytes] = field(repr=False)
+    remote: Remote | None = None
+    """The machine that it runs on when that is another one: `process` is the ssh that holds it."""
+    begin: int = 0
+    """Where its log begins, behind what those before it said."""
+    oom_kills: OomKills = field(default_factory=OomKills)
+    """How many processes the kernel had killed for want of memory when it was started."""
+    oom_killed: str | None = None
+    """Where the kernel had killed for that by the time that its end was noticed; None before."""
+    killed: str = ""
+    """Why the launcher killed it; empty when it did not."""
+
+    @property
+    def exit_code(self) -> int | None:
+        """Its exit code, -N when signal N ended it, None while it lives."""
+        return self.process.poll()
+
+    @property
+    def how(self) -> Ending:
+        """How it ended; it has."""
+        code = self.exit_code
+        assert code is not None, f"{self.name} lives"
+        name = signal.Signals(-code).name if code < 0 else ""
+        if self.oom_killed is None:
+            may_be = code == -signal.SIGKILL and self.remote is None
+            self.oom_killed = oom_kills().since(self.oom_kills) if may_be else ""
+        return Ending(code, name, self._tail(LINES), self.killed, self.oom_killed, self.remote is not None)
+
+    @property
+    def ending(self) -> str:
+        """How it ended, for people."""
+        code = self.exit_code
+        if code is None:
+            return "is alive"
+        if self.remote is not None and code > 0:
+            return f"ended: {self.remote.why(code, self._tail(LINES))}"
+        return self.how.text
+
+    def kill(self, why: str) -> None:
+        """Kill it, of which people are told why; a player shows before where it hangs."""
+        self.killed = why
+        if self.ask_for_stack():
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(STACK_S)
+        self.process.kill()
+
+    def ask_for_stack(self) -> bool:
+        """Have a player on this machine write to its log where it hangs, and end by that; False for any other."""
+        is_player = self.command[0] == PLAYER and self.remote is None
+        if is_player:
+            self.process.send_signal(STACK_SIGNAL)
+        return is_player
+
+    @property
+    def is_away(self) -> bool:
+        """Whether it ended because its machine could not be reached any more."""
+        return self.remote is not None and self.remote.is_away(self.exit_code or 0, self._tail(LINES))
+
+    def last_lines(self, count: int = 3) -> list[str]:
+        """Return the end of its log, when it ended by itself: it may say why there."""
+        return self._tail(count) if (self.exit_code or 0) > 0 else []
+
+    def let_go(self) -> None:
+        """End the standard input of one on another machine: whatever still lives there ends by that."""
+        if self.process.stdin is not None:
+            self.process.stdin.close()
+
+    def _tail(self, count: int) -> list[str]:
+        try:
+            with self.log.open("rb") as file:
+                file.seek(max(self.begin, self.log.stat().st_size - 8192))
+                lines = file.read().decode("utf-8", "replace").splitlines()
+        except OSError:
+            return []
+        return [line for line in lines if line.strip()][-count:]
+
+
+class Launcher:
+    """All children of this process, in the order in which they were started."""
+
+    def __init__(self, run: str = "", remotes: Mapping[str, Remote] | None = None, units: Sequence[str] = ()) -> None:
+        """`remotes` are the machines of the processes of this run that are not to run on this one, by name.
+
+        `units` are those among them that systemd runs there.
+        """
+        self.run = run
+        self.remotes: Mapping[str, Remote] = remotes or {}
+        self.units = frozenset(units)
+        self.children: dict[str, Child] = {}
+        self._end, self._hold = os.pipe()
+        """The pipe's two ends: children read the first; only this process has the second, and never writes."""
+
+    def start(self, name: str, command: Sequence[str], log: Path) -> Child:
+        """Start `command`, whose first word is one of foosim's commands, where this process belongs.
+
+        Of a unit of systemd the child here only tells systemd there to start it, and ends when that has been said.
+        """
+        remote = self.remotes.get(name)
+        if remote is not None:
+            return self._start_there(name, command, log, remote)
+        kills = oom_kills()
+        try:
+            with log.open("ab") as file:
+                begin = file.tell()
+                process = subprocess.Popen(
+                    (script(command[0]), *command[1:]),
+                    stdin=subprocess.DEVNULL,
+                    stdout=file,
+                    stderr=subprocess.STDOUT,
+                    env=child_environment(self._end),
+                    pass_fds=(self._end,),
+                    process_group=0,
+                )
+        except OSError as error:
+            why = "too little memory" if error.errno == errno.ENOMEM else error.strerror
+            raise Failed(f"{name} cannot be started: {why}") from None
+        child = self.children[name] = Child(name, tuple(command), log, process, None, begin, kills)
+        return child
+
+    def _start_there(self, name: str, command: Sequence[str], log: Path, remote: Remote) -> Child:
+        line = remote.unit_started(name) if name in self.units else remote.guarded(self.run, name, command)
+        earlier = self.children.get(name)
+        if earlier is not None:
+            earlier.let_go()
+        try:
+            with log.open("ab") as file:
+                process = subprocess.Popen(
+                    line, stdin=subprocess.PIPE, stdout=file, stderr=subprocess.STDOUT, process_group=0
+                )
+                begin = file.tell()
+        except FileNotFoundError:
+            raise Failed(f"there is no ssh here, which {name} is to be started with on host {remote.name}") from None
+        child = self.children[name] = Child(name, tuple(command), log, process, remote, begin)
+        return child
+
+    def ended(self) -> list[Child]:
+        """Return the children that have ended."""
+        return [child for child in self.children.values() if child.exit_code is not None]
+
+    def alive(self) -> list[Child]:
+        """Return the children that live."""
+        return [child for child in self.children.values() if child.exit_code is None]
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until no child lives; False when the time is over before."""
+        deadline = time.monotonic() + seconds
+        while self.alive():
+            if time.monotonic() >= deadline:
+                return False
+            time.sleep(POLL_S)
+        return True
+
+    def stop(self, grace_s: float = GRACE_S) -> None:
+        """End what lives: SIGTERM, then, after the grace, SIGKILL; players that hang show before where."""
+        self._signal(signal.SIGTERM)
+        if not self.wait(grace_s):
+            asked = [child for child in self.alive() if child.ask_for_stack()]
+            if asked:
+                self.wait(STACK_S)
+            self.kill()
+
+    def kill(self) -> None:
+        """End what lives at once."""
+        self._signal(signal.SIGKILL)
+        self.wait(GRACE_S)
+
+    def close(self) -> None:
+        """Give the pipe back; whoever should still live ends by it."""
+        os.close(self._hold)
+        os.close(self._end)
+        for child in self.children.values():
+            child.let_go()
+
+    def _signal(self, number: signal.Signals) -> None:
+        for child in reversed(self.alive()):
+            try:
+                os.killpg(child.process.pid, number)
+            except ProcessLookupError:
+                continue
+
+
+def command_line(command: Sequence[str]) -> str:
+    """Return a command as a person types it."""
+    return shlex.join(command)

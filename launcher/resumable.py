@@ -1,0 +1,77 @@
+"""Whether a run whose launcher is gone can go on: asked before anything is started, so that the reason is said at once.
+
+Looked at are both journals, whole (`journal_check`), and the capture's files.
+"""
+
+from __future__ import annotations
+
+import shlex
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.parts import files_from, first_there, has_end, head_of, parts_at
+from foosim.capture.start_frame import branch_command
+from foosim.common.errors import Malformed, Refused
+from foosim.launcher.journal_check import check_journals
+from foosim.launcher.run_options import RunOptions
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.codec import decode_any
+from foosim.runtime.journal import JournalError, journal_files, read_records
+from foosim.runtime.run_folder import RunFolder
+from foosim.vhub.records import HeadRecord, HubRecord
+
+
+def check_resumable(folder: RunFolder, options: RunOptions, capture: Path | None, *, has_hub_here: bool) -> None:
+    """Raise Refused, with what is wrong and the command that begins a new run, when a run cannot go on.
+
+    `options` are those that it was started with. The vHub's journal and the capture are looked at where it runs on this
+    machine.
+    """
+    if not any(path.stat().st_size for path in journal_files(folder.journals, SUPERVISOR)):
+        where = f"run {folder.name} has no journal to go on from in {folder.journals}"
+        raise Refused(f"{where}{_new_run(folder, options, capture)}")
+    try:
+        check_journals(folder, options)
+        if has_hub_here:
+            _check_hub(folder, capture)
+    except (JournalError, CaptureError, Malformed) as error:
+        then = _new_run(folder, options, capture)
+        raise Refused(f"run {folder.name} cannot go on: {error}{then}") from None
+
+
+def _new_run(folder: RunFolder, options: RunOptions, capture: Path | None) -> str:
+    """Return how a new run begins: with the last frame of the capture, where it is this run's and has one."""
+    if capture is not None and parts_at(capture):
+        first = first_there(capture)
+        with suppress(CaptureError):
+            if head_of(first).get("run") == folder.name:
+                return f". {branch_command(replace(options, branch=None).arguments(), first)}"
+    return f"; foosim-supervisor up {shlex.join(options.arguments())} begins a new run"
+
+
+def _check_hub(folder: RunFolder, capture: Path | None) -> None:
+    """Raise what says why the vHub could not go on from its journal, with its capture."""
+    files = journal_files(folder.journals, VHUB)
+    if not files:
+        if capture is not None and parts_at(capture):
+            raise JournalError(f"the vHub's journal is gone from {folder.journals}")
+        return  # it was never begun
+    raw = next(read_records(files[0]), None)
+    if raw is None:
+        return  # it was made, and nothing was written
+    head = decode_any(HubRecord, raw)
+    if not isinstance(head, HeadRecord) or head.run != folder.name:
+        raise Malformed(f"{files[0]}: does not begin with run {folder.name}")
+    if head.capture and parts_at(Path(head.capture)):
+        _check_capture(Path(head.capture), folder.name)
+
+
+def _check_capture(path: Path, run: str) -> None:
+    first = first_there(path)
+    about = head_of(first)
+    if about and about.get("run") != run:
+        raise CaptureError(f"{first}: was overwritten, it is the capture of run {about.get('run')}")
+    if about and has_end(files_from(first)[-1]):
+        raise CaptureError(f"{first}: is finished, and a capture is never overwritten")

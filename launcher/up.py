@@ -1,0 +1,498 @@
+"""`up`: starts all processes of a run, here and on other machines, shows the run, and ends it in order.
+
+It decides nothing of the run: supervisor, vHub, nodes and players are its children and do the work; it starts them,
+looks at them, asks the supervisor for the status that it shows, and hands on a Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from foosim.common.addresses import parse_address
+from foosim.common.errors import Failed, Refused
+from foosim.launcher.console_child import ConsoleChild, Page
+from foosim.launcher.display import Display, recovery_text
+from foosim.launcher.hosts.prepare import check_hosts, fetch_capture
+from foosim.launcher.hosts.ssh import CAPTURE
+from foosim.launcher.hosts.ssh import remotes as remotes_of
+from foosim.launcher.liveness import QUESTION_S, OwnTime, StalledWatch, SupervisorWatch
+from foosim.launcher.outcome import Outcome, capture_lines, plan_facts, result_without_supervisor, with_capture
+from foosim.launcher.plan import Plan
+from foosim.launcher.processes import Child, Launcher, command_line
+from foosim.launcher.restarts import Restarts
+from foosim.launcher.run_options import launch_of
+from foosim.launcher.signals import counted_signals
+from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.runtime.command import DONE, FAILED, REFUSED
+from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
+from foosim.runtime.transport.certificates import operator_credentials
+from foosim.runtime.transport.open_plane_warning import Exposure
+from foosim.runtime.transport.session import ConnectError
+from foosim.supervisor.control import Control, NoAnswer
+from foosim.vhub.links.summary import meanings
+from foosim.vhub.links.summary_text import start_lines
+
+POLL_S: Final = 0.02
+"""How often a run that starts is looked at."""
+WATCH_S: Final = 0.1
+"""How often one that runs is: what it takes is taken from the run."""
+END_S: Final = 20.0
+"""How long a run that is ending may take before its processes are stopped: the vHub has a capture to close."""
+LEAVE_S: Final = 1.0
+"""How long the others may take to end when the supervisor has: it waited for the vHub's capture."""
+AWAY_S: Final = 10.0
+"""The same for those on other machines, where an end takes a moment to be known."""
+LOST_S: Final = 3.0
+"""How long the supervisor has to notice that a child of ours ended; one that never said hello it does not know."""
+ENDED: Final = ("ended", "failed")
+"""States of a run that only waits for its vHub to close the capture."""
+
+T = TypeVar("T")
+
+
+class Killed(Exception):
+    """A second Ctrl-C: everything was killed. The text says so, and where the unfinished capture is."""
+
+    def __init__(self, text: str, result: Mapping[str, Any]) -> None:
+        super().__init__(text)
+        self.result = result
+
+
+class Up:
+    """One run whose processes are children of this one."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        capture: Path | None,
+        display: Display,
+        run: str | None = None,
+        resumed: RunFolder | None = None,
+        console: Page | None = None,
+    ) -> None:
+        """`capture` is where it is captured; None captures nothing. `run` names it, `resumed` is one to go on with.
+
+        `console` is the page that is served beside the run.
+        """
+        self.plan = plan
+        self.capture = capture
+        self.display = display
+        remotes = remotes_of(plan.deployment)
+        check_hosts(plan.deployment, plan.address, remotes)
+        self.folder: RunFolder = resumed or create_run(plan.deployment.world, run)
+        self.folder.hold_launcher()
+        self.folder.write_launch(launch_of(plan.options, capture))
+        units = [name for name, node in plan.deployment.nodes.items() if node.launch == "systemd"]
+        self._launcher = Launcher(self.folder.name, remotes, units)
+        self._console = ConsoleChild(self.folder, display.say, console)
+        self._not_home = ""
+        """Why the capture was not brought home from the machine on which it was written."""
+        self._interrupts = 0
+        self._ending_s = 0.0
+        self._is_told = False
+        """Whether the supervisor was told to end the run."""
+        self._lost: Child | None = None
+        self._lost_s = 0.0
+        self._has_begun = self._has_ended = False
+        self._is_resumed = resumed is not None
+        self._restarts = Restarts()
+        self._own_time = OwnTime(time.monotonic())
+        self._supervisor_watch = SupervisorWatch(plan.deployment.deadlines)
+        self._stalled_watch = StalledWatch(plan.deployment.deadlines)
+        self._control: Control | None = None
+        self._status: dict[str, Any] = {}
+        """The last that the supervisor has told."""
+        self._stopped: set[str] = set()
+        """Nodes that somebody stopped."""
+        self._wanted: set[str] = set()
+        """Nodes that are to be started when they have ended."""
+        self._starts: dict[str, int] = {}
+        """How often somebody asked for a node to be started, as far as it was done."""
+        self._told = 0
+        """How many of the run's recoveries were shown."""
+
+    def run(self) -> Outcome:
+        """Start everything, show it until it is over, and return how it ended. Raises Killed."""
+        with counted_signals(self._count), self.display, self._console:  # whose pages learn how it ended
+            try:
+                if self._start():
+                    self._watch()
+                if self._can_resume:
+                    self._launcher.kill()  # who is told to end would end the capture
+                leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
+                self._launcher.wait(leave_s if self.folder.result() is not None else END_S)
+            finally:
+                self._launcher.stop()
+                self._launcher.close()
+            self._bring_home()
+            return self._outcome()
+
+    @property
+    def _can_resume(self) -> bool:
+        """Whether nothing has ended the run, though its supervisor is gone, or has not begun to go on with it."""
+        is_gone = self._launcher.children[SUPERVISOR].exit_code is not None
+        return self.folder.result() is None and (is_gone or (self._is_resumed and not self._has_begun))
+
+    # --- starting ----------------------------------------------------------------------------------------------------
+
+    def _start(self) -> bool:
+        """Start the processes, each as soon as it can connect; False when the run was over before all had started."""
+        options, folder, display = self.plan.options, self.folder, self.display
+        supervisor = ["foosim-supervisor", "run", *options.arguments(), "--run", folder.name]
+        self._launch(SUPERVISOR, supervisor)
+        display.say(f"run {folder.name}, logs in {folder.logs}")
+        if self.plan.branch is not None:
+            display.say(self.plan.branch.text)
+        for line in start_lines(meanings(self.plan.deployment), str(options.file)):
+            display.say(line)
+        info = self._await(self._own_info)
+        if info is None:
+            return False
+        self._launch(VHUB, self._vhub_command(info))
+        for name, node in sorted(self.plan.deployment.nodes.items()):
+            command = ["foosim-node", "--name", name, "--connect", info.simulation, *self._pki_arguments(name)]
+            if node.launch != "manual":
+                self._launch(name, command)
+            else:
+                display.say(f"waiting for node {name}; start it on its machine: {command_line(command)}")
+        info = self._await(self._info_with_radio)
+        if info is None:
+            return False
+        for process, players in self.plan.deployment.player_processes().items():
+            names = [word for name in players for word in ("--name", name)]
+            self._launch(process, ["foosim-player", *names, "--connect", info.radio, *self._pki_arguments(process)])
+        return True
+
+    def _vhub_command(self, info: RunInfo) -> list[str]:
+        address, folder, capture, options = self.plan.address, self.folder.path, self.capture, self.plan.options
+        listen = replace(address, port=parse_address(info.radio).port) if info.radio else address.next_port()
+        remote = self._launcher.remotes.get(VHUB)
+        if remote is not None:  # where the guard has a folder for the run
+            listen = replace(listen, host=remote.host.address)
+            folder, capture = Path(), None if capture is None else Path(CAPTURE)
+        command = ["foosim-vhub", "--connect", info.simulation, "--listen", str(listen)]
+        command += ["--insecure"] if options.insecure else []
+        command += self._pki_arguments(VHUB)
+        command += ["--run-folder", str(folder)]
+        return [*command, "--no-capture"] if capture is None else [*command, "--capture", str(capture)]
+
+    def _pki_arguments(self, name: str) -> list[str]:
+        """Return where a process finds its certificate: in the folder of this machine, or of the one that it is on."""
+        remote = self._launcher.remotes.get(name)
+        given = self.plan.options.pki_arguments()
+        return remote.pki_arguments() if given and remote is not None else given
+
+    def _bring_home(self) -> None:
+        """Fetch the capture from the machine on which the vHub wrote it."""
+        remote = self._launcher.remotes.get(VHUB)
+        if remote is None or self.capture is None or VHUB not in self._launcher.children:
+            return
+        try:
+            fetch_capture(remote, self.folder.name, self.capture)
+        except Failed as failed:
+            self._not_home = str(failed)
+
+    def _launch(self, name: str, command: list[str]) -> None:
+        self._start_child(name, command, self.folder.log(name))
+
+    def _start_child(self, name: str, command: Sequence[str], log: Path) -> None:
+        self._launcher.start(name, command, log)
+        if name == SUPERVISOR:
+            self._supervisor_watch.started(self._own_time.at(time.monotonic()))
+
+    def _own_info(self) -> RunInfo | None:
+        """Return what the run file says, once it is that of the supervisor that is our child."""
+        info = self.folder.info()
+        return info if info is not None and info.pid == self._launcher.children[SUPERVISOR].process.pid else None
+
+    def _info_with_radio(self) -> RunInfo | None:
+        info = self.folder.info()
+        return info if info is not None and info.radio else None
+
+    def _await(self, value: Callable[[], T | None]) -> T | None:
+        """Return what `value` gives as soon as it is something; None when the run is over, or is to end, before."""
+        while self._goes_on():
+            found = None if self._ending_s else value()
+            if found is not None:
+                return found
+            time.sleep(POLL_S)
+        return None
+
+    # --- running -----------------------------------------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        """Show the run until its supervisor has ended."""
+        next_s = time.monotonic()
+        self._console.start()
+        exposure = Exposure(self.plan.address, time.monotonic_ns())
+        with ExitStack() as stack:
+            while self._goes_on():
+                reminder = exposure.due(time.monotonic_ns())
+                if reminder:
+                    self.display.say(reminder)
+                self._console.look()
+                if time.monotonic() >= next_s:
+                    next_s = time.monotonic() + self.display.every_s
+                    self._control = self._control or self._connect(stack)
+                    if self._control is not None:
+                        self._show(self._control)
+                time.sleep(WATCH_S)
+
+    def _connect(self, stack: ExitStack) -> Control | None:
+        """Connect to the supervisor; None when it has ended before: the run was short, or somebody killed it."""
+        info, supervisor = self._own_info(), self._launcher.children[SUPERVISOR]
+        if info is None:
+            return None
+        try:
+            credentials = operator_credentials(self.plan.options.pki)
+            return stack.enter_context(Control(info.simulation, credentials, lambda: supervisor.exit_code is not None))
+        except ConnectError:
+            if supervisor.exit_code is None:
+                raise
+            return None
+
+    def _show(self, control: Control) -> None:
+        supervisor = self._launcher.children[SUPERVISOR]
+        try:
+            status = self._status = control.status(QUESTION_S, lambda: supervisor.exit_code is not None)
+        except NoAnswer:
+            self._supervisor_watch.unanswered()
+            return
+        self._supervisor_watch.answered()
+        now_s = self._own_time.at(time.monotonic())
+        self._tell_recoveries(status["recoveries"])
+        if not self._has_ended:
+            self.display.show(status, now_s)
+        else:  # the supervisor waits as long as there is progress, and so do we
+            self.display.show_closing(status)
+            self._ending_s = now_s if self._ending_s else 0.0
+        self._has_begun = self._has_begun or status["begun"]
+        self._has_ended = status["state"] in ENDED
+        self._stopped = {name for name, process in status["processes"].items() if process["stopped"]}
+        self._start_wanted(status["starts"])
+        if not self._has_ended and not self._ending_s:
+            self._restart_ended(now_s, knows=True)
+        self._end_stalled(status)
+
+    def _start_wanted(self, starts: dict[str, int]) -> None:
+        """Start the nodes that somebody asked for since: one that was stopped, waits for its turn, or was given up."""
+        for name, count in starts.items():
+            child = self._launcher.children.get(name)
+            if child is None or count <= self._starts.get(name, 0) or name in self._stopped:
+                continue
+            self._restarts.forget(name)
+            if child.exit_code is not None:
+                self._start_child(name, child.command, child.log)
+            else:  # it was stopped, and has not ended yet
+                self._wanted.add(name)
+        self._starts = starts
+        self._wanted -= self._stopped
+
+    def _tell_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
+        """Say what is new, once it is over."""
+        while self._told < len(recoveries) and recoveries[self._told]["outage_ms"] is not None:
+            self.display.say(recovery_text(recoveries[self._told]))
+            self._told += 1
+
+    def _end_stalled(self, status: dict[str, Any]) -> None:
+        """Kill a process that hangs: the run goes on without it, and a new one can take part."""
+        alive = {child.name: child for child in self._launcher.alive()}
+        pids = {name: child.process.pid for name, child in alive.items()}
+        away = {name for name, child in alive.items() if child.remote is not None}
+        killed = self._stalled_watch.look(status, pids, away, self._own_time.at(time.monotonic()))
+        for name, why in killed.items():
+            self._kill(alive[name], why)
+
+    def _end_stalled_supervisor(self, supervisor: Child) -> None:
+        """Kill a supervisor that hangs: a new one goes on with the run."""
+        if not self._supervisor_watch.is_found and self._own_info() is not None:
+            self._supervisor_watch.found()
+        why = self._supervisor_watch.why_killed(self._own_time.at(time.monotonic()))
+        if why and not self._has_ended and not self._ending_s:
+            self._kill(supervisor, why)
+
+    def _kill(self, child: Child, why: str) -> None:
+        if not child.killed:
+            self.display.say(f"{child.name} does not answer any more: it is killed ({why})")
+            child.kill(why)
+
+    def _supervisor_comes_back(self, supervisor: Child, now_s: float) -> bool:
+        """Start a supervisor again that ended before the run did; False when the run is over, or it is given up."""
+        over = self._ending_s or self._has_ended or self.folder.result() is not None
+        began = self.folder.info() is not None or supervisor.how.is_by_signal
+        if over or not began or supervisor.exit_code in (DONE, REFUSED):
+            return False
+        if not self._restarts.is_known(SUPERVISOR):
+            self._restart_later(supervisor, now_s)
+        self._start_due(now_s)
+        return SUPERVISOR not in self._restarts.failed
+
+    def _restart_ended(self, now_s: float, knows: bool = False) -> None:
+        """Start processes again that ended while the run goes on; who ends again and again, or is refused, is given up.
+
+        `knows`: a status has just told which nodes are stopped, and whether the run has begun.
+        """
+        may_judge = self._has_begun or knows or self._control is None
+        for child in self._launcher.ended() if may_judge else ():
+            if child.name in self._stopped or child.exit_code == DONE or self._restarts.is_known(child.name):
+                continue
+            if child.exit_code == REFUSED and not knows:
+                continue  # it may have been stopped since the last status
+            if self._comes_back(child):
+                self._restart_later(child, now_s)
+        self._start_due(now_s)
+
+    def _restart_later(self, child: Child, now_s: float) -> None:
+        at_once = child.name in (SUPERVISOR, VHUB)
+        wait_s = None
+        if child.exit_code == REFUSED and child.name not in self._wanted:
+            self._restarts.give_up(child.name)
+        else:
+            self._wanted.discard(child.name)
+            wait_s = self._restarts.ended(child.name, now_s, at_once=at_once, is_away=child.is_away)
+        after = f"starts again in {wait_s:g} s" if wait_s else "starts again"
+        if wait_s is None:
+            is_node = child.name in self.plan.deployment.nodes
+            after = f"is given up; foosim-supervisor start {child.name} tries it again" if is_node else "is given up"
+        self.display.say(f"{child.name} {child.ending}, {after}; its log is {child.log}")
+
+    def _start_due(self, now_s: float) -> None:
+        for name in self._restarts.due(now_s):
+            child = self._launcher.children[name]
+            command = self._vhub_again() if name == VHUB else child.command
+            self._start_child(name, command, child.log)
+
+    def _comes_back(self, child: Child) -> bool:
+        """Whether the run waits for this process, which has ended, and another one takes its place.
+
+        Before the first tick that is one that something else has ended: who ends by himself then says what is wrong. A
+        player that is not to be restarted is no exception: it has not acted, so that it has nothing to forget.
+        """
+        if child.name == VHUB and (child.exit_code == REFUSED or VHUB in self._restarts.failed):
+            return False
+        if self._has_begun:
+            return child.name == VHUB or child.name in self.plan.deployment.nodes or self._plays_again(child)
+        is_orphan = child.exit_code == FAILED and self._restarts.has_ended(SUPERVISOR)
+        may_come = child.how.is_by_signal or child.is_away or is_orphan
+        return may_come and child.name not in self._restarts.failed
+
+    def _plays_again(self, child: Child) -> bool:
+        """Whether these are players whom something else has ended: one that ends by itself has failed."""
+        deployment = self.plan.deployment
+        players = deployment.player_processes().get(child.name, ())
+        may_restart = bool(players) and all(deployment.players[player].restart for player in players)
+        is_lost = child.how.is_by_signal or child.is_away
+        return may_restart and is_lost and child.name not in self._restarts.failed
+
+    def _vhub_again(self) -> list[str]:
+        """Return how the vHub is started again: where clients know it to be."""
+        info = self.folder.info()
+        assert info is not None
+        return self._vhub_command(info)
+
+    def _goes_on(self) -> bool:
+        """Look after the children and the Ctrl-C; False when the supervisor has ended."""
+        if self._interrupts > 1:
+            self._launcher.kill()
+            raise Killed("\n".join(["killed", *self._capture_lines()]), self.unended("killed by a second Ctrl-C"))
+        supervisor = self._launcher.children[SUPERVISOR]
+        now_s = self._own_time.at(time.monotonic())
+        if supervisor.exit_code is not None:
+            if self._supervisor_comes_back(supervisor, now_s):
+                self._restart_ended(now_s)
+                return True
+            if supervisor.exit_code == FAILED:  # it may have noticed a loss, and ended, since we looked last
+                self._look_for_lost(now_s)
+            return False
+        self._end_stalled_supervisor(supervisor)
+        if self._interrupts and not self._ending_s:
+            self.display.say("ending the run; a second Ctrl-C kills it")
+            self._ending_s = now_s
+        if not self._has_ended and not self._ending_s:
+            lost = self._lost
+            if lost is not None and (self._launcher.children[lost.name] is not lost or not self._ends_run(lost)):
+                self._lost = None  # it ended before we saw that the run had begun
+            self._restart_ended(now_s)
+        if self._lost is None:
+            self._look_for_lost(now_s)
+        elif not self._ending_s and (now_s > self._lost_s + LOST_S or self._lost.exit_code == REFUSED):
+            if self._can_resume:
+                return False
+            self._ending_s = now_s
+        if self._ending_s and not self._is_told:
+            self._tell(supervisor)
+        return not self._ending_s or now_s < self._ending_s + END_S
+
+    def _ends_run(self, child: Child) -> bool:
+        """Whether the run cannot go on without this child, which has ended."""
+        return child.exit_code != DONE and not self._comes_back(child)
+
+    def _look_for_lost(self, now_s: float) -> None:
+        """Note the first child that ended as none should; one that was killed before those that ended because of it."""
+        if self._lost is None:
+            bad = [child for child in self._launcher.ended() if self._ends_run(child) and child.name != SUPERVISOR]
+            self._lost = min(bad, key=lambda child: (child.exit_code or 0) > 0, default=None)
+            self._lost_s = now_s
+
+    def _tell(self, supervisor: Child) -> None:
+        """Have the supervisor end the run, as `down` does; before it has a run file, the signal would just kill it."""
+        if self.folder.info() is None:
+            return
+        self._is_told = True
+        if self._lost is not None and self._control is not None:
+            with suppress(Refused):
+                self._control.ask("down", QUESTION_S, lost=f"{self._lost.name}: it {self._lost.ending}")
+                return
+        supervisor.process.send_signal(signal.SIGTERM)
+
+    def _outcome(self) -> Outcome:
+        """Say how it ended. Where the supervisor does not, nothing has ended it: it can be resumed."""
+        ended = self.folder.result()
+        if self._lost is None and ended is None:
+            self._lost = self._launcher.children[SUPERVISOR]
+        reason = "" if self._lost is None else f"lost {self._lost.name}: it {self._lost.ending}"
+        if self._lost is self._launcher.children[SUPERVISOR] and self._lost.exit_code == REFUSED:
+            reason = self._lost.how.last_words
+        if ended is None:
+            result = self.unended(reason)
+            may_resume = self._is_resumed or self._has_begun
+            then = f"; foosim-supervisor up --resume {self.folder.name} goes on with it" if may_resume else ""
+            line = f"the run did not end in order{then}"
+        else:
+            result = {**ended, "reason": reason, "failed": True} if reason and not ended["failed"] else ended
+            line = f"the run has ended: {result['reason']}"
+            result = with_capture(result, self.capture)
+        if ended is not None and result != ended:
+            with suppress(OSError):
+                self.folder.write_result(result)
+        lines = [*map(recovery_text, result["recoveries"][self._told :]), line]
+        return Outcome(result, bool(result["failed"]), (*lines, *self._lost_lines(result), *self._capture_lines()))
+
+    def unended(self, reason: str) -> dict[str, Any]:
+        """Return the result of a run that nobody has ended."""
+        known = {"run": self.folder.name, **plan_facts(self.plan.deployment), **self._status}
+        return with_capture(result_without_supervisor(known, reason), self.capture)
+
+    def _lost_lines(self, result: Mapping[str, Any]) -> list[str]:
+        """Say which child ended before the run did, and show the end of its log; where the log of one to blame is."""
+        child = self._lost
+        if child is None:
+            blamed = self._launcher.children.get(result["reason"].partition(" ")[0])
+            return [] if blamed is None else [f"the log of {blamed.name} is {blamed.log}"]
+        return [f"{child.name} {child.ending}; its log is {child.log}", *(f"    {line}" for line in child.last_lines())]
+
+    def _capture_lines(self) -> list[str]:
+        """Say where the capture is, and whether it has its end: who was killed, or failed, did not finish it."""
+        journals = None if VHUB in self._launcher.remotes else self.folder.journals
+        lines = capture_lines(self.capture, self.folder.result(), journals)
+        return lines or ([self._not_home] if self._not_home else [])
+
+    def _count(self) -> None:
+        """Take note of a Ctrl-C."""
+        self._interrupts += 1

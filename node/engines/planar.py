@@ -1,0 +1,200 @@
+"""The engine of a hall: rovers on two wheels, moved by kinematics, and their batteries.
+
+A wheel approaches its wanted speed with at most the drive's acceleration and rolls a little less far than it turns.
+From the speeds l and r of the wheels on the ground, v = (l + r) / 2 and w = (r - l) / track, a rover goes along an arc:
+in time t it turns by w t and moves by the arc's chord, v t sin(w t / 2) / (w t / 2), in the direction half-way between
+(Siegwart, Nourbakhsh, Scaramuzza, *Introduction to Autonomous Mobile Robots*, section 3.2). It goes as far of that as
+nothing is in the way, in halves, and turns on the spot where all is blocked, with its wheels slipping.
+
+Rovers meet each other where they were at the tick's start: each stays on its own side of the line half-way between two
+(a buffered Voronoi cell: Zhou, Wang, Bandyopadhyay, Schwager, IEEE RA-L 2(2), 2017), so that they never overlap and the
+next state of each is a function of the frame alone, whoever computes which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, floor, pi, sin, sqrt
+from typing import Final
+
+from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.deployment.schema import Deployment
+from foosim.world.layout import Entity, Layout
+from foosim.world.scenes.obstacles import Obstacle, obstacles_of
+
+HALVINGS: Final = 7
+"""A way that is blocked is tried at 1, 1/2, 1/4, ... of its length, so often."""
+SQUARE_REACH_M: Final = 0.71
+"""From the middle of a square metre to its corners, and a little more."""
+GAP_M: Final = 1e-6
+"""Half of what stays between two rovers: far above rounding."""
+
+
+class Loaded:
+    """One rover that is solved in this tick; everything but `slips` changes with it."""
+
+    def __init__(self, slips: tuple[float, float]) -> None:
+        self.slips: Final = slips
+        self.x = self.y = self.heading = 0.0
+        self.left = self.right = 0.0
+        self.left_travel = self.right_travel = 0.0
+        self.charge = 0.0
+        self.blocked = False
+        self.wanted: tuple[tuple[float, float], ...] = ((0.0, 0.0), (0.0, 0.0))
+        self.cell: list[tuple[float, float, float]] = []
+        """Half-planes that it stays in: x and y of a unit vector, and the greatest x * position along it."""
+
+
+class RoverEngine:
+    """The rovers of one layout."""
+
+    def __init__(self, deployment: Deployment, layout: Layout) -> None:
+        hall = deployment.hall
+        self._dt = deployment.tick_ns / 1e9 / deployment.substeps
+        self._substeps = deployment.substeps
+        self._radius, self._track = hall.rover.radius, hall.rover.drive.track
+        battery, station = hall.rover.battery, hall.station
+        self._idle, self._drag, self._capacity = battery.idle, battery.drag, battery.capacity
+        self._charge_radius, self._charge_power = station.charge_radius, station.charge_power
+        self._obstacles = obstacles_of(deployment)
+        robots = [robot for _, robot in sorted(deployment.robots.items())]
+        self._chargers = [(robot.x, robot.y) for robot in robots if robot.model == "station"]
+        self._places = [(entity.index, entity.offsets["position"]) for entity in layout.rovers]
+        self._near_m = 2.0 * (hall.rover.radius + GAP_M + hall.rover.drive.speed * deployment.tick_ns / 1e9)
+        """Rovers that are farther apart cannot meet within the tick."""
+        self._slips = {entity.index: wheel_slips(deployment, entity.name) for entity in layout.rovers}
+        self._squares: dict[tuple[int, int], tuple[Obstacle, ...]] = {}
+        self._loaded: dict[int, Loaded] = {}
+
+    def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
+        """Take these rovers' state from the frame, and where all others are."""
+        places = [(index, state[at], state[at + 1]) for index, at in self._places]
+        self._loaded = {}
+        for entity in entities:
+            rover = self._loaded[entity.index] = Loaded(self._slips[entity.index])
+            at, speeds, travel = (entity.offsets[name] for name in ("position", "wheel_speeds", "wheel_travel"))
+            rover.x, rover.y, rover.heading = state[at], state[at + 1], state[entity.offsets["heading"]]
+            rover.left, rover.right = state[speeds], state[speeds + 1]
+            rover.left_travel, rover.right_travel = state[travel], state[travel + 1]
+            rover.charge = state[entity.offsets["charge"]]
+            rover.cell = self._cell(entity.index, rover.x, rover.y, places)
+
+    def _cell(
+        self, own: int, x: float, y: float, places: Sequence[tuple[int, float, float]]
+    ) -> list[tuple[float, float, float]]:
+        """Return the half-planes that keep a rover on its side of the line half-way to each other one that is near."""
+        near, room = self._near_m, self._radius + GAP_M
+        cell = []
+        for index, there_x, there_y in places:
+            dx, dy = there_x - x, there_y - y
+            if index == own or abs(dx) >= near or abs(dy) >= near:
+                continue
+            distance = sqrt(dx * dx + dy * dy)
+            if 0.0 < distance < near:
+                nx, ny = dx / distance, dy / distance
+                cell.append((nx, ny, x * nx + y * ny + distance / 2.0 - room))
+        return cell
+
+    def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, float]]]) -> None:
+        """Set the wheels of these rovers: for each the wanted speed (m/s) and the greatest acceleration (m/s2)."""
+        for entity, wheels in zip(entities, commands, strict=True):
+            self._loaded[entity.index].wanted = tuple(wheels)
+
+    def step(self, substeps: int) -> None:
+        """Advance the loaded rovers by `substeps` substeps."""
+        assert substeps == self._substeps, (substeps, self._substeps)
+        for rover in self._loaded.values():
+            for _ in range(substeps):
+                self._advance(rover)
+
+    def _advance(self, rover: Loaded) -> None:
+        """Go on by one substep."""
+        dt = self._dt
+        (left, left_rate), (right, right_rate) = rover.wanted
+        if rover.charge <= 0.0:
+            left = right = 0.0
+        rover.left = _approach(rover.left, left, left_rate * dt)
+        rover.right = _approach(rover.right, right, right_rate * dt)
+        rover.left_travel += rover.left * dt
+        rover.right_travel += rover.right * dt
+        self._roll(rover, rover.left * (1.0 - rover.slips[0]), rover.right * (1.0 - rover.slips[1]))
+        self._discharge(rover)
+
+    def _roll(self, rover: Loaded, left: float, right: float) -> None:
+        """Move along the arc of these wheels' speeds on the ground, as far as nothing is in the way."""
+        dt = self._dt
+        half_turn = (right - left) / self._track * dt / 2.0
+        chord = (left + right) / 2.0 * dt
+        if half_turn != 0.0:
+            chord *= sin(half_turn) / half_turn
+        if chord != 0.0:
+            direction = rover.heading + half_turn
+            way_x, way_y = chord * cos(direction), chord * sin(direction)
+            for _ in range(HALVINGS):
+                x, y = rover.x + way_x, rover.y + way_y
+                if self._is_free(rover, x, y):
+                    rover.x, rover.y = x, y
+                    break
+                rover.blocked = True
+                way_x, way_y = way_x / 2.0, way_y / 2.0
+        heading = rover.heading + 2.0 * half_turn
+        rover.heading = heading - 2.0 * pi if heading > pi else heading + 2.0 * pi if heading <= -pi else heading
+
+    def _is_free(self, rover: Loaded, x: float, y: float) -> bool:
+        """Whether a rover may be there; away from another one it may always go."""
+        for nx, ny, most in rover.cell:
+            if x * nx + y * ny > most and x * nx + y * ny > rover.x * nx + rover.y * ny:
+                return False
+        radius = self._radius
+        return all(obstacle.is_clear(x, y, radius) for obstacle in self._around(x, y))
+
+    def _around(self, x: float, y: float) -> tuple[Obstacle, ...]:
+        """Return the obstacles that a rover in this square metre can touch: few of all, found once for each square."""
+        square = floor(x), floor(y)
+        found = self._squares.get(square)
+        if found is None:
+            reach = self._radius + SQUARE_REACH_M
+            middle = square[0] + 0.5, square[1] + 0.5
+            found = tuple(obstacle for obstacle in self._obstacles if not obstacle.is_clear(*middle, reach))
+            self._squares[square] = found
+        return found
+
+    def _discharge(self, rover: Loaded) -> None:
+        """Take what standing and rolling cost, and give what a station beside it gives."""
+        dt, reach = self._dt, self._charge_radius
+        way = (abs(rover.left) + abs(rover.right)) / 2.0 * dt
+        charge = rover.charge - self._idle * dt - self._drag * way
+        for x, y in self._chargers:
+            dx, dy = rover.x - x, rover.y - y
+            if dx * dx + dy * dy <= reach * reach:
+                charge += self._charge_power * dt
+        rover.charge = min(max(charge, 0.0), self._capacity)
+
+    def read(self, entities: Sequence[Entity], state: list[float]) -> None:
+        """Write the rovers' new state."""
+        for entity in entities:
+            rover, offsets = self._loaded[entity.index], entity.offsets
+            at, turned = offsets["position"], offsets["orientation"]
+            speeds, travel = offsets["wheel_speeds"], offsets["wheel_travel"]
+            state[at : at + 2] = rover.x, rover.y
+            state[turned : turned + 4] = 0.0, 0.0, sin(0.5 * rover.heading), cos(0.5 * rover.heading)
+            state[offsets["heading"]] = rover.heading
+            state[speeds : speeds + 2] = rover.left, rover.right
+            state[travel : travel + 2] = rover.left_travel, rover.right_travel
+            state[offsets["charge"]] = rover.charge
+            state[offsets["blocked"]] = float(rover.blocked)
+
+    def close(self) -> None:
+        """Free what the engine holds: nothing outside of Python."""
+
+
+def wheel_slips(deployment: Deployment, name: str) -> tuple[float, float]:
+    """Return by which share the left and the right wheel of a rover roll less far than they turn: drawn by its name."""
+    words = draw_words(draw_key(deployment.seed, "slip", name), 0)
+    slip = deployment.hall.rover.drive.slip
+    return slip * unit_interval(words[0]), slip * unit_interval(words[1])
+
+
+def _approach(speed: float, wanted: float, step: float) -> float:
+    """Return a speed that is nearer to the wanted one, by at most `step`."""
+    return min(max(wanted, speed - step), speed + step)

@@ -1,0 +1,140 @@
+"""The engines of a node: one for each layout that is wanted, and the solving of a tick's work with the right one.
+
+Shared by the node's process and the rehearsal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from hashlib import blake2b
+from typing import Final
+
+import numpy as np
+
+from foosim.deployment.schema import Deployment
+from foosim.node.core import NodeCore
+from foosim.node.engines import build_in_steps, make_engine, prepare_spares
+from foosim.node.engines.interface import Engine, EngineFactory
+from foosim.node.tick import Stepper, Work
+from foosim.world.initial_state import initial_numbers
+from foosim.world.layout import Layout, build_layout
+from foosim.world.mesh import Mesh
+
+FINGERPRINT_TICKS: Final = 32
+ENGINES_KEPT: Final = 3
+"""The layout of the tick, the one before (an epoch may go back to it), and the next one."""
+
+
+class Solver:
+    """Builds what a node's core wants and solves its work. The engines that were used last are kept."""
+
+    def __init__(self, core: NodeCore, factory: EngineFactory | None = None, fingerprint: bytes = b"") -> None:
+        """`factory` overrides the deployment's engine; `fingerprint` is that of another solver of this process."""
+        self._core = core
+        self._factory = factory
+        self._engines: dict[bytes, Engine] = {}
+        """By layout, the one that was used last at the end."""
+        self._told = 0
+        """For how many of the layouts that the core wants it was told of an engine."""
+        self._building: tuple[Layout, Generator[None, None, Engine]] | None = None
+        self.fingerprint = fingerprint
+        """The digest of the fixed small run, empty before the first engine is built."""
+
+    # --- building ----------------------------------------------------------------------------------------------------
+
+    def build_wanted(self) -> None:
+        """Build an engine for every layout that is wanted and has none; the first one gives the fingerprint."""
+        while self.build_some():
+            continue
+
+    def build_some(self) -> bool:
+        """Do one step of building what is wanted; False when there is nothing to build."""
+        if self._building is None:
+            wanted = self._core.layouts_wanted
+            if self._told == len(wanted):
+                return False
+            while len(self._engines) >= ENGINES_KEPT:
+                self._engines.pop(next(iter(self._engines))).close()
+            self._building = wanted[self._told], self._steps(wanted[self._told])
+        layout, steps = self._building
+        try:
+            next(steps)
+        except StopIteration as end:
+            self._building = None
+            self._take(layout, end.value)
+        return True
+
+    @property
+    def is_building(self) -> bool:
+        return self._building is not None
+
+    def _steps(self, layout: Layout) -> Generator[None, None, Engine]:
+        deployment = self._core.deployment
+        assert deployment is not None
+        if self._factory is not None:
+            yield
+            return self._factory(deployment, layout)
+        if not self.fingerprint:
+            prepare_spares(deployment)
+        return (yield from build_in_steps(deployment, layout))
+
+    def _take(self, layout: Layout, engine: Engine) -> None:
+        """Keep a new engine and tell the core."""
+        self._engines[layout.digest] = engine
+        if not self.fingerprint:
+            self.fingerprint = engine_fingerprint(engine, self._core.stepper(layout))
+        self._told += 1
+        self._core.engine_ready(layout, self.fingerprint)
+
+    def rebuild(self) -> None:
+        """Replace every engine by a new one: nothing that matters is lost."""
+        for layout in self._core.layouts_wanted:
+            old = self._engines.pop(layout.digest, None)
+            if old is not None:
+                old.close()
+                self._engines[layout.digest] = self._make(layout)
+
+    def _make(self, layout: Layout) -> Engine:
+        """Build an engine at once."""
+        deployment = self._core.deployment
+        assert deployment is not None
+        return (self._factory or make_engine)(deployment, layout)
+
+    # --- solving -----------------------------------------------------------------------------------------------------
+
+    def engine_for(self, layout: Layout) -> Engine:
+        """Return the engine of a layout; one that went, or never came, is built at once."""
+        engine = self._engines.pop(layout.digest, None) or self._make(layout)
+        self._engines[layout.digest] = engine
+        return engine
+
+    def solve(self, work: Work) -> None:
+        """Solve a tick's work and give it back to the core."""
+        self._core.stepper(work.layout).solve(self.engine_for(work.layout), work)
+        self._core.solved(work)
+
+    def close(self) -> None:
+        for engine in self._engines.values():
+            engine.close()
+        self._engines.clear()
+
+
+def engine_fingerprint(engine: Engine, stepper: Stepper) -> bytes:
+    """Return the digest of a fixed small run: a kicked ball among turning rods, or rovers in curves, 32 ticks.
+
+    It is the same for every layout: what was added to the deployment's world stays parked. The meshes of the scenery,
+    as they were read here, are part of it.
+    """
+    deployment: Deployment = stepper.deployment
+    layout = stepper.layout
+    numbers = initial_numbers(deployment, layout)
+    stepper.world.stir(numbers)
+    base = build_layout(deployment)
+    declared = [entity for entity in layout.entities if entity.name in base]
+    bodies = tuple(entity for entity in declared if entity.has_body)
+    for tick in range(FINGERPRINT_TICKS):
+        work = Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})
+        stepper.solve(engine, work)
+    content = [number for entity in declared for number in numbers[entity.start : entity.stop]]
+    meshes = [shape.geometry.digest for shape in deployment.scenery_shapes() if isinstance(shape.geometry, Mesh)]
+    return blake2b(np.array(content).tobytes() + b"".join(meshes), digest_size=32).digest()

@@ -1,0 +1,60 @@
+"""Dispatch: the software of a base station. It hears what rovers tell, and tells all of them where the others are.
+
+So a rover that hears no neighbour still knows where they are, as old as that is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from mypy_extensions import mypyc_attr
+
+from foosim.client.packets import Outgoing
+from foosim.client.player import Samples, Turn
+from foosim.common.errors import BadValue
+from foosim.deployment.schema import Deployment
+from foosim.players.beacons import FLEET, TELEMETRY, Entry, Telemetry, decode_telemetry, encode_fleet
+from foosim.players.roadmap import roadmap_of
+from foosim.world.robots.rover import RoverRobot
+
+FLEET_S: Final = 1.0
+FORGOTTEN_S: Final = 60.0
+ENTRIES_MAX: Final = 30
+"""210 bytes, which the smallest packets of the usual radios hold; the newest are told."""
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class Dispatch:
+    """The player. Its one parameter is `cell_m`, the patrols' own: both number the spots of the same roadmap."""
+
+    def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
+        cell_m = {"cell_m": 2.5, **parameters}.pop("cell_m")
+        if set(parameters) - {"cell_m"}:
+            raise BadValue("no parameter of a dispatch but cell_m", ", ".join(sorted(set(parameters) - {"cell_m"})))
+        if isinstance(cell_m, bool) or not isinstance(cell_m, int | float) or not 0.0 < cell_m < 1000.0:
+            raise BadValue("parameter cell_m is not a number above 0", cell_m)
+        self.fleet: dict[int, tuple[float, Telemetry]] = {}
+        """What each rover has told last, and when that was (s), by its number."""
+        self._rovers = sum(isinstance(robot, RoverRobot) for robot in deployment.robots.values())
+        self._spots = len(roadmap_of(deployment, cell_m).spots)
+        self._tick_s = deployment.tick_ns / 1e9
+        self._due_s = 0.0
+
+    def act(self, tick: int, samples: Samples) -> Turn:
+        """Take what has come; once a second, say it all."""
+        now_s = tick * self._tick_s
+        for (_, channel), sample in samples.items():
+            if channel != TELEMETRY:
+                continue
+            told = decode_telemetry(sample.value, self._rovers, self._spots)
+            said_s = sample.sent_ns / 1e9
+            if told is not None and said_s > self.fleet.get(told.number, (-1.0, told))[0]:
+                self.fleet[told.number] = said_s, told
+        if now_s < self._due_s:
+            return Turn({})
+        self._due_s = now_s + FLEET_S
+        known = sorted((now_s - said_s, number) for number, (said_s, _) in self.fleet.items())
+        newest = [(age, self.fleet[number][1]) for age, number in known if age <= FORGOTTEN_S][:ENTRIES_MAX]
+        entries = [Entry(told.number, told.here, told.goal, age) for age, told in newest]
+        return Turn({}, [Outgoing("", FLEET, encode_fleet(entries))] if entries else [])

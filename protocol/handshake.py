@@ -1,0 +1,231 @@
+"""The handshake of a process with the supervisor, as the process sees it: hello, build, ready, and the heartbeat.
+
+Hello and ready are said again until they are answered, since declaring a subscriber does not mean that the other side
+knows of it. A supervisor that was started again recalls who takes part: hello, build and ready once more, while all
+that the process has computed stays. Shared by node and vHub.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, Literal
+
+from foosim.common import limits
+from foosim.common.errors import DeploymentError, Malformed
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
+from foosim.protocol.actions import Action, Publish, Say
+from foosim.protocol.asset_transfer import Fetching
+from foosim.protocol.codec import encode
+from foosim.protocol.messages import Build, Epoch, Fetch, Heartbeat, Hello, Piece, Ready, Recall, Refusal
+from foosim.world.layout import Layout, build_layout
+from foosim.world.mesh import AssetError
+
+AGAIN_NS: Final = 200_000_000
+
+
+class Member:
+    """The state of one process's membership. What it has to say goes to `actions`."""
+
+    def __init__(
+        self,
+        role: Literal["node", "vhub"],
+        name: str,
+        boot: str,
+        fingerprint: bytes,
+        world: str,
+        actions: list[Action],
+        now_ns: int,
+    ) -> None:
+        self.role = role
+        self.name = name
+        self.boot = boot
+        self.refusal = ""
+        self.build: Build | None = None
+        self.deployment: Deployment | None = None
+        self.layout: Layout | None = None
+        """Of the world as it was when the build was said."""
+        self.layouts: list[Layout] = []
+        self.deadline_ns = now_ns
+        self.is_ready = False
+        self.simulation = b""
+        """A node's digest of a fixed small run of its engine, once it has one."""
+        self._fingerprint = fingerprint
+        self._world = world
+        self._actions = actions
+        self._said_ready: Layout | None = None
+        self._built: set[bytes] = set()
+        """Digests of the layouts that were said to be ready."""
+        self._entered = False
+        self._entered_by = ""
+        """Boot of the supervisor in one of whose epochs it was the last time."""
+        self._coming: tuple[Build, Deployment, Fetching] | None = None
+        """A build whose files are on their way."""
+        self._files: dict[str, bytes] = {}
+        """Files that an earlier build brought, by digest."""
+        self._recalled_by = ""
+        """Boot of a supervisor that has recalled this process and not answered its hello yet."""
+        self.standing: Callable[[], Action] | None = None
+        """Gives what is said before each ready (the vHub's)."""
+
+    def take_build(self, build: Build | Piece) -> bool:
+        """Take the supervisor's answer to hello, and then the files that it refers to; True when all is there.
+
+        False also for what is for another boot, or a repeat.
+        """
+        if build.boot != self.boot:
+            return False
+        if self.build is not None:
+            return isinstance(build, Build) and self._take_again(self.build, build)
+        if isinstance(build, Build):
+            if self._coming is None:
+                self._begin_build(build)
+        elif self._coming is not None and self._coming[2].take(build):
+            self.deadline_ns = 0  # the next one follows at once
+        if self._coming is None or self._coming[2].lacking is not None:
+            return False
+        self._end_build(*self._coming)
+        return True
+
+    @property
+    def is_fetching(self) -> bool:
+        """Whether files of the build are on their way."""
+        return self._coming is not None
+
+    def _begin_build(self, build: Build) -> None:
+        try:
+            deployment = load_deployment(build.deployment, build.deployment_name)
+        except DeploymentError as error:
+            raise Malformed(f"a build with a deployment that is not valid here:\n{error}") from None
+        build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
+        self._coming = build, deployment, Fetching(deployment, self._files)
+        self.deadline_ns = 0
+
+    def _end_build(self, build: Build, deployment: Deployment, fetching: Fetching) -> None:
+        self._coming, self._files = None, fetching.files
+        try:
+            deployment = deployment.with_assets(fetching.contents())
+        except AssetError as error:
+            raise Malformed(f"a build with a file that is not valid here: {error}") from None
+        self.layout = build_layout(deployment, [(entity.name, entity.model) for entity in build.added])
+        self.deployment = deployment
+        self.build = build
+        self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's says where clients find it
+        self._world = deployment.world
+
+    def _fetch(self, fetching: Fetching) -> None:
+        """Ask for what is lacking."""
+        assert fetching.lacking is not None
+        digest, offset = fetching.lacking
+        fetch = Fetch(self.name, self.boot, bytes.fromhex(digest), offset)
+        self._actions.append(Publish(channels.FETCH, self.name, encode(fetch)))
+
+    @property
+    def first_tick(self) -> int:
+        """The tick of the frame that the run began with."""
+        return 0 if self.build is None or self.build.origin is None else self.build.origin.tick
+
+    def _take_again(self, known: Build, build: Build) -> bool:
+        """Take the answer of the supervisor that has recalled this process, if it is about the same run."""
+        if not self._recalled_by or self.deployment is None:
+            return False
+        if (build.run, build.deployment) != (known.run, known.deployment):
+            self.refusal = f"the supervisor is that of another run, {build.run}, this takes part in {known.run}"
+            self._actions.append(Say("error", self.refusal))
+            return False
+        self._recalled_by = ""
+        self.layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in build.added])
+        self.build = build
+        self.deadline_ns = 0
+        return True
+
+    def recall(self, recall: Recall) -> bool:
+        """A supervisor does not know this process: say hello to it, unless it is the one that is known."""
+        if self.build is None or recall.boot in (self.build.supervisor, self._recalled_by):
+            return False
+        self._actions.append(Say("warning", "recalled by a supervisor that was started again"))
+        self._recalled_by = recall.boot
+        self._entered = False
+        self.deadline_ns = 0
+        return True
+
+    def refuse(self, refusal: Refusal) -> bool:
+        """Take a refusal; False when it is meant for another boot."""
+        if refusal.boot != self.boot:
+            return False
+        self.refusal = refusal.reason
+        self._actions.append(Say("error", f"refused by the supervisor: {refusal.reason}"))
+        return True
+
+    def check_epoch(self, epoch: Epoch) -> None:
+        """Raise `Malformed` unless every robot has one owner, who takes part, and the added entities make a layout."""
+        assert self.deployment is not None
+        owners, roster = dict(epoch.owners), set(epoch.roster)
+        if len(owners) != len(epoch.owners) or owners.keys() != self.deployment.robots.keys():
+            raise Malformed(f"epoch {epoch.epoch}: owners of {len(epoch.owners)} robots, not of each robot once")
+        if not set(owners.values()) <= roster or len(roster) != len(epoch.roster):
+            raise Malformed(f"epoch {epoch.epoch}: a roster of {', '.join(epoch.roster)} without every owner once")
+        if epoch.branch > epoch.epoch:
+            raise Malformed(f"epoch {epoch.epoch}: of branch {epoch.branch}, which is to come")
+        build_layout(self.deployment, [(entity.name, entity.model) for entity in epoch.added])
+
+    def want_layout(self, layout: Layout) -> None:
+        """Ask the shell for what this layout needs (a node: an engine)."""
+        if all(layout.digest != wanted.digest for wanted in self.layouts):
+            self.layouts.append(layout)
+        elif layout.digest in self._built:
+            self.ready(layout)
+
+    def ready(self, layout: Layout) -> None:
+        """Say that this layout is built."""
+        self.is_ready = True
+        self._said_ready = layout
+        self._built.add(layout.digest)
+        if self.standing is not None:
+            self._actions.append(self.standing())
+        ready = Ready(self.name, self.boot, layout.digest, self.simulation or self._fingerprint)
+        self._actions.append(Publish(channels.READY, self.name, encode(ready)))
+
+    def entered(self) -> None:
+        """An epoch with this process in it has begun: nothing is to be said again."""
+        self._entered = True
+        self._entered_by = "" if self.build is None else self.build.supervisor
+
+    def repeated(self, is_present: bool) -> None:
+        """An epoch came again; the present one answers a ready that was said again.
+
+        Not to a supervisor that has recalled this process: it begins an epoch of its own, this is one of before.
+        """
+        is_known = self.build is not None and self.build.supervisor == self._entered_by and not self._recalled_by
+        self._entered = self._entered or (is_present and is_known)
+
+    def begin_anew(self) -> None:
+        """The run goes on without this process: come back by the handshake. What is built stays."""
+        self.build = self.layout = self._said_ready = self._coming = None
+        self.is_ready = self._entered = False
+        self._recalled_by = ""
+        self.deadline_ns = 0
+
+    def wake(self, now_ns: int, heartbeat: Callable[[], Heartbeat]) -> None:
+        """Say hello or ready again and the heartbeat, each when it is due."""
+        if now_ns < self.deadline_ns:
+            return
+        if self.refusal:
+            self.deadline_ns = now_ns + AGAIN_NS
+            return
+        if self._coming is not None:
+            self._fetch(self._coming[2])
+            self._actions.append(Publish(channels.HEARTBEAT, self.name, encode(heartbeat())))
+            self.deadline_ns = now_ns + AGAIN_NS
+            return
+        if self.build is None or self._recalled_by:
+            hello = Hello(self.role, self.name, self.boot, limits.PROTOCOL_VERSION, self._world, self._fingerprint)
+            self._actions.append(Publish(channels.HELLO, self.name, encode(hello)))
+            self.deadline_ns = now_ns + AGAIN_NS
+            if self.build is None:
+                return
+        elif not self._entered and self._said_ready is not None:
+            self.ready(self._said_ready)
+        self._actions.append(Publish(channels.HEARTBEAT, self.name, encode(heartbeat())))
+        self.deadline_ns = now_ns + limits.HEARTBEAT_NS

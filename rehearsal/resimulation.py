@@ -1,0 +1,140 @@
+"""The world computed again from orders and deliveries alone, on any number of nodes: what `verify` compares with.
+
+The nodes are those of a run, with their cores, parts and engines; supervisor and vHub are replaced by what the capture
+says they said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from foosim.deployment.schema import Deployment
+from foosim.node.core import NodeCore
+from foosim.node.engines.interface import EngineFactory
+from foosim.node.engines_pool import Solver
+from foosim.protocol import channels
+from foosim.protocol.actions import Publish
+from foosim.protocol.asset_transfer import piece_of
+from foosim.protocol.codec import encode
+from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.messages import Build, Commit, Deliveries, Epoch, Order, Prepare
+from foosim.rehearsal.bus import Bus
+from foosim.world.edits import Edit, layout_after
+from foosim.world.frame import Frame
+from foosim.world.initial_state import AddedEntity, Start, first_frame
+from foosim.world.layout import Layout, build_layout
+from foosim.world.robot_packets import Delivered, RobotPacket
+
+SOURCE = "capture"
+
+
+class Replica:
+    """Nodes of a deployment, fed tick by tick. `frame` is the world so far."""
+
+    def __init__(
+        self,
+        text: str,
+        name: str,
+        deployment: Deployment,
+        factory: EngineFactory | None = None,
+        start: Start | None = None,
+    ) -> None:
+        self.frame: Frame = first_frame(deployment, start)
+        self._deployment = deployment
+        self._base = build_layout(deployment)
+        self._bus = Bus()
+        self._nodes: dict[str, tuple[NodeCore, Solver]] = {}
+        for node in sorted(deployment.nodes):
+            core = NodeCore(node, "boot", library_fingerprint(), 0)
+            self._nodes[node] = core, Solver(core, factory)
+            self._bus.subscribe(node, channels.NODE_READS)
+        self._bus.subscribe(SOURCE, ((channels.FETCH, False),))
+        for node in self._nodes:
+            origin = None if start is None else start.origin
+            build = Build(node, "boot", "first", SOURCE, name, text, "fast", self._added(self.frame.layout), origin)
+            self._say(channels.BUILD, node, encode(build))
+        self._settle()
+        self._epoch = self._branch = 0
+        self._begin(self.frame)
+
+    def _begin(self, frame: Frame) -> None:
+        """Go on from a frame, in an epoch of its own."""
+        self.frame = frame
+        self._epoch += 1
+        owners, added = sorted(self._deployment.owners().items()), self._added(frame.layout)
+        who = sorted(self._nodes), owners, added, b"", self._branch, frame.tick
+        self._say(channels.EPOCH, SOURCE, encode(Epoch(self._epoch, frame.tick, frame.digest, *who)))
+        commit = Commit(
+            self._epoch, frame.tick, frame.digest, frame.values.tobytes(), frame.outbox_items, [], last=False
+        )
+        for node in self._nodes:
+            self._say(channels.COMMIT, node, encode(commit))
+        self._settle()
+
+    def set_back(self, frame: Frame) -> None:
+        """Go on from another frame than the last one, of an earlier tick."""
+        self._branch = self._epoch + 1
+        self._begin(frame)
+
+    @property
+    def arithmetic(self) -> bytes:
+        """The digest of the fixed small run of this machine's engine: captures with another one may differ."""
+        core, _ = next(iter(self._nodes.values()))
+        return core.member.simulation
+
+    def step(self, edits: Sequence[Edit], delivered: Sequence[Delivered]) -> Frame:
+        """Compute the next frame from what the order and the vHub gave to this tick."""
+        tick = self.frame.tick
+        layout = layout_after(self.frame.layout, edits)
+        if layout is not self.frame.layout:
+            self._say(channels.PREPARE, SOURCE, encode(Prepare(self._added(layout))))
+            self._settle()
+        self._say(channels.ORDER, SOURCE, encode(Order(self._epoch, tick, list(edits))))
+        self._say(channels.DELIVERIES, SOURCE, encode(Deliveries(tick, list(delivered), branch=self._branch)))
+        self._settle()
+        core, _ = next(iter(self._nodes.values()))
+        assert core.frame is not None and core.frame.tick == tick + 1, "every node has its inputs"
+        self.frame = core.frame
+        return self.frame
+
+    def sense(self) -> list[RobotPacket]:
+        """Return what all robots send at the frame, in (robot, index) order."""
+        core, _ = next(iter(self._nodes.values()))
+        packets, _ = core.stepper(self.frame.layout).sense(self.frame, self.frame.layout.robots)
+        return packets
+
+    def rebuild_engines(self) -> None:
+        """Replace all engines by new ones."""
+        for _, solver in self._nodes.values():
+            solver.rebuild()
+
+    def close(self) -> None:
+        for _, solver in self._nodes.values():
+            solver.close()
+
+    def _added(self, layout: Layout) -> list[AddedEntity]:
+        return [AddedEntity(e.name, e.model) for e in layout.entities if e.name not in self._base]
+
+    def _say(self, channel: channels.Channel, name: str, payload: bytes) -> None:
+        self._bus.put(SOURCE, channel, name, payload, 0)
+
+    def _settle(self) -> None:
+        """Let the nodes take turns until nobody has anything to say."""
+        while not self._bus.is_empty:
+            _, _, receiver, channel, name, payload = self._bus.pop()
+            if receiver == SOURCE:
+                piece = piece_of(self._deployment, channels.read(channel, name, payload))
+                self._say(channels.PIECE, piece.name, encode(piece))
+                continue
+            core, solver = self._nodes[receiver]
+            core.receive(channel, name, payload, 0)
+            core.wake(0)
+            solver.build_wanted()
+            core.advance(0)
+            while core.work is not None:
+                solver.solve(core.work)
+                core.advance(0)
+            for action in core.actions:
+                if isinstance(action, Publish):
+                    self._bus.put(receiver, action.channel, action.name, action.payload, 0)
+            core.actions.clear()

@@ -1,0 +1,1 @@
+"""Random faults against invariants, by seed."""

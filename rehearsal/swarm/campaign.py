@@ -1,0 +1,346 @@
+"""Rehearsals under random faults, by seed: the real cores of all processes, on virtual time, in bad weather.
+
+A seed decides the number of nodes, their clocks, the weather on the bus and when which fault happens. The laws are
+checked at whatever is written, said and closed; then everything heals, and the run must go on and be finished with
+everybody back. A failing seed is one command.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from typing import Final
+
+from foosim.client.core import ClientCore
+from foosim.client.packets import Outgoing
+from foosim.common.errors import Refused
+from foosim.common.names import CHANNEL_ECHO
+from foosim.common.units import Pace
+from foosim.deployment.loader import load_deployment
+from foosim.node.core import NodeCore
+from foosim.protocol import channels
+from foosim.rehearsal.bus import CALM, Traced, Weather
+from foosim.rehearsal.clock import Clock
+from foosim.rehearsal.failures import Broken
+from foosim.rehearsal.resimulation import Replica
+from foosim.rehearsal.run import with_nodes
+from foosim.rehearsal.swarm.faults import (
+    CHANGES_THE_WORLD,
+    FAULT_OF,
+    HEALED_TICK,
+    HOUR_NS,
+    KINDS,
+    MS,
+    ONCE,
+    TICKS,
+    Dice,
+    Fault,
+    ask,
+    lose_player,
+    loses_players,
+    revive,
+    when_answered,
+)
+from foosim.rehearsal.swarm.invariants import Laws
+from foosim.rehearsal.swarm.memory_bounds import too_large
+from foosim.rehearsal.swarm.packet_invariants import hold
+from foosim.rehearsal.system import Settings, System
+from foosim.supervisor.settings import RunSettings
+from foosim.world.frame import Frame
+
+FAULTS: Final[tuple[int, ...]] = (8, 20)
+NODES: Final[tuple[int, ...]] = (3, 3, 3, 4, 4, 5)
+HEALED_PACE: Final = "0.02x"
+"""100 ms a tick: slow enough that all are back before the end."""
+PROGRESS_NS: Final = 10_000_000_000
+"""When all is healed the next tick is committed within this virtual time."""
+BOUNDS_EVERY: Final = 50
+"""How many ticks apart everything is looked at that processes keep: a look takes as long as some ticks."""
+IDLE_NS: Final = 60_000_000_000
+"""Before, with all that goes on, within this."""
+WORLDS: Final = 4
+"""How many worlds there are: seeds differ in what happens to the processes, and take the next of these in turn."""
+PROBER: Final = "prober"
+SMALL: Final[tuple[str, ...]] = (
+    "engine=pure",
+    "substeps=1",
+    f"clients={{{PROBER}: {{lockstep: true, rate: 50 Hz}}}}",
+)
+"""What is computed is the same, with fewer steps to it, and robots are asked for echoes."""
+OF_TABLE: Final[tuple[str, ...]] = ("table.rules.kickoff_delay=20 ms",)
+"""The ball of a table rolls from the start."""
+BY_PERIOD: Final[tuple[str, ...]] = ("act=period", "arrivals={}", "rate=100 Hz")
+"""Players that act at arrival do so in the last world; in others they have ticks of their own: both kinds are flown."""
+PATIENT: Final[tuple[str, ...]] = (
+    "deadlines.tick_lost=5 s",
+    "deadlines.lockstep_fast=24 h",
+    "deadlines.lockstep_realtime=24 h",
+    "deadlines.client_back=24 h",
+    "deadlines.start=24 h",
+)
+"""A bus that loses a tenth of what is said and asked can keep a process for longer than a link that loses nothing."""
+RESTART_NS: Final = 500 * MS
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a seed stands for."""
+
+    seed: int
+    nodes: int
+    weather: Weather
+    faults: tuple[Fault, ...]
+    clocks: tuple[tuple[str, Clock], ...]
+    ticks: int = TICKS
+
+    @property
+    def healed_tick(self) -> int:
+        return self.ticks - TICKS + HEALED_TICK
+
+    @property
+    def kinds(self) -> list[str]:
+        return sorted({fault.kind for fault in self.faults})
+
+
+def plan_of(seed: int, ticks: int = TICKS) -> Plan:
+    """Return the plan of a seed: nodes, clocks, weather, and from 8 to 20 faults, of three kinds at least.
+
+    A longer run has as many more of them.
+    """
+    dice = Dice(seed)
+    nodes = dice.one_of(NODES)
+    names = [f"n{number}" for number in range(1, nodes + 1)]
+    bad = dice.unit() < 0.7
+    weather = Weather(
+        seed,
+        delay_ns=dice.between(0, MS) if bad else 0,
+        spread_ns=dice.between(0, 3 * MS) if bad else 0,
+        loss=dice.one_of((0.0, 0.02, 0.1)) if bad else 0.0,
+        repeat=dice.one_of((0.0, 0.05, 0.3)) if bad else 0.0,
+    )
+    chosen = [KINDS[(seed + place) % len(KINDS)] for place in range(3)]
+    times = max(1, ticks // TICKS)
+    chosen += [dice.one_of(KINDS) for _ in range(dice.between(*FAULTS) * times - len(chosen))]
+    once = [kind for place, kind in enumerate(chosen) if kind not in ONCE or kind not in chosen[:place]]
+    late = max(0, ticks - TICKS)
+    faults = [_later(FAULT_OF[kind](dice, names), dice.between(0, late) if late else 0) for kind in once]
+    if loses_players(seed):
+        of_players = Dice(seed, "players")
+        lost = [lose_player(of_players, names) for _ in range(of_players.between(1, 3) * times)]
+        faults += [_later(fault, of_players.between(0, late) if late else 0) for fault in lost]
+    faults.sort(key=lambda fault: fault.tick)
+    here = (*names, channels.SUPERVISOR, channels.VHUB, PROBER)
+    clocks = tuple((name, Clock(dice.between(0, 2 * HOUR_NS), dice.between(-1000, 1000))) for name in here)
+    return Plan(seed, nodes, weather, tuple(faults), clocks, ticks)
+
+
+def _later(fault: Fault, ticks: int) -> Fault:
+    return replace(fault, tick=fault.tick + ticks)
+
+
+class Prober:
+    """A lockstep client that asks robots for echoes, each with a number of its own, and counts what comes back."""
+
+    OF_TABLE: Final[tuple[str, ...]] = ("blue.goal", "camera", "red.midfield")
+
+    def __init__(self, core: ClientCore) -> None:
+        self._core = core
+        self._joined = False
+        self._sent = 0
+        self._back: dict[bytes, int] = {}
+        """The echoes that have come, with the tick at which they did."""
+        self._branch = 0
+        self._robots: list[str] = []
+
+    def step(self, now_ns: int) -> None:
+        """Join, and answer each Go with a question."""
+        core = self._core
+        if core.deployment is None or core.ended:
+            return
+        if not self._joined:
+            self._joined = True
+            deployment = core.deployment
+            spec = deployment.clients[PROBER]
+            assert spec.rate_hz is not None
+            self._robots = sorted(deployment.robots)[:3] if deployment.is_hall else list(self.OF_TABLE)
+            heard = [(robot, CHANNEL_ECHO) for robot in self._robots]
+            core.join(deployment.ticks(spec.rate_hz), heard, spec.offset_ns // deployment.tick_ns)
+        if core.branch != self._branch:
+            self._branch, last = core.branch, core.branch_ns // core.deployment.tick_ns
+            self._back = {payload: tick for payload, tick in self._back.items() if tick <= last}
+        if core.go is not None:
+            for packet in core.go.packets:
+                if packet.payload in self._back:
+                    raise Broken(f"echo {packet.payload.decode()} comes back twice")
+                self._back[packet.payload] = core.go.tick
+            robot = self._robots[self._sent % len(self._robots)]
+            self._sent += 1
+            core.done([Outgoing(robot, CHANNEL_ECHO, f"{robot} {self._sent}".encode())])
+
+
+class WatchedNode(NodeCore):
+    """A node that lets the laws see from what it makes its frames."""
+
+    def _enter(self, frame: Frame, now_ns: int) -> None:
+        if self._barrier is not None:
+            old = [part.node for part in self._barrier.parts.values() if part.epoch != self.epoch]
+            hold(not old, f"{self.name} takes parts of {old} from another epoch than {self.epoch}")
+        super()._enter(frame, now_ns)
+
+    def _resume(self, frame: Frame, now_ns: int) -> None:
+        epoch = self._awaited_epoch
+        if epoch is not None:
+            fits = frame.tick == epoch.tick and frame.digest == epoch.digest
+            hold(fits, f"{self.name} begins epoch {epoch.epoch} from another frame than its own")
+        super()._resume(frame, now_ns)
+
+
+@dataclass(slots=True)
+class Flown:
+    """How a seed went. `broken` is empty when all laws held and the run was finished."""
+
+    seed: int
+    nodes: int
+    kinds: list[str]
+    faults: list[str]
+    ticks: int = 0
+    epochs: int = 0
+    losses: int = 0
+    joins: int = 0
+    restarts: int = 0
+    branches: int = 0
+    seen: int = 0
+    """Things that were written or said, each of them checked."""
+    virtual_s: float = 0.0
+    broken: str = ""
+    chain: str = ""
+    packets: dict[str, int] = field(default_factory=dict)
+
+
+@lru_cache(maxsize=4 * WORLDS)
+def worlds(text: str, name: str, nodes: int, seed: int) -> tuple[str, str]:
+    """Return the swarm's world of a deployment on some nodes, and the same on one, without players."""
+    deployment = load_deployment(text, name)
+    of_world = [] if deployment.is_hall else list(OF_TABLE)
+    if seed != WORLDS - 1:
+        acting = [player for player in deployment.players if deployment.arrivals_of(player)]
+        of_world += [f"players.{player}.{what}" for player in acting for what in BY_PERIOD]
+    text = with_nodes(text, name, nodes, [f"seed={seed}", *SMALL, *of_world, *PATIENT])
+    return text, with_nodes(text, name, 1, ["players={}", "clients={}", "network={}"])
+
+
+class Flight:
+    """One seed under way: the system, the laws that watch it, and its healing."""
+
+    def __init__(self, text: str, name: str, plan: Plan, settings: Settings) -> None:
+        text, alone = worlds(text, name, plan.nodes, plan.seed % WORLDS)
+        self.plan = plan
+        self.seen = 0
+        self._healed_ns = -1
+        self._last_commit_ns = 0
+        self._replica = Replica(alone, name, load_deployment(alone, name))
+        self.laws = Laws(self._replica, load_deployment(text, name))
+        chosen = replace(
+            settings,
+            node=WatchedNode if settings.node is NodeCore else settings.node,
+            weather=plan.weather,
+            clocks=dict(plan.clocks),
+            clients={PROBER: lambda core: Prober(core).step},
+            restart_ns=RESTART_NS,
+            keeps_journals=True,
+            observer=self._see,
+            observes=("journal", "publish"),
+            on_closing=self.laws.close,
+            on_hub_loss=self.laws.lose_hub,
+            on_supervisor_loss=self.laws.lose_supervisor,
+            on_commit=self._committed,
+        )
+        self.system = System(RunSettings(f"swarm-{plan.seed}", name, text, Pace("fast"), plan.ticks), chosen)
+        self.laws.flipped = self.system.flipped
+        for fault in plan.faults:
+            self.system.at_tick(fault.tick, partial(fault.do, self.system))
+        self.system.at_tick(plan.healed_tick, self._heal)
+
+    def run(self) -> None:
+        """Run to the end; raise Broken for a law that does not hold, or what a core asserts."""
+        try:
+            self.system.run()
+            end = self.system.supervisor.end
+            if end is None or end.reason != "done":
+                raise Broken(f"the run ended: {'not at all' if end is None else end.reason}")
+            self.laws.end(self.system, self.plan.nodes)
+        finally:
+            self.system.close()
+            self._replica.close()
+
+    def _see(self, traced: Traced) -> None:
+        self.seen += 1
+        idle_ns = traced.now_ns - self._last_commit_ns
+        if idle_ns > (IDLE_NS if self._healed_ns < 0 else PROGRESS_NS):
+            raise Broken(f"{'healed, ' * (self._healed_ns >= 0)}no tick is committed for {idle_ns / 1e9:.0f} s")
+        self.laws.see(traced)
+        if traced.what == "journal" and traced.process == channels.VHUB and self.system.hub.state is not None:
+            self.laws.packets.account(self.system.hub.state)
+
+    def _committed(self, frame: Frame) -> None:
+        self._last_commit_ns = self.system.bus.now_ns
+        if frame.tick % BOUNDS_EVERY == 0:
+            large = [text for process in self.system.processes.values() for text in too_large(process.core)]
+            hold(not large, f"at tick {frame.tick} what is kept grows: {', '.join(large)}")
+
+    def _heal(self) -> None:
+        """Fine weather from now on: who is down comes up, who is slow is quick, who stood still goes on."""
+        system = self.system
+        self._healed_ns = self._last_commit_ns = system.bus.now_ns
+        system.healed = True
+        system.bus.heal()
+        system.people.give_up("rate")  # or one that was lost before comes after this one
+        ask(system, "rate", pace=HEALED_PACE)
+        for name, process in list(system.processes.items()):
+            process.slow_ns = 0
+            system.resume(name)
+        stops = [identity for identity, verb in system.people.asked.items() if verb == "stop"]
+        when_answered(system, stops, self._start_all)
+
+    def _start_all(self, system: System) -> None:
+        for number in range(1, self.plan.nodes + 1):
+            ask(system, "start", node=f"n{number}")
+            revive(system, f"n{number}")
+        for name in sorted(system.players):
+            revive(system, name)
+
+
+@lru_cache(maxsize=4 * WORLDS)
+def undisturbed(text: str, name: str, world: int, ticks: int) -> bytes:
+    """Return the chain of a world in which nothing happens."""
+    flight = Flight(text, name, Plan(world, NODES[0], CALM, (), (), ticks), Settings())
+    flight.run()
+    return flight.system.supervisor.chain
+
+
+def fly(text: str, name: str, seed: int, settings: Settings | None = None, ticks: int = TICKS) -> Flown:
+    """Rehearse a deployment under the faults of a seed, on the pure engine. `settings` may plant faulty cores.
+
+    Where no fault changes the world, it has to be that of the run in which nothing happened (law 3).
+    """
+    plan = plan_of(seed, ticks)
+    flown = Flown(seed, plan.nodes, plan.kinds, [f"tick {fault.tick}: {fault.what}" for fault in plan.faults])
+    flight = Flight(text, name, plan, settings or Settings())
+    try:
+        flight.run()
+        if not CHANGES_THE_WORLD & {*plan.kinds}:
+            same = flight.system.supervisor.chain == undisturbed(text, name, seed % WORLDS, ticks)
+            hold(same, "the world is not the one that would have been")
+    except (AssertionError, Refused, ArithmeticError, LookupError, TypeError, ValueError) as error:
+        flown.broken = f"{type(error).__name__}: {error}"  # what a core raises would have ended its process
+    system, told = flight.system, flight.system.supervisor.recovery.recovered
+    flown.ticks, flown.chain, flown.seen = flight.laws.ticks, system.supervisor.chain.hex(), flight.seen
+    flown.epochs, flown.virtual_s = flight.laws.epoch, system.bus.now_ns / 1e9
+    flown.losses = sum(entry.what == "node" for entry in told)
+    flown.joins = sum(entry.what == "join" for entry in told)
+    flown.branches = sum(entry.reason.startswith("branch") for entry in told)
+    flown.restarts = sum(entry.what == channels.SUPERVISOR for entry in told)
+    if system.hub.state is not None:
+        packets = system.hub.state.packets
+        flown.packets = {"offered": packets.offered, "delivered": packets.delivered, "dropped": packets.dropped}
+    return flown

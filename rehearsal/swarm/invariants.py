@@ -1,0 +1,328 @@
+"""The laws as a watch over a rehearsal: told of everything that is written and said, it raises at the first breach.
+
+It keeps a history of its own, from what processes wrote and said alone, and asks at each thing whether it may follow
+on it: who may write what, what is final, what has to be written first. Each committed tick is computed again by a
+replica, and at the end the journals are folded and compared with those who wrote them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Final
+
+from msgspec.structs import replace
+
+from foosim.common import limits
+from foosim.deployment.schema import Deployment
+from foosim.protocol import channels
+from foosim.protocol.barrier import basis_of, edits_content
+from foosim.protocol.codec import decode, decode_any, encode
+from foosim.protocol.messages import Answer, Commit, Deliveries, Done, Down, Epoch, Go, Order, Part, Recovered
+from foosim.rehearsal.bus import Traced
+from foosim.rehearsal.resimulation import Replica
+from foosim.rehearsal.swarm.packet_invariants import PacketLaws, hold
+from foosim.rehearsal.swarm.world_bounds import strays
+from foosim.rehearsal.system import System
+from foosim.supervisor.records import CommitRecord, HeadRecord, OrderedRecord, RecoveredRecord, RequestRecord
+from foosim.supervisor.records import Record as SupervisorRecord
+from foosim.supervisor.records import fold as fold_supervisor
+from foosim.vhub.records import Closing, HubRecord, TickRecord
+from foosim.vhub.records import fold as fold_hub
+from foosim.world.edits import Edit
+from foosim.world.frame import CHAIN_START, chain_next
+from foosim.world.initial_state import initial_frame
+
+FRAMES_KEPT: Final = 400
+"""More ticks than are lost with a machine."""
+
+
+class Laws:
+    """Watches a run; raises Broken at the first thing that must not be. `ticks` are those that it saw whole."""
+
+    def __init__(self, replica: Replica, deployment: Deployment) -> None:
+        self.ticks = 0
+        self.packets = PacketLaws(deployment)
+        self.epoch = 0
+        self.flipped: Collection[str] = ()
+        """Nodes whose memory a fault has changed."""
+        self._replica = replica
+        self._deployment = deployment
+        self._chains = {0: CHAIN_START}
+        """By tick, over all frames up to it."""
+        self._frames = {0: initial_frame(deployment)}
+        """Those of the last ticks that are captured."""
+        self._branch = 0, 0
+        """Number and tick of the last branch."""
+        self._is_begun = False
+        """Whether no epoch is in it yet."""
+        self._digests = {0: initial_frame(deployment).digest}
+        self._rosters: dict[int, list[str]] = {}
+        self._epochs: set[bytes] = set()
+        self._commits: dict[int, bytes] = {}
+        self._parts: dict[tuple[int, int], dict[str, tuple[bytes, Part]]] = {}
+        """By (epoch, tick) and node: the one thing that it may say there."""
+        self._ordered: dict[int, list[Edit]] = {}
+        """What journalled requests change, by tick."""
+        self._orders: dict[int, bytes] = {}
+        self._said_epoch: dict[str, int] = {}
+        """The newest epoch of which each node has said a part."""
+        self._stopped: list[str] = []
+        self._answers: dict[tuple[str, str], bytes] = {}
+        self._chosen = deployment.owners()
+        """The owner of each robot by the deployment, or by who moved it last."""
+        self._untold: list[Recovered] = []
+        """Losses and returns that are written, and of which no commit has told."""
+        self._told: dict[int, list[Recovered]] = {}
+        """What each commit has told, by tick."""
+        self._captured_told: set[int] = set()
+        """The ticks of which the capture has it."""
+        self._journals: dict[str, list[bytes]] = {channels.SUPERVISOR: [], channels.VHUB: []}
+        self._readers: Mapping[tuple[str, str], Callable[[Traced], None]] = {
+            ("journal", channels.SUPERVISOR): self._supervisor_writes,
+            ("journal", channels.VHUB): self._hub_writes,
+            ("publish", channels.PART.name): self._part,
+            ("publish", channels.ORDER.name): self._order,
+            ("publish", channels.COMMIT.name): self._commit,
+            ("publish", channels.EPOCH.name): self._epoch_said,
+            ("publish", channels.DELIVERIES.name): self._deliveries,
+            ("publish", channels.ANSWER.name): self._answer,
+            ("publish", channels.DOWN.name): self._down,
+            ("publish", channels.UP.name): self._up,
+        }
+
+    @property
+    def committed(self) -> int:
+        return next(reversed(self._commits), -1)  # they come one after the other
+
+    def see(self, traced: Traced) -> None:
+        """Look at one thing that a process did."""
+        reader = self._readers.get((traced.what, traced.channel or traced.process))
+        if reader is not None:
+            reader(traced)
+
+    # --- what is written -------------------------------------------------------------------------------------------
+
+    def _supervisor_writes(self, traced: Traced) -> None:
+        self._journals[channels.SUPERVISOR].append(traced.payload)
+        record = decode_any(SupervisorRecord, traced.payload)
+        if isinstance(record, CommitRecord):
+            self._commits_one(record.commit, decode(Commit, record.commit))
+        elif isinstance(record, Epoch):
+            self._begins(record, traced.payload)
+        elif isinstance(record, HeadRecord) and record.branch[0] >= self._branch[0] and record.branch != self._branch:
+            self._branches(*record.branch)
+            self._tells_again([entry.message() for entry in record.recovered if entry.outage_ns < 0])
+        elif isinstance(record, OrderedRecord):
+            self._ordered.setdefault(record.tick, []).extend(record.edits)
+        elif isinstance(record, RecoveredRecord):
+            self._untold.append(record.entry.message())
+        elif isinstance(record, RequestRecord):
+            key = record.answer.sender, record.answer.id
+            hold(key not in self._answers, f"request {key} is carried out twice")
+            hold(not record.edits or record.tick > max(self._orders, default=-1), f"{key} changes what is released")
+            self._answers[key] = encode(record.answer)
+            self._ordered.setdefault(record.tick, []).extend(record.edits)
+            self._stopped = record.control.stopped
+            robot, does, _ = f"{record.answer.text}  ".split(" ", 2)
+            if does in ("moved", "is") and robot in self._chosen:
+                self._chosen[robot] = record.owners[robot]
+
+    def _commits_one(self, raw: bytes, commit: Commit) -> None:
+        """Law 3 and 4: one more tick, of the present epoch, from one part of each node in it, all from one basis."""
+        tick, epoch = commit.tick, commit.epoch
+        hold(tick == self.committed + 1, f"commit {tick} after {self.committed}")
+        hold(epoch == self.epoch, f"commit {tick} of epoch {epoch} in epoch {self.epoch}")
+        self._commits[tick] = raw
+        self._tells(commit)
+        if tick == 0:
+            hold(commit.digest == self._digests[0], "frame 0 is not that of the deployment")
+            return
+        self._digests[tick] = commit.digest
+        self._chains[tick] = chain_next(self._chains[tick - 1], commit.digest)
+        parts = self._parts.get((epoch, tick), {})
+        hold(sorted(parts) == self._rosters[epoch], f"commit {tick}: parts of {sorted(parts)} in epoch {epoch}")
+        hold(edits_content(commit.edits) == self._orders.get(tick - 1), f"commit {tick} with edits that nobody ordered")
+        basis = self._basis(tick, commit.edits)
+        strange = [node for node, (_, part) in parts.items() if part.basis != basis]
+        hold(not strange, f"commit {tick} is made of parts of {strange}, from another basis")
+        self._check_ahead(tick + 1)
+        solved = sorted(index for _, part in parts.values() for index in part.solved)
+        hold(solved == list(range(len(solved))), f"tick {tick}: entities {solved} are solved")
+        for old in [key for key in self._parts if key[1] <= tick]:
+            self._parts.pop(old)
+
+    def _tells(self, commit: Commit) -> None:
+        """Whoever was lost or came is told of by the commit behind it, once, in the order of the journal."""
+        told = [replace(entry, outage_ns=-1) for entry in commit.recovered]
+        hold(told == self._untold, f"commit {commit.tick} tells of {told}, and {self._untold} were written")
+        self._untold.clear()
+        if commit.recovered:
+            self._told[commit.tick] = commit.recovered
+
+    def _basis(self, tick: int, edits: list[Edit]) -> bytes:
+        """Return what all parts of frame `tick` have to start from."""
+        delivered = self.packets.said.get(tick - 1)
+        hold(delivered is not None, f"frame {tick} before the deliveries of the tick before")
+        return basis_of(self._digests[tick - 1], edits, delivered or b"")
+
+    def _check_ahead(self, tick: int) -> None:
+        """Whoever runs ahead of the commits has the frame that is committed then, unless its memory was changed."""
+        for each in [parts for (_, ahead), parts in self._parts.items() if ahead == tick]:
+            for node, (_, part) in each.items():
+                right = node in self.flipped or part.basis == self._basis(tick, self._ordered.get(tick - 1, []))
+                hold(right, f"{node} goes on from another frame {tick - 1} than the committed one")
+
+    def _begins(self, epoch: Epoch, raw: bytes) -> None:
+        hold(epoch.epoch > self.epoch, f"epoch {epoch.epoch} after {self.epoch}")
+        hold(epoch.tick == max(self.committed, 0), f"epoch {epoch.epoch} does not start at the last commit")
+        hold(epoch.digest == self._digests[epoch.tick], f"epoch {epoch.epoch} starts from another frame")
+        owners = dict(epoch.owners)
+        hold(owners.keys() == self._deployment.robots.keys(), f"epoch {epoch.epoch} has not all robots")
+        hold(not {*epoch.roster} & {*self._stopped}, f"epoch {epoch.epoch} is with a node that is stopped")
+        hold({*owners.values()} <= {*epoch.roster}, f"epoch {epoch.epoch}: an owner takes no part")
+        branch = (epoch.epoch if self._is_begun else self._branch[0]), self._branch[1]
+        hold((epoch.branch, epoch.branch_tick) == branch, f"epoch {epoch.epoch} is not of branch {branch}")
+        if self._is_begun:
+            self._branch, self._is_begun = branch, False
+            self.packets.branch(epoch.branch)
+        self.epoch = epoch.epoch
+        self._rosters[epoch.epoch] = sorted(epoch.roster)
+        self._epochs.add(raw)
+
+    def _branches(self, number: int, tick: int) -> None:
+        """A branch begins where the vHub stands; all behind is void, but for what was asked for at its tick."""
+        hold(
+            tick == self.packets.closed, f"branch {number} from tick {tick}, the vHub has closed {self.packets.closed}"
+        )
+        self._branch, self._is_begun = (number, tick), True
+        for known in (self._commits, self._digests, self._chains):
+            for behind in [each for each in known if each > tick]:
+                known.pop(behind)
+        self._orders = {each: edits for each, edits in self._orders.items() if each < tick}
+        self._parts.clear()
+        self.packets.branch(number)
+
+    def _tells_again(self, untold: list[Recovered]) -> None:
+        """What commits told that are void is told again, with that a branch begins."""
+        void = [entry for tick in sorted(self._told) if tick > self.committed for entry in self._told.pop(tick)]
+        again = [*(replace(entry, outage_ns=-1) for entry in void), *self._untold]
+        hold(untold[:-1] == again, f"the branch tells again of {untold[:-1]}, void are {again}")
+        self._captured_told = {tick for tick in self._captured_told if tick <= self.committed}
+        self._untold = untold
+
+    def lose_supervisor(self, journal: Sequence[bytes]) -> None:
+        """The supervisor's machine is lost: of what no commit has told it knows what its journal has."""
+        left = fold_supervisor(self._deployment, journal).recovered
+        self._untold = [entry.message() for entry in left if entry.outage_ns < 0]
+
+    def lose_hub(self, records: int, captured: int) -> None:
+        """The vHub's machine is lost with so many records; up to tick `captured` the capture holds what it held."""
+        journal = self._journals[channels.VHUB]
+        del journal[len(journal) - records :]
+        self.packets.lose(journal, captured)
+        if captured < self._replica.frame.tick:
+            self._replica.set_back(self._frames[max(0, captured)])
+            self.ticks = captured
+
+    def _hub_writes(self, traced: Traced) -> None:
+        self._journals[channels.VHUB].append(traced.payload)
+        record = decode_any(HubRecord, traced.payload)
+        if isinstance(record, TickRecord):
+            hold(record.commit == self._commits.get(record.tick), f"the vHub closes tick {record.tick} uncommitted")
+            self.packets.closes(record, self._digests[record.tick])
+
+    # --- what is said ----------------------------------------------------------------------------------------------
+
+    def _part(self, traced: Traced) -> None:
+        part = decode(Part, traced.payload)
+        hold(part.node in self._rosters.get(part.epoch, ()), f"{part.node} has no part in epoch {part.epoch}")
+        hold(part.epoch >= self._said_epoch.get(part.node, 0), f"{part.node} goes back to epoch {part.epoch}")
+        self._said_epoch[part.node] = part.epoch
+        if part.tick <= self.committed or part.epoch < self._branch[0]:
+            return
+        said = self._parts.setdefault((part.epoch, part.tick), {}).setdefault(part.node, (traced.payload, part))
+        hold(said[0] == traced.payload, f"{part.node} has two parts {part.tick} in epoch {part.epoch}")
+
+    def _order(self, traced: Traced) -> None:
+        """Law 3: order k says the same in every epoch, and what requests change is journalled before."""
+        order = decode(Order, traced.payload)
+        hold(order.epoch == self.epoch, f"order {order.tick} of epoch {order.epoch} in epoch {self.epoch}")
+        last = order.tick + order.following
+        hold(last <= max(self.committed, 0) + limits.RELEASE_AHEAD, f"order {last} is released at {self.committed}")
+        for tick in range(order.tick, last + 1):
+            edits = edits_content(order.edits if tick == order.tick else [])
+            hold(edits == edits_content(self._ordered.get(tick, [])), f"order {tick} is not what was journalled")
+            hold(edits == self._orders.setdefault(tick, edits), f"order {tick} has changed")
+
+    def _commit(self, traced: Traced) -> None:
+        tick = decode(Commit, traced.payload).tick
+        hold(traced.payload == self._commits.get(tick), f"commit {tick} is said, and not or otherwise written")
+
+    def _epoch_said(self, traced: Traced) -> None:
+        hold(traced.payload in self._epochs, "epoch is said before it is written")
+
+    def _deliveries(self, traced: Traced) -> None:
+        self.packets.delivers(decode(Deliveries, traced.payload), traced.payload)
+
+    def _answer(self, traced: Traced) -> None:
+        """The same request, the same answer."""
+        answer = decode(Answer, traced.payload)
+        key = answer.sender, answer.id
+        if answer.result == b"{}":  # any other is a status, which changes
+            hold(self._answers.get(key) == traced.payload, f"{key} is answered, and not or otherwise written")
+
+    def _down(self, traced: Traced) -> None:
+        down = decode_any(Go | Down, traced.payload)
+        self.packets.downlink(traced.name, down, traced.payload)
+
+    def _up(self, traced: Traced) -> None:
+        up = decode_any(channels.UP.message, traced.payload)
+        if isinstance(up, Done):
+            self.packets.answers(up, traced.payload)
+
+    # --- what comes of it ------------------------------------------------------------------------------------------
+
+    def close(self, closing: Closing) -> None:
+        """Compute the tick again from what led to it: the frame must be the same to the last bit."""
+        frame = closing.frame
+        self.packets.fates(closing)
+        told = self._told.get(frame.tick, [])
+        self._captured_told.add(frame.tick)
+        hold(closing.recovered == told, f"tick {frame.tick} is captured with {closing.recovered}, commits tell {told}")
+        if frame.tick != self._replica.frame.tick + 1:
+            return  # frame 0, or the last one of a run that ended before all was closed
+        again = self._replica.step(closing.edits, closing.delivered)
+        hold(again.digest == closing.digest, f"frame {frame.tick} is another one than its orders and deliveries give")
+        hold(closing.digest == self._digests[frame.tick], f"frame {frame.tick} is not the committed one")
+        self.packets.senses(again, self._replica)
+        stray = strays(self._deployment, again)
+        hold(not stray, f"at tick {frame.tick} {', '.join(stray)}")
+        self.ticks = frame.tick
+        self._frames[frame.tick] = again
+        self._frames.pop(frame.tick - FRAMES_KEPT, None)
+
+    def end(self, system: System, nodes: int) -> None:
+        """When all has healed: everybody is back, everything is answered, and the journals give what is there."""
+        supervisor = system.supervisor
+        hold(supervisor.chain == self._chains[self.committed], "the chain is not that of the committed frames")
+        members = [f"n{number}" for number in range(1, nodes + 1)]
+        hold(list(supervisor.members) == members, f"healed, only {', '.join(supervisor.members)} take part")
+        strayed = {robot: owner for robot, owner in supervisor.owners.items() if owner != self._chosen[robot]}
+        hold(not strayed, f"healed, {strayed} are not where they belong")
+        asked = [identity for identity in system.people.asked if identity not in system.answers]
+        hold(not asked, f"{asked} are not answered")
+        untold = self._told.keys() - self._captured_told
+        hold(not untold, f"what ticks {sorted(untold)} tell is not in the capture")
+        history = fold_supervisor(self._deployment, self._journals[channels.SUPERVISOR])
+        hold(
+            history.chain == self._chains[self.committed] and history.frame.digest == supervisor.frame.digest,
+            "another chain is folded",
+        )
+        hold(history.epoch is not None and history.epoch.epoch == supervisor.epoch, "another epoch is folded")
+        hold(history.owners == supervisor.owners and not history.edits, "other owners or edits are folded")
+        state = system.hub.state
+        assert state is not None
+        for folded, _ in fold_hub(self._deployment, self._journals[channels.VHUB]):
+            last = folded
+        hold(last.snapshot() == state.snapshot(), "the vHub's journal gives another state")
+        self.packets.end(system)

@@ -1,0 +1,103 @@
+"""What a core keeps is bounded: a walk over everything that it holds, which names what has grown too large.
+
+Nothing that a core keeps may grow with the ticks of a run. So a container may have as many things as there are ticks
+that others still ask for, some times over, unless the table here says by what it is bounded instead. A container that
+is new is watched without being named anywhere.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import msgspec
+
+from foosim.common import limits
+from foosim.deployment.network.rules import EVENTS_MAX
+from foosim.deployment.schema import Deployment
+from foosim.supervisor.requests import ANSWERS_KEPT
+from foosim.vhub.line_of_sight.occlusion import PAIRS_KEPT, Sight
+from foosim.vhub.network.memory import AirState, LinkState, RadioState
+from foosim.vhub.radio.propagation import LOSS_MAX_DB
+from foosim.vhub.radio.shadowing import CELLS_KEPT
+from foosim.world.frame import Frame
+from foosim.world.layout import Layout
+
+KEPT_MAX: Final = 4 * limits.KEPT_TICKS
+BOUNDS: Final[Mapping[str, int]] = {
+    "Held._messages": limits.HELD_MESSAGES_MAX,
+    "Requests._answers": ANSWERS_KEPT,
+    "Issued.by_tick": limits.EDITED_TICKS_KEPT,
+    "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
+    "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
+    "Lags.cells": 1 << 13,
+    "_Memory._newer": PAIRS_KEPT,
+    "_Memory._older": PAIRS_KEPT,
+    "Propagation._ways": limits.CLIENTS_MAX,  # a pair that talks, or hears
+    "Propagation._places": limits.CLIENTS_MAX,
+    "Propagation._reaches": LOSS_MAX_DB + 1,  # of fixed length
+    "_Lattice._cells": CELLS_KEPT,
+    "Fabric.states": limits.CLIENTS_MAX,
+    "Fabric._links": limits.CLIENTS_MAX,
+    "Fabric.radios": limits.CLIENTS_MAX,
+    "HubState._receivers": limits.ENTITIES_MAX,
+    "Transit._by_source": limits.ENTITIES_MAX,
+    "HubState._flights": 1 << 14,  # by tick all that arrives then: each of many clients may hear all others
+    "Air._flights": 1 << 14,  # what is on air: of a broadcast one for each who hears it
+    "AirState.on_air": 1 << 14,
+    "RadioState.waiting": 1 << 14,  # as much as its queue takes
+    "Process.report": limits.CLIENTS_MAX,  # a line a link
+    "Fabric.asked": EVENTS_MAX,
+    "Timeline._events": 2 * EVENTS_MAX,
+    "Timeline.settings": 2 * EVENTS_MAX,
+    "Timeline.holds": 2 * EVENTS_MAX,
+    "Timeline.cuts": 1 << 16,  # an hour of chaos has some 10,000
+    "Downlinks._by_client": limits.DOWNLINKS_KEPT_MAX,
+}
+"""By class and attribute: containers of something else than ticks."""
+CONSTANT: Final[tuple[type[Any], ...]] = (Deployment, Layout, Frame, msgspec.Struct, Sight)
+"""What does not grow, or is of one frame."""
+SIMPLE: Final = frozenset({bool, bytes, float, int, str, type(None)})
+"""What holds nothing."""
+REMEMBERED: Final[tuple[type[Any], ...]] = (LinkState, RadioState, AirState)
+"""Messages do not grow; these are structs that do."""
+
+
+def too_large(core: object) -> list[str]:
+    """Return what a core holds that is larger than it may be, each as `Class.attribute has n of m`."""
+    return [
+        f"{where} has {size} of {BOUNDS.get(where, KEPT_MAX)}"
+        for where, size in sizes(core)
+        if size > BOUNDS.get(where, KEPT_MAX)
+    ]
+
+
+def sizes(core: object) -> list[tuple[str, int]]:
+    """Return the size of every container that a core holds, however deep, by class and attribute."""
+    found: list[tuple[str, int]] = []
+    seen: set[int] = set()
+    todo: list[tuple[str, Any]] = [("", core)]
+    while todo:
+        where, value = todo.pop()
+        kind = type(value)
+        if kind in SIMPLE or id(value) in seen or (isinstance(value, CONSTANT) and not isinstance(value, REMEMBERED)):
+            continue
+        seen.add(id(value))
+        if isinstance(value, (dict, list, set, deque)):
+            found.append((where, len(value)))
+            inside = value.values() if isinstance(value, dict) else value
+            todo += [(where, item) for item in inside if type(item) not in SIMPLE]
+        elif kind.__module__.startswith("foosim."):
+            todo += [(f"{kind.__name__}.{name}", held) for name, held in _attributes(value) if type(held) not in SIMPLE]
+    return found
+
+
+def _attributes(value: object) -> Iterator[tuple[str, Any]]:
+    yield from getattr(value, "__dict__", {}).items()
+    for name in getattr(value, "__struct_fields__", ()):
+        yield name, getattr(value, name)
+    for kind in type(value).__mro__:
+        for name in (*getattr(kind, "__slots__", ()), *getattr(kind, "__mypyc_attrs__", ())):
+            if hasattr(value, name):
+                yield name, getattr(value, name)

@@ -1,0 +1,276 @@
+"""The laws of packets: what the vHub takes, judges, delivers and releases, watched from outside."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
+from msgspec.structs import replace
+
+from foosim.client.core import ClientCore
+from foosim.deployment.schema import Deployment
+from foosim.protocol.codec import decode, decode_any, encode
+from foosim.protocol.messages import Commit, Deliveries, Done, Down, Go, Samples, Sent
+from foosim.rehearsal.failures import Broken
+from foosim.rehearsal.resimulation import Replica
+from foosim.rehearsal.system import System
+from foosim.vhub.naming import in_branch
+from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT
+from foosim.vhub.records import Closing, HubRecord, TickRecord, fold, world_packets
+from foosim.vhub.state import HubState
+from foosim.world.frame import Frame
+from foosim.world.robot_packets import Delivered, RobotPacket
+from foosim.world.sampling import Sampling
+
+Key = tuple[str, str, int, int]
+"""A packet: source, destination, sequence number, copy."""
+LOST_TICKS_MAX: Final = 1000
+"""More than a machine that is lost takes with it: what led to fates that come again is kept for so long."""
+OPEN: Final[tuple[str, ...]] = ("", IN_FLIGHT)
+"""What stands for a cause where a packet was not dropped."""
+
+
+def hold(law: bool, what: str) -> None:
+    """Raise Broken unless the law holds."""
+    if not law:
+        raise Broken(what)
+
+
+class PacketLaws:
+    """Watches packets. `said` are the deliveries of each tick as nodes take them, the bytes that are final."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.closed = -1
+        self.said: dict[int, bytes] = {0: encode(Deliveries(0, []))}
+        self._deployment = deployment
+        self._sampling = Sampling(deployment)
+        self._written: dict[int, bytes] = {0: self.said[0]}
+        self._delivered: dict[tuple[str, int, int], int] = {}
+        """The tick at which each packet reached a robot."""
+        self._branch = 0
+        self._samples: dict[int, list[Samples]] = {}
+        self._sequences: dict[str, int] = {}
+        self._downlinks: dict[str, dict[int, bytes]] = {}
+        self._go_ticks: dict[str, int] = {}
+        self._dones: dict[tuple[str, str, int, int], bytes] = {}
+        self._answered: dict[int, dict[str, list[Sent]]] = {}
+        """What clients answered to a tick that is not closed, by tick and client."""
+        self._reached: dict[int, list[Key]] = {}
+        """What robots were told by the deliveries behind a tick."""
+        self._received: dict[int, dict[str, list[Key]]] = {}
+        """What clients were told at a tick."""
+        self._owed: dict[tuple[str, int], list[Key] | None] = {}
+        """Of who left owing, by client and tick, whose Go was not said: what it had, None until the tick is kept."""
+        self._fates: dict[Key, tuple[int, str]] = {}
+        """By packet: the tick at which its fate was final, and the cause."""
+
+    # --- the vHub's side ---------------------------------------------------------------------------------------------
+
+    def closes(self, record: TickRecord, digest: bytes) -> None:
+        """A record: the next tick, from samples of the committed frame, with nothing that clients sent left out."""
+        tick = record.tick
+        hold(tick == self.closed + 1, f"the vHub closes tick {tick} after {self.closed}")
+        self.closed = tick
+        samples = [decode(Samples, raw) for raw in record.samples]
+        wrong = [message.node for message in samples if message.tick != tick or message.digest != digest]
+        hold(not wrong, f"the samples of {wrong} at tick {tick} are not of its frame")
+        self._samples[tick] = samples
+        for client in record.owing:
+            self._owes(client, tick)
+        for client, sent in record.admitted:
+            for packet in sent:
+                known = self._sequences.get(client, 0)
+                hold(packet.sequence <= known + 1, f"{client}: packet {packet.sequence} is taken after {known}")
+                self._sequences[client] = max(known, packet.sequence)
+        said = self._answered.pop(tick, {})
+        answered = {name: sent for name, sent in said.items() if sent and name not in record.owing}
+        taken = {name: sent for name, sent in record.admitted if sent}
+        hold(taken == answered, f"record {tick} has {[*taken]}, clients answered {[*answered]}: a crash has lost some")
+        deliveries = decode(Deliveries, record.deliveries)
+        self._reached[tick] = [(p.source, p.destination, p.sequence, p.copy) for p in deliveries.packets]
+        hold(deliveries.tick == tick + 1, f"record {tick} has deliveries {deliveries.tick}")
+        if tick + 1 not in self._written:
+            self._written[tick + 1] = record.deliveries
+            for following in range(tick + 2, deliveries.last + 1):
+                self._written[following] = encode(Deliveries(following, [], branch=deliveries.branch))
+        hold(
+            not deliveries.packets or self._written[tick + 1] == record.deliveries, f"deliveries {tick + 1} were final"
+        )
+
+    def delivers(self, deliveries: Deliveries, raw: bytes) -> None:
+        """Law 3: deliveries are written before they are said, and then they never change. Law 4: each packet once."""
+        for tick in range(deliveries.tick, deliveries.last + 1):
+            payload = raw if tick == deliveries.tick else encode(Deliveries(tick, [], branch=deliveries.branch))
+            written = self._written.get(tick)
+            hold(written is not None, f"deliveries {tick} are said before they are written")
+            hold(written == payload, f"deliveries {tick} are said otherwise than they are written")
+            if tick not in self.said:
+                self.said[tick] = payload
+                self._reach(tick, deliveries.packets if tick == deliveries.tick else [])
+
+    def _reach(self, tick: int, packets: list[Delivered]) -> None:
+        order = [(packet.due_ns, packet.source, packet.sequence, packet.copy) for packet in packets]
+        hold(order == sorted(order), f"deliveries {tick} are out of order")
+        late = tick * self._deployment.tick_ns
+        hold(all(packet.due_ns <= late for packet in packets), f"deliveries {tick} come before they are due")
+        keys = {(packet.source, packet.sequence, packet.copy) for packet in packets}
+        hold(
+            len(keys) == len(packets) and not keys & self._delivered.keys(), f"deliveries {tick}: a packet comes twice"
+        )
+        self._delivered.update(dict.fromkeys(keys, tick))
+
+    def fates(self, closing: Closing) -> None:
+        """Law 5: each packet has one fate; a robot's has the number of its tick and place.
+
+        What has not reached its receiver is in the count of what was dropped: receivers were told all the rest.
+        """
+        self._came(closing)
+        for flight in closing.fates:
+            key = flight.source, flight.destination, flight.sequence, flight.copy
+            hold(key not in self._fates, f"packet {key} has two fates")
+            self._fates[key] = closing.frame.tick, flight.cause
+            if flight.source in self._deployment.robots:
+                sent = (flight.sequence >> 16) * self._deployment.tick_ns
+                hold(flight.sent_ns == sent, f"packet {key} of a robot has another tick's number")
+
+    def _came(self, closing: Closing) -> None:
+        """Every packet that counts as delivered was in a message to its receiver, and no other was."""
+        tick = closing.frame.tick
+        robots: list[Key] = []
+        clients: dict[str, list[Key]] = {}
+        for flight in closing.fates:
+            if not flight.cause:
+                to = flight.destination
+                of_it = robots if to in self._deployment.robots else clients.setdefault(to, [])
+                of_it.append((flight.source, to, flight.sequence, flight.copy))
+        hold(robots == self._reached.get(tick, []), f"deliveries {tick + 1} are not what counts as delivered")
+        for name, owed in self._owed:
+            if owed == tick:
+                self._owed[name, tick] = clients.pop(name, [])
+        told = {name: keys for name, keys in self._received.get(tick, {}).items() if keys}
+        hold(clients == told, f"what clients were told at tick {tick} is not what counts as delivered")
+        self._reached.pop(tick - LOST_TICKS_MAX, None)
+        self._received.pop(tick - LOST_TICKS_MAX, None)
+
+    def senses(self, frame: Frame, replica: Replica) -> None:
+        """What robots sent at a frame is a function of it, whoever owned them."""
+        samples = self._samples.pop(frame.tick, [])
+        taken = world_packets(samples, frame.digest, frame, self._sampling)
+        sensed: list[RobotPacket] = [] if self._sampling.is_silent(frame) else replica.sense()
+        hold(taken is None or taken == sensed, f"what robots sent at tick {frame.tick} is not what they sense")
+
+    # --- the clients' side -------------------------------------------------------------------------------------------
+
+    def downlink(self, client: str, down: Go | Down, raw: bytes) -> None:
+        """Downlinks are numbered one after the other, and each number stands for one thing."""
+        known = self._downlinks.setdefault(client, {})
+        if down.number not in known:
+            keys = [(packet.source, client, packet.sequence, packet.copy) for packet in down.packets]
+            self._received.setdefault(down.tick, {}).setdefault(client, []).extend(keys)
+            owed = self._owed.pop((client, down.tick), None)
+            hold(owed is None or owed == keys, f"downlink {down.number} of {client} is not what its Go had")
+        hold(down.number <= len(known) + 1, f"downlink {down.number} of {client} after {len(known)}")
+        hold(known.setdefault(down.number, raw) == raw, f"downlink {down.number} of {client} says two things")
+        if isinstance(down, Go):
+            hold(down.tick <= self.closed + 1, f"Go {down.tick} before tick {down.tick - 1} is written")
+            known_tick = self._go_ticks.setdefault(client, -1)
+            hold(down.tick >= known_tick, f"Go {down.tick} of {client} after {known_tick}")
+            self._go_ticks[client] = down.tick
+
+    def _owes(self, client: str, tick: int) -> None:
+        """A client has left owing the Done of a tick: what its Go had is said from here on as what needs no answer."""
+        known = self._downlinks.setdefault(client, {})
+        number, raw = next(reversed(known.items()), (0, b""))
+        said = decode_any(Go | Down, raw) if raw else None
+        if said is None or said.tick < tick:
+            self._owed.setdefault((client, tick))
+        elif isinstance(said, Go):
+            known[number] = encode(Down(number, tick, said.acknowledged, said.packets, False, said.branch))
+
+    def answers(self, done: Done, raw: bytes) -> None:
+        """A lockstep client's answer to a tick is one; a process that takes another's place answers for itself."""
+        said = self._dones.setdefault((done.name, done.boot, done.branch, done.tick), raw)
+        hold(said == raw, f"{done.name} has two Dones of {done.tick}")
+        if done.tick > self.closed and done.branch == self._branch:
+            self._answered.setdefault(done.tick, {})[done.name] = done.packets
+
+    # --- a machine is lost -------------------------------------------------------------------------------------------
+
+    def lose(self, journal: Sequence[bytes], captured: int) -> None:
+        """Only these records of the vHub are left, and the capture up to a tick: what it wrote and said is less."""
+        self.closed, self._sequences, self._samples, self._reached = -1, {}, {}, {}
+        self._written = {0: encode(Deliveries(0, []))}
+        for raw in journal:
+            record = decode_any(HubRecord, raw)
+            if isinstance(record, TickRecord):
+                self._answered[record.tick] = dict(record.admitted)
+                self.closes(record, decode(Commit, record.commit).digest)
+        self._answered.clear()
+        self._received = {tick: told for tick, told in self._received.items() if tick <= self.closed}
+        self._owed = {key: keys for key, keys in self._owed.items() if key[1] <= self.closed}
+        for state, _ in fold(self._deployment, journal):
+            last = state
+        for client, known in self._downlinks.items():
+            number = last.members[client].downlink if client in last.members else 0
+            self._downlinks[client] = {each: raw for each, raw in known.items() if each <= number}
+        self._go_ticks.clear()
+        self._samples = {tick: samples for tick, samples in self._samples.items() if tick > captured}
+        self._fates = {key: told for key, told in self._fates.items() if told[0] <= captured}
+        self._name(self._branch)
+
+    def branch(self, number: int) -> None:
+        """What is said from now on names this branch; what was said and is not written any more is void."""
+        self._branch = number
+        self._answered.clear()
+        self.said = {tick: raw for tick, raw in self.said.items() if tick in self._written}
+        self._delivered = {key: tick for key, tick in self._delivered.items() if tick in self._written}
+        self._name(number)
+
+    def _name(self, branch: int) -> None:
+        for known in (self.said, self._written):
+            known.update({tick: in_branch(Deliveries, raw, branch) for tick, raw in known.items()})
+        for downlinks in self._downlinks.values():
+            named = {number: decode_any(Go | Down, raw) for number, raw in downlinks.items()}
+            downlinks.update({number: encode(replace(down, branch=branch)) for number, down in named.items()})
+
+    # --- account -----------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def account(state: HubState) -> None:
+        """Law 5: offered = delivered + dropped + in flight, in all and for every link; copies are in none of these."""
+        packets, flying = state.packets, [flight for flight in state.in_flight() if flight.copy == 0]
+        hold(packets.in_flight == len(flying), f"{packets.in_flight} packets in flight, there are {len(flying)}")
+        links = list(state.fabric.states.values())
+        total = sum(link.offered for link in links), sum(link.delivered for link in links)
+        hold(total == (packets.offered, packets.delivered), "the links' account is not that of all")
+        hold(all(link.offered >= link.delivered + link.dropped for link in links), "a link has more fates than packets")
+
+    def end(self, system: System) -> None:
+        """Every packet that was offered has its fate, so has every copy, and every downlink has come."""
+        state = system.hub.state
+        assert state is not None
+        self.account(state)
+        hold(not self._owed, f"what these had left owing was never said: {sorted(self._owed)}")
+        hold(state.packets.refused == 0, f"lockstep clients repeat nothing, {state.refusals} were refused")
+        counted = {DELIVERED: 0, DROPPED: 0, IN_FLIGHT: 0}
+        fates = {key: cause for key, (_, cause) in self._fates.items() if key[3] == 0}
+        for cause in fates.values():
+            counted[DELIVERED if not cause else IN_FLIGHT if cause == IN_FLIGHT else DROPPED] += 1
+        packets = state.packets
+        copies = len(self._fates) - len(fates)
+        hold(copies == packets.copies, f"{copies} copies have a fate, {packets.copies} were made")
+        by_link = Counter((source, to) for (source, to, _, _), cause in fates.items() if cause not in OPEN)
+        dropped: Counter[tuple[str, str]] = Counter()
+        for (source, destination, _), link in state.fabric.states.items():
+            if link.dropped:
+                dropped[source, destination] += link.dropped
+        hold(dict(by_link) == dropped, f"receivers lack {by_link}, links count {dropped} as dropped")
+        told = {DELIVERED: packets.delivered, DROPPED: packets.dropped, IN_FLIGHT: packets.in_flight}
+        hold(counted == told, f"fates {counted}, the account says {told}")
+        for name, process in system.processes.items():
+            if isinstance(process.core, ClientCore):
+                statistics = process.core.statistics()
+                hold(statistics.missing == 0, f"{name} misses {statistics.missing} downlinks")
+                sent = process.core.first_sequence + statistics.sent
+                hold(sent >= self._sequences.get(name, 0), f"{name} sent less than was taken")

@@ -1,0 +1,1 @@
+"""Plays a capture again, verifies it, and judges it under another network."""

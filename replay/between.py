@@ -1,0 +1,60 @@
+"""The frames between those that a capture has, computed again from its orders and deliveries: a step to the tick.
+
+Each is compared with the digest that the capture has of its tick, so what is given is what was, to the last bit, or
+nothing. Neighbour: `replica` computes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from foosim.capture.payload_hash import check_payloads
+from foosim.capture.reader import About, CapturedTick
+from foosim.deployment.loader import load_deployment
+from foosim.node.engines.mesh_trial import check_models
+from foosim.rehearsal.resimulation import Replica
+from foosim.rehearsal.run import with_nodes
+from foosim.world.frame import CHAIN_START, Frame
+from foosim.world.initial_state import Start, added_to, start_with
+
+
+class Between:
+    """Computes frames of one capture on one node, which is made when it is first needed. It belongs to one thread."""
+
+    def __init__(self, about: About) -> None:
+        self._about = about
+        self._replica: Replica | None = None
+
+    def __call__(self, frame: Frame, inputs: Iterable[CapturedTick]) -> Frame | None:
+        """Return the frame that inputs lead to from a captured one; None where it is not what the capture had.
+
+        Raises Refused where the capture cannot be computed again: its payloads are hashed, or its files do not fit.
+        """
+        replica = self._at(frame)
+        for captured in inputs:
+            found = replica.step(captured.edits, captured.delivered)
+            if found.digest != captured.digest:
+                self.close()
+                return None
+        return replica.frame
+
+    def _at(self, frame: Frame) -> Replica:
+        """Return the node, standing at a frame."""
+        if self._replica is not None:
+            if self._replica.frame.digest != frame.digest or self._replica.frame.tick != frame.tick:
+                self._replica.set_back(frame)
+            return self._replica
+        about = self._about
+        text = with_nodes(about.deployment_text, about.deployment_name, 1)
+        deployment = load_deployment(text, about.deployment_name).with_assets(about.files)
+        check_payloads(str(about.path), deployment, "a step between captured frames")
+        check_models(deployment, about.deployment_name, text)
+        start: Start = start_with(frame, about.path.name, CHAIN_START, added_to(deployment, frame.layout))
+        self._replica = Replica(text, about.deployment_name, deployment, start=start)
+        return self._replica
+
+    def close(self) -> None:
+        """Give the node up; it is made again when it is needed."""
+        if self._replica is not None:
+            self._replica.close()
+            self._replica = None

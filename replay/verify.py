@@ -1,0 +1,127 @@
+"""Verify a capture: simulate it again from orders and deliveries, compare the digest of every tick.
+
+The typed function behind `foosim-replay verify`. It starts with the frame that the run began with, which is frame 0 but
+for a branch, on any number of nodes, and names the first tick and the entities that differ. With a later one it starts
+only where that is asked for, of a cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.payload_hash import check_payloads
+from foosim.capture.reader import CaptureData, CapturedTick, beginning_of, check_whole, open_capture, read_about
+from foosim.deployment.loader import load_deployment
+from foosim.node.engines.mesh_trial import check_models
+from foosim.rehearsal.resimulation import Replica
+from foosim.rehearsal.run import with_nodes
+from foosim.world.frame import Frame, chain_next
+from foosim.world.initial_state import Start, added_to, first_chain, start_with
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """What a verification found. `tick` is the first that differs, -1 if none does; `entities` are those that do.
+
+    `first_tick` is that of the frame that the run began with, `ticks` that of the last one that was compared.
+    """
+
+    ticks: int
+    nodes: int
+    chain: bytes
+    tick: int = -1
+    entities: tuple[str, ...] = ()
+    missing_tick: int = -1
+    """The first tick that the capture lacks, -1 if it is whole."""
+    arithmetic: str = ""
+    """This machine's digest of the fixed small run of an engine, in hex."""
+    other_arithmetic: tuple[str, ...] = ()
+    """Those that the capture has and that are others."""
+    first_tick: int = 0
+
+    @property
+    def equal(self) -> bool:
+        return self.tick < 0 and self.missing_tick < 0
+
+
+def verify_capture(path: Path | str, nodes: int = 1, *, from_first_frame: bool = False) -> Verified:
+    """Verify a capture file. With `from_first_frame` it may be a cut: what follows on its first frame is verified, not
+    how that frame came.
+
+    Raises CaptureError for one that cannot be read, has no payloads, or, without that, is a cut.
+    """
+    if not from_first_frame:
+        check_whole(read_about(Path(path)))
+    capture = open_capture(path)
+    check_payloads(str(capture.path), capture.deployment, "a verification")
+    about = capture.about
+    start = start_of(capture)
+    text, name = about.deployment_text, about.deployment_name
+    found = verify(text, name, capture.captured_ticks(), nodes, start, about.files)
+    kept = {epoch.arithmetic for epoch in capture.epochs}
+    return replace(found, other_arithmetic=tuple(sorted(kept - {"", found.arithmetic})))
+
+
+def start_of(capture: CaptureData) -> Start | None:
+    """Return the frame that a captured run, or a cut, begins with, None where that is frame 0. Raises CaptureError."""
+    origin = beginning_of(capture.about)
+    if origin is None:
+        return None
+    first = capture.first_frame()
+    if first is None or first.digest != origin.digest:
+        raise CaptureError(f"{capture.path}: it does not have frame {origin.tick}, with which it begins")
+    return start_with(first, origin.source, origin.chain, added_to(capture.deployment, first.layout))
+
+
+def verify(
+    text: str,
+    name: str,
+    ticks: Iterable[CapturedTick],
+    nodes: int = 1,
+    start: Start | None = None,
+    files: Mapping[str, bytes] | None = None,
+) -> Verified:
+    """Simulate again what `ticks` (from 0, or from that of `start` on, in order) say, on `nodes` nodes, and compare.
+
+    `files` are those that the deployment refers to, by path. Raises AssetError for one that is not acceptable.
+    """
+    text = with_nodes(text, name, nodes)
+    deployment = load_deployment(text, name).with_assets(files or {})
+    check_models(deployment, name, text)
+    replica = Replica(text, name, deployment, start=start)
+    chain = first_chain(None if start is None else start.origin)
+    try:
+        first = replica.frame.tick
+        found = _compare(replica, ticks, nodes, chain)
+        return replace(found, arithmetic=replica.arithmetic.hex(), first_tick=first)
+    finally:
+        replica.close()
+
+
+def _compare(replica: Replica, ticks: Iterable[CapturedTick], nodes: int, chain: bytes) -> Verified:
+    first = expected = replica.frame.tick
+    for captured in ticks:
+        if captured.tick != expected:
+            return Verified(replica.frame.tick, nodes, chain, missing_tick=expected)
+        frame = replica.frame if expected == first else replica.step(captured.edits, captured.delivered)
+        if frame.digest != captured.digest:
+            return Verified(frame.tick, nodes, chain, frame.tick, _differing(frame, captured))
+        if expected > first:
+            chain = chain_next(chain, frame.digest)
+        expected += 1
+    return Verified(replica.frame.tick, nodes, chain)
+
+
+def _differing(frame: Frame, captured: CapturedTick) -> tuple[str, ...]:
+    """Return the names of the entities whose digests differ."""
+    entities = frame.layout.entities
+    if len(captured.entities) != len(entities):
+        return ("layout",)
+    return tuple(
+        entity.name
+        for entity, digest in zip(entities, captured.entities, strict=True)
+        if frame.entity_digest(entity) != digest
+    )

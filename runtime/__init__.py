@@ -1,0 +1,1 @@
+"""What every process has: loop, journal, signals, run folder, health; and its transport."""

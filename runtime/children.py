@@ -1,0 +1,35 @@
+"""What a launcher and a guard share: where foosim's commands are, and what ties a child to its parent."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sysconfig
+from pathlib import Path
+from typing import Final
+
+from foosim.runtime.process import PARENT_VARIABLE
+
+GRACE_S: Final = 5.0
+"""How long a child has after SIGTERM before it is killed."""
+GUARD: Final = "foosim-guard"
+BY_SIGNAL: Final = 128
+"""A guard ends with this and the number of the signal that ended its process."""
+OTHER_VERSION: Final = 125
+"""What a guard ends with that is of another version than the launcher."""
+
+
+def script(name: str) -> str:
+    """Return the path of one of foosim's commands: beside this Python, else on PATH."""
+    beside = Path(sysconfig.get_path("scripts")) / name
+    return str(beside) if beside.is_file() else shutil.which(name) or name
+
+
+def child_environment(pipe: int) -> dict[str, str]:
+    """Return the environment of a child of this process that is to die with it; `pipe` ends when this process does."""
+    return {
+        **os.environ,
+        PARENT_VARIABLE: f"{os.getpid()}:{pipe}",
+        "OPENBLAS_NUM_THREADS": "1",  # nothing here uses BLAS; its threads only take memory
+        "PYTHONUNBUFFERED": "1",
+    }

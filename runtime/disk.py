@@ -1,0 +1,66 @@
+"""How much room a disk has left for what is written to it, and when that gets little.
+
+A reserve is kept free, so that what has to be written in the end still fits: a file's summary, a journal's last
+records.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import Final
+
+_UNITS: Final = {"TiB": 1 << 40, "TB": 10**12, "GiB": 1 << 30, "GB": 10**9, "MiB": 1 << 20, "MB": 10**6, "KiB": 1 << 10}
+
+
+class Level(IntEnum):
+    """How much room is left: below twice the reserve it is LOW, below the reserve FULL, below a quarter of it OUT."""
+
+    FINE = 0
+    LOW = 1
+    FULL = 2
+    OUT = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """What is left, and the reserve that is not for ordinary use, in bytes; `where` names it for people."""
+
+    left: int
+    reserve: int
+    where: str
+
+    @property
+    def level(self) -> Level:
+        if self.left < self.reserve // 4:
+            return Level.OUT
+        if self.left < self.reserve:
+            return Level.FULL
+        return Level.LOW if self.left < 2 * self.reserve else Level.FINE
+
+    def __str__(self) -> str:
+        return f"{megabytes(max(0, self.left))} left {self.where}, the reserve is {size_text(self.reserve)}"
+
+
+def free_bytes(place: int | Path) -> int:
+    """Return how much an ordinary process can still write to the disk of an open file or a path; raises OSError."""
+    found = os.statvfs(place)
+    return found.f_bavail * found.f_frsize
+
+
+def room_on_disk(place: int | Path, reserve: int) -> Room:
+    """Return the room on a disk; raises OSError."""
+    return Room(free_bytes(place), reserve, "on its disk")
+
+
+def megabytes(count: int) -> str:
+    """Return a size for people: `12.4 MB`."""
+    return f"{count / 1e6:.1f} MB" if count < 1e10 else f"{count / 1e9:.1f} GB"
+
+
+def size_text(count: int) -> str:
+    """Return a size as a deployment says it: exactly, in the unit in which the number is shortest (`64 MiB`)."""
+    whole = [f"{count // size} {unit}" for unit, size in _UNITS.items() if count >= size and count % size == 0]
+    return min([*whole, f"{count} B"], key=lambda text: len(text.split()[0]))

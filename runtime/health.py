@@ -1,0 +1,55 @@
+"""The command `foosim-probe`: whether a process of a run still works, for health checks and probes."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foosim.common.errors import BadValue
+from foosim.common.units import parse_ns
+from foosim.runtime.command import VersionOption, new_app, run_app
+from foosim.runtime.progress import NoProgress, age_ns
+
+ProgressOption = Annotated[
+    Path | None,
+    typer.Option("--progress-file", help="Write signs of life here, for foosim-probe."),
+]
+"""The option of a process that is watched."""
+
+app = new_app()
+
+
+def probe_file(path: Path, within: str) -> int:
+    """Return the age (ns) of a sign of life; raises NoProgress for an old one or none, BadValue for a bad limit."""
+    within_ns = parse_ns(within)
+    if within_ns <= 0:
+        raise BadValue("--within: not above 0", within)
+    age = age_ns(path, time.monotonic_ns())
+    if age > within_ns:
+        raise NoProgress(f"{path}: the last sign of life is {age / 1e9:.1f} s old, more than {within}")
+    return age
+
+
+@app.command()
+def probe(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="The process's --progress-file.", show_default=False)],
+    within: Annotated[str, typer.Option(help="How old the last sign of life may be.")] = "5s",
+    version: VersionOption = False,
+) -> None:
+    """Ask whether the loop of a process still goes round, on the machine or in the container where the process is.
+
+    It exits with 0 when it does, with 1 when it gave no sign of life for too long.
+    """
+    print(f"alive, {probe_file(path, within) / 1e9:.1f} s ago")
+
+
+def main() -> None:
+    """Entry of `foosim-probe`."""
+    run_app(app, "foosim-probe")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,426 @@
+"""Journals: append-only files of framed records, which a process writes before it speaks.
+
+One record is one `write`. A killed process loses nothing that was appended; a dead machine at most what `fdatasync`,
+called each second in a thread, had not reached. The first record of a file is what its writer gives as head, so that
+older files can go. `flock` keeps a second writer out. What a record means is its writer's matter: `vhub.records`,
+`supervisor.records`.
+
+When a file is full, `append` does not turn to the next one by itself: the head holds the writer's state, which is the
+state after the last appended record only when nothing that was decided still waits to be appended. The shell knows
+when that is, and calls `rotate_if_full`.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from foosim.common import limits
+from foosim.common.errors import Failed
+from foosim.runtime.journal_format import (
+    FRAMING_BYTES,
+    HEAD_BYTES,
+    SIGNATURE,
+    Head,
+    Place,
+    Whole,
+    is_damage,
+    machine_hash,
+    pack_record,
+    record_bytes,
+    whole_record,
+    whole_records,
+)
+from foosim.runtime.process import machine_start
+
+_SERIAL: Final = re.compile(r"(\d{6,})\.journal")
+
+
+class JournalError(Failed):
+    """A journal cannot be written or read: the file, and what is wrong with it."""
+
+
+class JournalDamaged(JournalError):
+    """A record is bad that was whole once: the file, the byte, and how many whole records of the file are before it.
+
+    No run goes on from such a journal.
+    """
+
+    exit_code = 3
+
+    def __init__(self, what: str, path: Path, byte: int, records: int) -> None:
+        super().__init__(what)
+        self.path, self.byte, self.records = path, byte, records
+
+
+@dataclass(frozen=True, slots=True)
+class JournalStatistics:
+    """What a journal has written since it was opened, and how many of its files there are."""
+
+    records: int
+    bytes: int
+    files: int
+    syncs: int
+
+
+def journal_files(folder: Path, stem: str) -> list[Path]:
+    """Return the files of a journal, oldest first; none is no error."""
+    return [path for _, path in _numbered(folder, stem)]
+
+
+def remove_journal(folder: Path, stem: str) -> None:
+    """Remove the files of a journal whose run has ended in order: nothing is left to recover from them."""
+    for path in [*journal_files(folder, stem), folder / f"{stem}.lock"]:
+        path.unlink(missing_ok=True)
+
+
+def _numbered(folder: Path, stem: str) -> list[tuple[int, Path]]:
+    found = []
+    for path in folder.glob(f"{stem}-*.journal"):
+        match = _SERIAL.fullmatch(path.name.removeprefix(f"{stem}-"))
+        if match is not None:
+            found.append((int(match[1]), path))
+    return sorted(found)
+
+
+class Records(Iterator[bytes]):
+    """The records of one file, in order, up to the end of the file or of the journal.
+
+    After the last one `left_bytes` is how many bytes of the file are no record: 0 in a whole file. Raises
+    JournalDamaged at a record that is bad though it was whole once.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.count = 0
+        """How many records were read."""
+        self.head: Head | None = None
+        """None where the file's beginning never came to the disk."""
+        try:
+            with path.open("rb") as file:
+                self._size = os.fstat(file.fileno()).st_size
+                start = file.read(HEAD_BYTES)
+        except OSError as error:
+            raise JournalError(f"{path}: cannot be read, {error.strerror}") from None
+        if len(start) == HEAD_BYTES and start.startswith(SIGNATURE):
+            self.head = Head.unpack(start)
+            if self.head is None:
+                raise JournalDamaged(f"{path}: byte {len(SIGNATURE)}: the head of the file is damaged", path, 0, 0)
+        elif any(start) and not SIGNATURE.startswith(start[: len(SIGNATURE)]):
+            shown = start[: len(SIGNATURE)]
+            raise JournalError(f"{path}: no journal of this version, its first bytes are {shown!r}, not {SIGNATURE!r}")
+        self.valid_bytes = 0 if self.head is None else HEAD_BYTES
+        """Where the next record starts."""
+        self._records = iter(()) if self.head is None else self._read(self.head)
+
+    @property
+    def left_bytes(self) -> int:
+        return self._size - self.valid_bytes
+
+    @property
+    def same_machine(self) -> bool:
+        """Whether the machine was not started since the journal was opened: then the disk has lost nothing."""
+        return self.head is not None and any(self.head.machine) and self.head.machine == machine_hash(machine_start())
+
+    def __next__(self) -> bytes:
+        return next(self._records)
+
+    def behind(self, at: int) -> Iterator[Whole]:
+        """Yield the whole records from a byte on, wherever they stand."""
+        return iter(()) if self.head is None else whole_records(self.head, self.path.read_bytes(), at)
+
+    def damaged(self, following: int) -> JournalDamaged:
+        """Return what to raise when so many whole records say that the one where reading ended was whole."""
+        behind = f"{following} whole record{'s' if following > 1 else ''}"
+        text = f"{self.path}: byte {self.valid_bytes}: record {self.count + 1} is damaged, {behind} behind it"
+        return JournalDamaged(text, self.path, self.valid_bytes, self.count)
+
+    def _read(self, head: Head) -> Iterator[bytes]:
+        """Yield whole records; a length beyond the file's end is never allocated."""
+        with self.path.open("rb") as file:
+            file.seek(self.valid_bytes)
+            while self.left_bytes:
+                content = file.read(FRAMING_BYTES)
+                content += file.read(min(record_bytes(content), self.left_bytes - len(content)))
+                whole = whole_record(head, content, self.valid_bytes, self.valid_bytes)
+                if whole is None:
+                    break
+                self.valid_bytes += whole.stop
+                self.count += 1
+                yield content[whole.start : whole.stop]
+        if self.left_bytes:
+            bad = head.serial, self.valid_bytes
+            following = is_damage(self.same_machine, bad, self.behind(self.valid_bytes))
+            if following:
+                raise self.damaged(following)
+
+
+def read_records(path: Path) -> Records:
+    """Read one file of a journal. A torn tail is what a killed machine leaves, and no error: see `left_bytes`."""
+    return Records(path)
+
+
+def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
+    """Yield the records of all files of a journal, in order; each file but the first starts with its head again.
+
+    Behind a torn end comes what was written when the journal was opened again. Raises JournalDamaged.
+    """
+    opening = b""
+    torn: tuple[int, Records] | None = None
+    """The first file of that opening that has no end, and its number."""
+    for serial, path in _numbered(folder, stem):
+        records = read_records(path)
+        head = records.head
+        if head is not None and head.opening != opening:
+            opening, torn = head.opening, None
+        elif head is not None and torn is not None:
+            bad = torn[0], torn[1].valid_bytes
+            following = is_damage(records.same_machine, bad, records.behind(HEAD_BYTES))
+            if following:
+                raise torn[1].damaged(following)
+            continue
+        yield from records
+        if head is None or records.left_bytes:
+            torn = torn or (serial, records)
+
+
+def read_newest(folder: Path, stem: str) -> Iterator[bytes]:
+    """Yield the records of a journal's newest file that has any: its head stands for the files before it."""
+    for path in reversed(journal_files(folder, stem)):
+        records = read_records(path)
+        first = next(records, None)
+        if first is not None:
+            yield first
+            yield from records
+            return
+
+
+def read_whole(records: Iterable[bytes]) -> tuple[list[bytes], JournalDamaged | None]:
+    """Return the records up to one that is damaged, and what is to say of that; None when none is."""
+    whole: list[bytes] = []
+    try:
+        whole.extend(records)
+    except JournalDamaged as damaged:
+        return whole, damaged
+    return whole, None
+
+
+def lock_journal(folder: Path, stem: str) -> int:
+    """Take the lock of a journal, held until it is closed; the kernel frees it when the process ends.
+
+    Raises JournalError when another process has it.
+    """
+    path = folder / f"{stem}.lock"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise JournalError(f"{path}: cannot be opened, {error.strerror}") from None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        holder = os.pread(lock, 20, 0).decode(errors="replace").strip()
+        os.close(lock)
+        raise JournalError(f"{path}: the journal is being written by another process ({holder})") from None
+    except OSError as error:
+        os.close(lock)
+        raise JournalError(f"{path}: cannot be locked, {error.strerror}") from None
+    return lock
+
+
+class Journal:
+    """The one writer of a journal: files `STEM-000001.journal`, ... in `folder`; a new one at every opening.
+
+    Raises JournalError when another process writes it or the disk refuses; after a failed write every further one
+    fails too, since a record that is missing in the middle would be worse than an end.
+    """
+
+    def __init__(
+        self, folder: Path, stem: str, bytes_max: int = limits.JOURNAL_BYTES_MAX, sync_every_s: float = 1.0
+    ) -> None:
+        self.folder = folder
+        self.stem = stem
+        self._bytes_max = bytes_max
+        self._sync_every_s = sync_every_s
+        self._records = self._bytes = self._syncs = 0
+        self._error: JournalError | None = None
+        self._lock_file = self._lock()
+        self._closed_files: list[tuple[int, int]] = []
+        """Serial and last tick of files that are full, oldest first."""
+        self._serial = max((serial for serial, _ in _numbered(folder, stem)), default=0)
+        self._mutex = threading.Lock()
+        """Guards what the syncing thread shares: `_file`, `_retired`, what is dirty, `_syncs`."""
+        self._retired: list[int] = []
+        self._dirty = self._folder_dirty = False
+        self._file = self._size = 0
+        self._opening, self._machine = os.urandom(8), machine_hash(machine_start())
+        self._written: Place = (self._serial + 1, 0)
+        self._synced: Place = self._written
+        """Up to where the journal is written, and up to where that is known to be on the disk."""
+        self._begin_file()
+        self._stop = threading.Event()
+        self._syncer = threading.Thread(target=self._sync_each_interval, name=f"sync-{stem}", daemon=True)
+        self._syncer.start()
+
+    # --- writing -----------------------------------------------------------------------------------------------------
+
+    def append(self, record: bytes) -> None:
+        """Write one record; when this returns, a killed process does not lose it."""
+        if self._error is not None:
+            raise self._error
+        if len(record) > limits.JOURNAL_BYTES_MAX:
+            most = f"a file of it has {limits.JOURNAL_BYTES_MAX} at most"
+            self._error = JournalError(f"{self.path}: cannot be written, a record has {len(record)} bytes, {most}")
+            raise self._error
+        start = b"" if self._size else self._head.pack()
+        self._write(start + pack_record(self._head, self._size + len(start), self._synced, record))
+        self._records += 1
+
+    def rotate_if_full(self, head: Callable[[], bytes], tick: int) -> bool:
+        """Begin a new file with the record `head()` when this one is full; return whether that was so.
+
+        To be called when everything that was decided is appended. `tick` is the last one that the files so far hold.
+        """
+        if self._size < self._bytes_max:
+            return False
+        if self._error is not None:
+            raise self._error
+        first_record = head()
+        self._closed_files.append((self._serial, tick))
+        self._begin_file()
+        self.append(first_record)
+        return True
+
+    def forget_before(self, tick: int) -> None:
+        """Remove the files that hold nothing from `tick` on: the capture is synced up to there."""
+        done = [serial for serial, last_tick in self._closed_files if last_tick < tick]
+        if not done:
+            return
+        self._closed_files = self._closed_files[len(done) :]
+        try:
+            for serial, path in _numbered(self.folder, self.stem):
+                if serial <= done[-1]:
+                    path.unlink(missing_ok=True)
+        except OSError as error:
+            raise self._failed("cannot remove a file that is done with", error) from None
+
+    def statistics(self) -> JournalStatistics:
+        with self._mutex:
+            syncs = self._syncs
+        return JournalStatistics(self._records, self._bytes, len(journal_files(self.folder, self.stem)), syncs)
+
+    @property
+    def path(self) -> Path:
+        """The file that is written."""
+        return self.folder / f"{self.stem}-{self._serial:06d}.journal"
+
+    def close(self) -> None:
+        """Sync what is written and let go of the files; a second call does nothing."""
+        if self._stop.is_set():
+            return
+        self._stop.set()
+        self._syncer.join()
+        with self._mutex:
+            self._retired.append(self._file)
+        self._sync()
+        os.close(self._lock_file)
+        if self._error is not None:
+            raise self._error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # --- files -------------------------------------------------------------------------------------------------------
+
+    def _lock(self) -> int:
+        """Take the lock that is held as long as the journal is open, and note in it who has it."""
+        lock = lock_journal(self.folder, self.stem)
+        try:
+            os.ftruncate(lock, 0)
+            os.pwrite(lock, f"pid {os.getpid()}\n".encode(), 0)
+        except OSError as error:
+            os.close(lock)
+            raise JournalError(f"{self.folder / self.stem}.lock: cannot be written, {error.strerror}") from None
+        return lock
+
+    def _begin_file(self) -> None:
+        """Turn to a new file, which must not exist yet; the one before goes to the syncing thread."""
+        self._serial += 1
+        try:
+            file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise self._failed("cannot be created", error) from None
+        with self._mutex:
+            if self._file:
+                self._retired.append(self._file)
+            self._file = file
+            self._folder_dirty = True
+        self._size = 0
+        self._head = Head(self._opening, self._machine, self._serial)
+        self._written = self._serial, 0
+
+    def _write(self, content: bytes) -> None:
+        """Append by one `write`, more of them only when a disk that gets full takes a part; that part is cut off."""
+        written = 0
+        try:
+            while written < len(content):
+                written += os.write(self._file, content[written:] if written else content)
+        except OSError as error:
+            failure = self._failed("cannot be written", error)
+            with suppress(OSError):
+                os.ftruncate(self._file, self._size)
+            raise failure from None
+        self._size += written
+        self._bytes += written
+        self._dirty = True  # before the syncing thread can see how far it is
+        self._written = self._serial, self._size
+
+    def _failed(self, what: str, error: OSError) -> JournalError:
+        failure = JournalError(f"{self.path}: {what}, {error.strerror}")
+        self._error = self._error or failure
+        return failure
+
+    # --- syncing -----------------------------------------------------------------------------------------------------
+
+    def _sync_each_interval(self) -> None:
+        while not self._stop.wait(self._sync_every_s):
+            self._sync()
+
+    def _sync(self) -> None:
+        """Bring to the disk what was written, and the names of new files; files that are full are let go of."""
+        written = self._written
+        with self._mutex:
+            retired, self._retired = self._retired, []
+            dirty = retired if not self._dirty or self._file in retired else [*retired, self._file]
+            folder_dirty, self._dirty, self._folder_dirty = self._folder_dirty, False, False
+            self._syncs += 1 if dirty else 0
+        try:
+            for file in dirty:
+                os.fdatasync(file)
+            if folder_dirty:
+                self._sync_folder()
+            self._synced = written
+        except OSError as error:
+            self._failed("cannot be synced", error)
+        for file in retired:
+            os.close(file)
+
+    def _sync_folder(self) -> None:
+        folder = os.open(self.folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)

@@ -1,0 +1,117 @@
+"""What every process does around its loop: it dies with its parent, logs lines, and ends in order when told to.
+
+A child that its launcher started is told so in the environment. It asks the kernel to be killed when the launcher
+ends, and a thread watches a pipe that only the launcher can write: its end means the same where the kernel cannot be
+asked.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+PARENT_VARIABLE: Final = "FOOSIM_PARENT"
+"""Process id of the launcher and the number of the pipe's reading end, as `PID:FD`."""
+STACK_SIGNAL: Final = signal.SIGUSR1
+_PR_SET_PDEATHSIG: Final = 1
+
+
+def die_with_parent() -> None:
+    """Tie this process to the launcher that started it; nothing happens when none did."""
+    parent, _, pipe = os.environ.pop(PARENT_VARIABLE, "").partition(":")
+    if not parent:
+        return
+    end_with(int(parent))
+    threading.Thread(target=_watch, args=(int(pipe),), name="parent", daemon=True).start()
+
+
+def has_launcher() -> bool:
+    """True in a process that a launcher has started, until it is tied to it."""
+    return bool(os.environ.get(PARENT_VARIABLE))
+
+
+def end_with(parent: int) -> None:
+    """Have the kernel kill this process when its parent ends, where the kernel can be asked."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:  # it ended before the kernel was asked
+        os._exit(1)
+
+
+def end_with_stack() -> None:
+    """Have STACK_SIGNAL write the stacks of all threads to standard error and then end this process: if it hangs."""
+    signal.signal(STACK_SIGNAL, signal.SIG_DFL)
+    faulthandler.register(STACK_SIGNAL, sys.stderr, all_threads=True, chain=True)
+
+
+def _watch(pipe: int) -> None:
+    """Wait for the end of a pipe that nobody writes to."""
+    os.read(pipe, 1)
+    os._exit(1)
+
+
+def start_log(name: str) -> logging.Logger:
+    """Return the log of this process: lines with UTC time on standard error, which a launcher sends to a file."""
+    handler = logging.StreamHandler()
+    formatter = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)-7s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
+    formatter.converter = time.gmtime
+    handler.setFormatter(formatter)
+    logger = logging.getLogger(name)
+    logger.setLevel(logging.INFO)
+    logger.handlers = [handler]
+    logger.propagate = False
+    return logger
+
+
+def machine_start() -> str:
+    """Return a name for this start of this machine; another start of it has another one. Empty where there is none."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
+
+
+def clock_name() -> str:
+    """Return a name for the clock of `time.monotonic_ns`: it counts from the start of this machine, not longer."""
+    return machine_start() or f"process {os.getpid()}"  # then no other process's times are comparable
+
+
+def new_boot() -> str:
+    """Return a name for this start of this process; another start of it has another one."""
+    return f"b{os.urandom(8).hex()}"
+
+
+class Stop:
+    """Whether this process was told to end: by SIGTERM, SIGINT or SIGHUP. A second SIGINT ends it at once."""
+
+    def __init__(self) -> None:
+        """Take the signals over; only the main thread can."""
+        self._is_set = False
+        self._then: Callable[[], None] = lambda: None
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            signal.signal(number, self._take)
+
+    def is_set(self) -> bool:
+        return self._is_set
+
+    def then(self, call: Callable[[], None]) -> None:
+        """Call this when told to end; at once when that was before."""
+        self._then = call
+        if self._is_set:
+            call()
+
+    def _take(self, number: int, frame: object) -> None:
+        if self._is_set and number == signal.SIGINT:
+            os._exit(130)
+        if not self._is_set:
+            self._is_set = True
+            self._then()

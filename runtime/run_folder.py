@@ -1,0 +1,293 @@
+"""Where a run keeps its run file, logs and journals, and how control commands find it without an address.
+
+Each run has a folder named as the run, by default in the platform's state folder. Its supervisor holds a lock as long
+as it lives, so a run that is over is never taken for a live one, whatever process has its id by now. The run file says
+where the run listens.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import platformdirs
+
+from foosim.common import wall_clock
+from foosim.common.errors import BadValue, Failed, Refused
+from foosim.common.names import NAME_RULE, is_name, nearest_name
+
+LOGS: Final = "logs"
+KEPT_RUNS: Final = 20
+"""How many runs that are over keep their folder."""
+RUN_FILE: Final = "run.json"
+RESULT_FILE: Final = "result.json"
+LOCK_FILE: Final = "lock"
+LAUNCHER_FILE: Final = "launcher"
+LAUNCH_FILE: Final = "launch.json"
+HOLD_TRIES: Final = 50
+SPARE_FILE: Final = "spare"
+SPARE_BYTES: Final = 64 * 1024
+"""Kept on the disk while the run lives, so that its result can be written when the disk is full."""
+
+
+class NoRun(Failed):
+    """There is no such run, or none that is live."""
+
+
+UNREADABLE: Final = (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+"""How a file of a run fails that is missing or spoiled."""
+
+
+class RunInfo(msgspec.Struct, frozen=True):
+    """What a run file says. `radio` is empty until the vHub has told where it listens, `pki` without certificates."""
+
+    run: str
+    world: str
+    deployment: str
+    pid: int
+    started: str
+    simulation: str
+    radio: str = ""
+    pki: str = ""
+
+
+class Launch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How `up` was called: the options of a run as they were typed, with absolute paths. No capture: an empty path."""
+
+    file: str
+    capture: str
+    pace: str | None = None
+    duration: str | None = None
+    seed: int | None = None
+    sets: tuple[str, ...] = ()
+    listen: str | None = None
+    insecure: bool = False
+    pki: str | None = None
+    branch: str | None = None
+    balance: bool = False
+
+
+class RunFolder:
+    """The folder of one run."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.name = path.name
+        self._lock: int | None = None
+        self._launcher: int | None = None
+
+    @property
+    def logs(self) -> Path:
+        return self.path / LOGS
+
+    @property
+    def journals(self) -> Path:
+        return self.path / "journals"
+
+    def log(self, process: str) -> Path:
+        """Return the log file of one process."""
+        return self.logs / f"{process}.log"
+
+    def hold(self) -> None:
+        """Lock the folder as its live supervisor, until this process ends. Raises NoRun when another one does."""
+        self._lock = self._take(LOCK_FILE)
+        if self._lock is None:
+            raise NoRun(f"run {self.name} has a supervisor already")
+        (self.path / SPARE_FILE).write_bytes(bytes(SPARE_BYTES))
+
+    def hold_launcher(self) -> None:
+        """Lock the folder as the launcher of its run, until this process ends: somebody looks after the run.
+
+        Raises Refused when another one does.
+        """
+        self._launcher = self._take(LAUNCHER_FILE)
+        if self._launcher is None:
+            raise Refused(f"run {self.name} is looked after by the launcher that started it")
+
+    def _take(self, name: str) -> int | None:
+        """Lock a file of the folder until this process ends; None when another process has it."""
+        lock = os.open(self.path / name, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        for _ in range(HOLD_TRIES):  # who looks whether it is locked has the lock for a moment, too
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                time.sleep(0.01)
+                continue
+            return lock
+        os.close(lock)
+        return None
+
+    def write_launch(self, launch: Launch) -> None:
+        """Write how the run was launched, so that it can be launched again."""
+        _replace(self.path / LAUNCH_FILE, msgspec.json.format(msgspec.json.encode(launch)))
+
+    def launch(self) -> Launch | None:
+        """Return how the run was launched; None when no launcher did."""
+        try:
+            return msgspec.json.decode((self.path / LAUNCH_FILE).read_bytes(), type=Launch)
+        except (OSError, msgspec.DecodeError):
+            return None
+
+    def is_fresh(self) -> bool:
+        """Whether nothing has run in it yet."""
+        return not any((self.path / name).exists() for name in (LAUNCHER_FILE, LAUNCH_FILE, LOCK_FILE, RUN_FILE))
+
+    def is_left(self) -> bool:
+        """Whether the run had a launcher, which is gone, and has no supervisor: nobody starts its processes again."""
+        return (self.path / LAUNCHER_FILE).exists() and not self._is_locked(LAUNCHER_FILE) and not self.is_live()
+
+    def release(self) -> None:
+        """Give the lock back: the run is over."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def is_live(self) -> bool:
+        """Whether a supervisor holds the folder."""
+        return self._is_locked(LOCK_FILE)
+
+    def _is_locked(self, name: str) -> bool:
+        try:
+            lock = os.open(self.path / name, os.O_RDONLY | os.O_CLOEXEC)
+        except FileNotFoundError:
+            return False
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        finally:
+            os.close(lock)
+        return False
+
+    def write_info(self, info: RunInfo) -> None:
+        """Write the run file; a reader sees the old one or the new one."""
+        _replace(self.path / RUN_FILE, msgspec.json.format(msgspec.json.encode(info)))
+
+    def info(self) -> RunInfo | None:
+        """Return what the run file says, or None while there is none."""
+        try:
+            return msgspec.json.decode((self.path / RUN_FILE).read_bytes(), type=RunInfo)
+        except UNREADABLE:
+            return None
+
+    def write_result(self, result: dict[str, Any]) -> None:
+        """Write how the run ended, on a disk that is full, too."""
+        (self.path / SPARE_FILE).unlink(missing_ok=True)
+        _replace(self.path / RESULT_FILE, msgspec.json.format(msgspec.json.encode(result)))
+
+    def result(self) -> dict[str, Any] | None:
+        """Return how the run ended, or None when it did not end in order."""
+        try:
+            content = msgspec.json.decode((self.path / RESULT_FILE).read_bytes())
+        except UNREADABLE:
+            return None
+        return content if isinstance(content, dict) else None
+
+
+def _replace(path: Path, content: bytes) -> None:
+    fresh = path.with_name(path.name + ".new")
+    fresh.write_bytes(content + b"\n")
+    fresh.replace(path)
+
+
+def hosted_folder() -> Path:
+    """Return the folder of the runs that have processes on this machine, and their supervisor elsewhere."""
+    return platformdirs.user_state_path("foosim") / "hosts"
+
+
+def runs_folder() -> Path:
+    """Return the folder of all runs of this user."""
+    return platformdirs.user_state_path("foosim") / "runs"
+
+
+def create_run(world: str, name: str | None = None) -> RunFolder:
+    """Make the folder of a new run, by default named by world and time; the oldest ones that are over go."""
+    if name is not None and not is_name(name):
+        raise BadValue(f"--run: {NAME_RULE}", name)
+    parent = runs_folder()
+    if name is not None and (parent / name / LOGS).is_dir() and RunFolder(parent / name).is_fresh():
+        return RunFolder(parent / name)  # made for us, by who waits for the run
+    parent.mkdir(parents=True, exist_ok=True)
+    _forget_old(parent)
+    path = _make(parent, world, name)
+    folder = RunFolder(path)
+    folder.logs.mkdir()
+    folder.journals.mkdir()
+    return folder
+
+
+def _make(parent: Path, world: str, name: str | None) -> Path:
+    """Make the folder itself: a name that is taken is refused when it was asked for, else it gets a number."""
+    stem = name or f"{world[:12]}-{wall_clock.now_stamp()}"
+    for number in range(1, 100):
+        path = parent / (stem if number == 1 else f"{stem}-{number}")
+        try:
+            path.mkdir()
+        except FileExistsError:
+            if name is not None:
+                raise Refused(f"there is a run {name} already, in {path}") from None
+            continue
+        return path
+    raise Refused(f"no free name for a run in {parent}")
+
+
+def _forget_old(parent: Path) -> None:
+    """Remove the folders of all but the last runs that are over. A folder without a run file is just being made."""
+    over = [folder for folder in _newest_first(parent) if not folder.is_live()]
+    for folder in over[KEPT_RUNS - 1 :]:
+        shutil.rmtree(folder.path, ignore_errors=True)
+
+
+def _newest_first(parent: Path) -> list[RunFolder]:
+    """Return the runs that have a run file, the newest first."""
+    found = []
+    for path in parent.iterdir() if parent.is_dir() else ():
+        info = RunFolder(path).info()
+        if info is not None:
+            found.append((info.started, path.name, RunFolder(path)))
+    return [folder for _, _, folder in sorted(found, key=lambda entry: entry[:2], reverse=True)]
+
+
+def live_runs() -> list[RunFolder]:
+    """Return the live runs of this user, the newest first."""
+    return [folder for folder in _newest_first(runs_folder()) if folder.is_live()]
+
+
+def left_runs() -> list[RunFolder]:
+    """Return the runs of this user that nobody looks after any more, the newest first."""
+    return [folder for folder in _newest_first(runs_folder()) if folder.is_left()]
+
+
+def run_exists(name: str) -> bool:
+    """Whether there is a folder of a run with this name."""
+    return is_name(name) and (runs_folder() / name).is_dir()
+
+
+def open_run(name: str) -> RunFolder:
+    """Return the folder of a run by name, live or over. Raises NoRun."""
+    path = runs_folder() / name
+    if run_exists(name):
+        return RunFolder(path)
+    known = [folder.name for folder in _newest_first(runs_folder())]
+    nearest = nearest_name(name, known)
+    raise NoRun(f"no run {name!r}" + (f", nearest is {nearest}" if nearest else f" in {runs_folder()}"))
+
+
+def find_run(name: str | None = None) -> RunFolder:
+    """Return a live run: the newest one, or the one with this name. Raises NoRun."""
+    if name is None:
+        live = live_runs()
+        if not live:
+            raise NoRun("no run is live; foosim-supervisor up FILE starts one")
+        return live[0]
+    folder = open_run(name)
+    if not folder.is_live():
+        raise NoRun(f"run {name} is over")
+    if folder.info() is None:
+        raise NoRun(f"run {name} is starting, and does not listen yet")
+    return folder

@@ -1,0 +1,198 @@
+"""The folder of certificates, and how a process proves from it who it is.
+
+    ca.pem                   the root that everybody trusts
+    IDENTITY.pem .key        a certificate and its key; the certificate's common name is the identity
+    client.NAME.password     instead of these, where clients of the radio plane have passwords
+
+A refused connection looks like a router that is not there, to both sides. So everything that can be checked here is
+checked before anything is opened. A process of a run without certificates, which most are, does not load what reads
+them.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Final
+
+from foosim.common import wall_clock
+from foosim.common.addresses import parse_address
+from foosim.common.errors import Refused
+from foosim.protocol.identity import parse_identity
+from foosim.runtime.transport.certificate_folder import (
+    CA_FILE,
+    CERTIFICATE_SUFFIX,
+    KEY_SUFFIX,
+    PASSWORD_SUFFIX,
+    CertificateError,
+    read_bounded,
+)
+
+OPERATOR_VARIABLE: Final = "FOOSIM_OPERATOR"
+"""Names the operator whose certificate control commands show, where there are several."""
+VIEWER_VARIABLE: Final = "FOOSIM_VIEWER"
+"""The same of the viewer whose certificate is shown by who only looks."""
+SOON: Final = timedelta(days=14)
+"""A certificate that ends within this is to be renewed."""
+
+
+class NotAuthorised(Refused):
+    """The router will not have us, or we not the router; the text says why, as far as that can be known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Credentials:
+    """What a process shows and whom it trusts. Either it has a certificate with its key, or a user and a password."""
+
+    identity: str
+    ca: Path
+    certificate: Path | None = None
+    key: Path | None = None
+    user: str = ""
+    password: str = field(default="", repr=False)
+    until: datetime | None = None
+    """When the certificate ends."""
+
+    @property
+    def name(self) -> str:
+        return parse_identity(self.identity)[1]
+
+    def ends_soon(self, now: datetime) -> str:
+        """Return a warning when the certificate ends soon; connections end with it."""
+        if self.until is None or self.until - now > SOON:
+            return ""
+        return f"{self.certificate} ends on {self.until:%Y-%m-%d %H:%M} UTC, and its connections with it: renew it"
+
+
+def load_credentials(folder: Path | None, identity: str, password: str = "") -> Credentials | None:
+    """Return what the folder has for an identity, checked; None without a folder. Raises CertificateError.
+
+    `password`: use this one, and of the folder only the root.
+    """
+    if folder is None:
+        if password:
+            raise CertificateError("a password needs the root certificate, too: it is sent to the right vHub only")
+        return None
+    from foosim.runtime.transport import certificate_files as files
+
+    now = wall_clock.now_utc()
+    ca = files.read_ca(folder, now)
+    certificate, key = certificate_path(folder, identity), key_path(folder, identity)
+    role, name = parse_identity(identity)
+    own_password = folder / f"{identity}{PASSWORD_SUFFIX}"
+    if role == "client" and not password and own_password.exists():
+        if certificate.exists():
+            raise CertificateError(f"{folder} has a certificate and a password of {identity}: remove what is not used")
+        password = read_password(own_password)
+    if password:
+        return Credentials(identity, folder / CA_FILE, user=name, password=password)
+    if not certificate.exists():
+        known = ", ".join(identities_in(folder)) or "none"
+        raise CertificateError(f"{folder} has no certificate of {identity}; it has: {known}")
+    found = files.read_certificate(certificate)
+    files.check_certificate(certificate, found, identity, ca, now)
+    files.check_key(key, found)
+    return Credentials(identity, folder / CA_FILE, certificate, key, until=found.not_valid_after_utc)
+
+
+def certificate_path(folder: Path, identity: str) -> Path:
+    """Return where the certificate of an identity is."""
+    return folder / f"{identity}{CERTIFICATE_SUFFIX}"
+
+
+def key_path(folder: Path, identity: str) -> Path:
+    """Return where its key is."""
+    return folder / f"{identity}{KEY_SUFFIX}"
+
+
+def identities_in(folder: Path) -> list[str]:
+    """Return the identities that the folder has certificates of, in name order."""
+    stems = [path.name.removesuffix(CERTIFICATE_SUFFIX) for path in folder.glob(f"*{CERTIFICATE_SUFFIX}")]
+    return sorted(stem for stem in stems if stem != CA_FILE.removesuffix(CERTIFICATE_SUFFIX))
+
+
+def operator_credentials(folder: Path | None) -> Credentials | None:
+    """Return those of the operator that FOOSIM_OPERATOR names, or of the only one there; as `load_credentials`."""
+    return None if folder is None else _credentials_of_one(folder, "operator", OPERATOR_VARIABLE)
+
+
+def viewer_credentials(folder: Path | None) -> Credentials | None:
+    """Return those of the viewer that FOOSIM_VIEWER names, or of the only one there; as `load_credentials`.
+
+    Where there is none, those of an operator, who may look as well.
+    """
+    if folder is None:
+        return None
+    has_viewer = VIEWER_VARIABLE in os.environ or any(who.startswith("viewer.") for who in identities_in(folder))
+    return _credentials_of_one(folder, "viewer", VIEWER_VARIABLE) if has_viewer else operator_credentials(folder)
+
+
+def _credentials_of_one(folder: Path, role: str, variable: str) -> Credentials | None:
+    """Return those of the one in a role whom a variable of the environment names, or of the only one there."""
+    name = os.environ.get(variable)
+    if name is not None:
+        return load_credentials(folder, f"{role}.{name}")
+    known = [who for who in identities_in(folder) if who.startswith(f"{role}.")]
+    if len(known) != 1:
+        there = f"several {role}s ({', '.join(known)})" if known else f"no {role}'s certificate"
+        raise CertificateError(f"{folder} has {there}: {variable}=NAME in the environment says which it is")
+    return load_credentials(folder, known[0])
+
+
+def warn_of_end(credentials: Credentials | None, log: logging.Logger) -> None:
+    """Log a warning when a certificate ends soon."""
+    warning = "" if credentials is None else credentials.ends_soon(wall_clock.now_utc())
+    if warning:
+        log.warning(warning)
+
+
+@contextmanager
+def passwords_file(folder: Path, clients: Sequence[str]) -> Iterator[Path]:
+    """Give a file with the users and passwords of these clients, as a router reads it; a client without one is left
+    out. It is gone afterwards. Raises CertificateError.
+    """
+    paths = {name: folder / f"client.{name}{PASSWORD_SUFFIX}" for name in clients}
+    lines = [f"{name}:{read_password(path)}\n" for name, path in paths.items() if path.exists()]
+    with tempfile.NamedTemporaryFile("w", encoding="ascii") as file:  # only its owner can read it
+        file.writelines(lines)
+        file.flush()
+        yield Path(file.name)
+
+
+def read_password(path: Path) -> str:
+    """Return the one line of a password file. Raises CertificateError."""
+    try:
+        password = read_bounded(path).decode("ascii").strip()
+    except UnicodeDecodeError:
+        raise CertificateError(f"{path}: not a line of ASCII") from None
+    check_password(str(path), password)
+    return password
+
+
+def check_password(where: str, password: str) -> None:
+    """Raise CertificateError for a password that cannot be one."""
+    if not password or not password.isascii() or not password.isprintable() or set(" :") & set(password):
+        raise CertificateError(f"{where}: a password is printable ASCII without blanks and colons, and not empty")
+
+
+def check_host(credentials: Credentials | None, locator: str) -> None:
+    """Raise CertificateError when those who connect to where we listen would not find its host in our certificate."""
+    if credentials is None or credentials.certificate is None:
+        return
+    from foosim.runtime.transport.certificate_files import hosts_of, read_certificate
+
+    host = parse_address(locator).host.strip("[]").lower()
+    known = [name.lower() for name in hosts_of(read_certificate(credentials.certificate))]
+    if host not in known:
+        who = credentials.identity
+        shown = ", ".join(name for name in known if name != who)
+        raise CertificateError(
+            f"{credentials.certificate} is for {shown}, not for {host}, where {who} listens: "
+            f"foosim-pki renew {credentials.certificate.parent} {who} --host {host}"
+        )

@@ -1,0 +1,231 @@
+"""The inbox of a process: bounded, many writers, one reader.
+
+Threads that receive only offer to it; the loop takes everything that is there, decides, and sleeps until there is more
+or its deadline has come. Nothing else may happen in a receiving thread: the rest of the world waits behind it.
+
+A waiting reader costs a wake-up for each message, and a receiving thread between network and reader costs a second one:
+a quarter more for all that a tick's messages cost (`bench/barrier.py`). So an inbox can have `Source`s, in one of whose
+queues the reader waits itself: in that of the channel without which it cannot go on, so that nothing else wakes it for
+nothing. It looks into the others whenever it is awake; what threads offer rings the bell of the queue that it waits in.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+Item = tuple[str, str, bytes]
+"""Channel, name (the sender, or who is addressed), payload."""
+
+_NS: Final = 1_000_000_000
+_NEVER_NS: Final = 1 << 63
+ALARM_S: Final = 1.0
+"""How long the end of the alarm thread is waited for."""
+
+
+class Source(Protocol):
+    """A queue of messages in which a reader can wait."""
+
+    def poll(self) -> list[Item]:
+        """Return all that is there, without waiting."""
+
+    def wait(self, count: int) -> list[Item]:
+        """Wait for `count` messages or the bell; return what is there, which may be nothing when it was the bell."""
+
+    def ring(self) -> None:
+        """End a wait, from another thread."""
+
+
+@dataclass(frozen=True, slots=True)
+class InboxStatistics:
+    """Items taken by the reader, dropped since the inbox was full, and the most that was ever there at once."""
+
+    taken: int
+    dropped: int
+    high_water: int
+
+
+class Inbox:
+    """Items from many threads for one reader. A full inbox drops the newest and counts: what is older goes first."""
+
+    def __init__(self, limit: int) -> None:
+        assert limit >= 1, limit
+        self.limit: Final = limit
+        self._items: list[Item] = []
+        self._guard = threading.Lock()
+        self._waiting = False
+        self._woken = False
+        self._bell = threading.Lock()  # unlocked: it has rung
+        self._bell.acquire()
+        self._sources: dict[str, Source] = {}
+        self._source: Source | None = None
+        """The one that the reader waits in, or has waited in last, and for how many messages."""
+        self._count = 1
+        self._alarm: _Alarm | None = None
+        self._taken = 0
+        self._dropped = 0
+        self._high_water = 0
+
+    def offer(self, item: Item) -> bool:
+        """Add an item, from any thread; False when the inbox is full and the item is lost."""
+        with self._guard:
+            if len(self._items) >= self.limit:
+                self._dropped += 1
+                return False
+            self._items.append(item)
+        self._ring()
+        return True
+
+    def take(self, timeout_s: float | None, lacking: str = "", count: int = 1) -> list[Item]:
+        """Return all that is there; wait for it until the timeout (None: for ever) or until woken.
+
+        `lacking` is the channel without `count` messages of which the reader cannot go on: fewer do not end the wait,
+        nor does what comes in the queues of other sources. An empty list says that nothing came.
+        """
+        sources = self._sources  # a session that closes takes them away
+        received: list[Item] = []
+        for source in sources.values():
+            received += source.poll()
+        if sources:
+            self._source = sources.get(lacking) or next(iter(sources.values()))
+            self._count = count if lacking in sources else 1
+            if self._sources is not sources:
+                self._source = None
+        if received or self._items or (timeout_s is not None and timeout_s <= 0):
+            return self._hand_over(received)
+        deadline_ns = None if timeout_s is None else time.monotonic_ns() + int(timeout_s * _NS)
+        while True:
+            self._waiting = True  # before looking: who comes later rings
+            if self._items or self._woken:
+                break
+            received = self._wait(deadline_ns)
+            if received or (deadline_ns is not None and time.monotonic_ns() >= deadline_ns):
+                break
+        self._waiting = False
+        self._woken = False
+        return self._hand_over(received)
+
+    def wake(self) -> None:
+        """End the reader's take, or the next one that would wait. A signal handler may call this: it takes no lock."""
+        self._woken = True
+        self._ring()
+
+    def attach(self, source: Source, channel: str) -> None:
+        """Let the reader wait in this channel's queue; to be called by the reader, or before its first take."""
+        assert channel not in self._sources, channel
+        if self._alarm is None:
+            self._alarm = _Alarm(self._ring)
+        self._sources[channel] = source
+
+    def detach(self) -> None:
+        """Give the queues up, since their session closes: the reader waits without them. What was offered stays."""
+        self._sources = {}
+        source, self._source = self._source, None
+        if self._alarm is not None:
+            self._alarm.stop()
+        if source is not None:
+            source.ring()
+
+    def statistics(self) -> InboxStatistics:
+        """Return the account so far."""
+        return InboxStatistics(self._taken, self._dropped, self._high_water)
+
+    def _ring(self) -> None:
+        """End a wait. A ring too many only lets the reader look around once more."""
+        if not self._waiting:
+            return
+        self._waiting = False
+        source = self._source
+        if source is not None:
+            source.ring()
+            return
+        with contextlib.suppress(RuntimeError):  # it has rung already
+            self._bell.release()
+
+    def _wait(self, deadline_ns: int | None) -> list[Item]:
+        """Wait for a message, a ring or the deadline; return what the source has."""
+        source = self._source
+        if source is not None and self._alarm is not None:
+            if deadline_ns is not None:
+                self._alarm.set(deadline_ns)
+            return source.wait(self._count)
+        left_ns = -_NS if deadline_ns is None else max(0, deadline_ns - time.monotonic_ns())
+        self._bell.acquire(timeout=left_ns / _NS)
+        return []
+
+    def _hand_over(self, items: list[Item]) -> list[Item]:
+        """Return what the source had and then what was offered, no more than the limit."""
+        if self._items:
+            with self._guard:  # or an offer could still append to what the reader has
+                offered, self._items = self._items, []
+            items = items + offered if items else offered
+        count = len(items)
+        if count > self._high_water:
+            self._high_water = min(count, self.limit)
+            if count > self.limit:
+                with self._guard:
+                    self._dropped += count - self.limit
+                del items[self.limit :]
+                count = self.limit
+        self._taken += count
+        return items
+
+
+class _Alarm:
+    """Rings at a deadline, from a thread that sleeps until then.
+
+    A later deadline does not wake it: it finds it when the earlier one has passed. So a loop whose deadlines advance
+    pays for one wake-up where one passes, not where one is set. Only the reader writes the deadline.
+    """
+
+    def __init__(self, ring: Callable[[], None]) -> None:
+        self._ring = ring
+        self._changed = threading.Condition()
+        self._deadline_ns = 0
+        self._passed_ns = 0
+        self._sleeps_until_ns = _NEVER_NS
+        self._thread: threading.Thread | None = None
+        self._stopped = False
+
+    def set(self, deadline_ns: int) -> None:
+        """Ring at this time, and no more at the one that was set before."""
+        self._deadline_ns = deadline_ns
+        if deadline_ns >= self._sleeps_until_ns:
+            return
+        with self._changed:
+            if self._thread is None and not self._stopped:
+                self._thread = threading.Thread(target=self._run, name="alarm", daemon=True)
+                self._thread.start()
+            self._changed.notify()
+
+    def stop(self) -> None:
+        """End the thread."""
+        with self._changed:
+            self._stopped = True
+            self._changed.notify()
+        if self._thread is not None:
+            self._thread.join(ALARM_S)
+
+    def _run(self) -> None:
+        while self._sleep():
+            self._ring()
+
+    def _sleep(self) -> bool:
+        """Return at a deadline; False when stopped."""
+        with self._changed:
+            while not self._stopped:
+                deadline_ns, now_ns = self._deadline_ns, time.monotonic_ns()
+                if deadline_ns == self._passed_ns:
+                    self._changed.wait()
+                elif deadline_ns <= now_ns:
+                    self._passed_ns = deadline_ns
+                    return True
+                else:
+                    self._sleeps_until_ns = deadline_ns
+                    self._changed.wait((deadline_ns - now_ns) / _NS)
+                    self._sleeps_until_ns = _NEVER_NS  # awake: whoever sets a deadline waits until it has been read
+        return False

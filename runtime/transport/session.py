@@ -1,0 +1,462 @@
+"""A session on a plane: the one file that knows Zenoh.
+
+The supervisor's session is the router of the simulation plane, the vHub's second one that of the radio plane. All
+others are clients, which dial one address and never listen. Scouting is off: nothing is found or linked behind a
+router's back. Threads that receive only fill inboxes; they never decide, never publish, never call Zenoh.
+
+Zenoh tells a sender nothing about loss and takes many settings silently. So what matters is set here on purpose, read
+back and compared, and every message is numbered by what it is about.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import os
+import re
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Final, Self
+
+import zenoh
+
+from foosim.common import limits
+from foosim.common.addresses import parse_address, reachable
+from foosim.common.errors import BadValue, Failed, show
+from foosim.runtime.transport.inbox import Inbox, Item
+from foosim.runtime.transport.settings import QUERY_S, Security, client_settings, holds, router_settings
+
+KeyReader = Callable[[str], tuple[str, str] | None]
+"""Gives the channel and the name that a key stands for, or None for a key that it does not know."""
+
+CLOSE_S: Final = 2.0
+ATTEMPT_S: Final = 0.5
+"""Between two attempts to connect `give_up` is asked, and signals are heard."""
+ROUTER_THREADS: Final = 8
+"""Each sender whose message waits for a stuck reader holds one receiving thread of the router. With Zenoh's two, a
+stuck client stopped healthy ones for 9 s; with eight for 1.3 s, and nothing of theirs was lost."""
+KEYS_KEPT: Final = 4096
+BELL: Final = "-"
+"""Last chunk of a bell's key: nobody can be called so."""
+
+ROUTER_RUNTIME: Final = f"(rx: (worker_threads: {ROUTER_THREADS}))"
+CLIENT_RUNTIME: Final = "(rx: (handover: app), acc: (handover: app))"
+_RUNTIME_VARIABLE: Final = "ZENOH_RUNTIME"
+_runtime = ROUTER_RUNTIME
+_opened = False
+
+
+class ListenError(Failed):
+    """The address cannot be listened on."""
+
+
+class ConnectError(Failed):
+    """No router answers at the address."""
+
+
+def use_client_runtime() -> None:
+    """Let the thread that watches the sockets receive, too: for a process that opens clients only, before it does.
+
+    That spares a change of threads for each message. In a router, one stuck reader would stop that thread for all.
+    """
+    global _runtime  # noqa: PLW0603  # Zenoh has one runtime for the process, too
+    assert not _opened, "Zenoh reads its runtime's settings at the first session"
+    _runtime = CLIENT_RUNTIME
+
+
+@dataclass(frozen=True, slots=True)
+class SessionStatistics:
+    """Messages published, messages received, keys refused, errors in receiving threads, and the text of one of them."""
+
+    sent: int
+    received: int
+    refused: int
+    errors: int
+    error: str
+
+
+class Publisher:
+    """Puts payloads on one key."""
+
+    def __init__(self, declared: zenoh.Publisher) -> None:
+        self.sent = 0
+        self._declared = declared
+        self._put = declared.put
+        self._pid = os.getpid()
+
+    def put(self, payload: bytes) -> None:
+        """Publish. A stuck reader holds a blocking publisher for at most half a second; nothing is told about loss."""
+        assert os.getpid() == self._pid, "a session does not survive a fork: spawn processes"
+        self._put(payload)
+        self.sent += 1
+
+    def undeclare(self) -> None:
+        self._declared.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stubs name no result
+
+
+class Session:
+    """One session of a process. Use it in `with`; what it declares lives as long as it does."""
+
+    def __init__(self, session: zenoh.Session, locator: str) -> None:
+        self.locator: Final = locator
+        """Where this router listens, or where this client dials: `tcp/HOST:PORT`."""
+        self._session = session
+        self.pid: Final = os.getpid()
+        self._closed = False
+        self._publishers: list[Publisher] = []
+        self._receivers: list[_Receiver] = []
+        self._threads: list[threading.Thread] = []
+        self._inboxes: list[Inbox] = []
+        self._declared: list[Any] = []
+        _sessions.add(self)
+
+    @classmethod
+    def router(
+        cls, listen: str, message_bytes_max: int = limits.MESSAGE_BYTES_MAX, security: Security | None = None
+    ) -> Session:
+        """Listen as the router of a plane; with port 0 the system chooses. Raises ListenError.
+
+        With `security` only who proves to be known is let in, and may do what is granted.
+        """
+        address = parse_address(listen, security is not None)
+        try:
+            session = _open(router_settings(address, message_bytes_max, security))
+        except zenoh.ZError as error:
+            raise ListenError(f"cannot listen on {address}: {_reason(error)}") from None
+        locators = _locators(session)
+        if not locators:
+            session.close()  # type: ignore[no-untyped-call]
+            raise ListenError(f"cannot listen on {address}: no answer about the port that was chosen")
+        return cls(session, reachable(locators, address))
+
+    @classmethod
+    def client(
+        cls,
+        connect: str,
+        timeout_s: float,
+        message_bytes_max: int = limits.MESSAGE_BYTES_MAX,
+        give_up: Callable[[], bool] = lambda: False,
+        security: Security | None = None,
+    ) -> Session:
+        """Connect to a router, which may start later. Raises ConnectError at the timeout, or when `give_up` says so.
+
+        Raises NotAuthorised as soon as the other side, or its certificate, says that we may not. A link that is lost
+        later is made again as soon as the router is back.
+        """
+        address = parse_address(connect, security is not None)
+        if address.port == 0 or address.is_wildcard:
+            raise BadValue("not an address to connect to (tcp/HOST:PORT)", connect)
+        begun_ns = time.monotonic_ns()
+        while not give_up():
+            left_s = timeout_s - (time.monotonic_ns() - begun_ns) / 1e9
+            try:
+                return cls(
+                    _open(client_settings(address, message_bytes_max, min(left_s, ATTEMPT_S), security)), str(address)
+                )
+            except zenoh.ZError:  # its text says no more than the address, whatever the cause
+                from foosim.runtime.transport.tls_probe import probe  # brings ssl, which few processes need
+
+                probe(address, None if security is None else security.credentials, left_s <= ATTEMPT_S)
+                if left_s <= ATTEMPT_S:
+                    raise ConnectError(
+                        f"no router answers at {address} within {timeout_s:g} s: "
+                        "it is not started, listens elsewhere, or a firewall is between"
+                    ) from None
+        raise ConnectError(f"gave up before a router answered at {address}")
+
+    def publisher(self, key: str, express: bool = True, blocking: bool = True) -> Publisher:
+        """Return a publisher on one key, which subscribers of this same session do not hear.
+
+        `express`: sent at once, never held back for a batch. `blocking`: a slow reader holds the sender; otherwise what
+        does not fit within 1 ms is lost.
+        """
+        self._check()
+        declared = self._session.declare_publisher(
+            key,
+            congestion_control=zenoh.CongestionControl.BLOCK if blocking else zenoh.CongestionControl.DROP,
+            express=express,
+            reliability=zenoh.Reliability.RELIABLE,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+        self._publishers.append(Publisher(declared))
+        return self._publishers[-1]
+
+    def subscribe(self, key_expr: str, channel: str, inbox: Inbox) -> None:
+        """Offer what comes on these keys to the inbox as (channel, last chunk of the key, payload)."""
+        self._check()
+        self._drain(self._session.declare_subscriber(key_expr, _queue(inbox)), channel, inbox, _payload)
+
+    def receive(self, key_expr: str, channel: str, read_key: KeyReader, inbox: Inbox) -> None:
+        """Let the inbox's reader wait for these keys itself: the short way, for what every tick brings.
+
+        Once for a channel, by the reader itself or before the inbox's first take. When the reader leaves more than the
+        inbox's limit waiting, the link waits, too.
+        """
+        self._check()
+        stem = key_expr.removesuffix("/*")
+        subscriber = self._session.declare_subscriber(f"{stem}/**", _queue(inbox))
+        key = f"{stem}/{BELL}"
+        bell = self._session.declare_publisher(key, express=True, allowed_destination=zenoh.Locality.SESSION_LOCAL)
+        self._declared += [subscriber, bell]
+        source = _Source(subscriber.handler, read_key, key, bell, inbox.limit)
+        self._receivers.append(source)
+        self._inboxes.append(inbox)
+        inbox.attach(source, channel)
+
+    def declare_alive(self, key: str) -> None:
+        """Be present under this key until the session or its process ends."""
+        self._check()
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def watch_alive(self, key_expr: str, channel: str, inbox: Inbox) -> None:
+        """Offer (channel, name, b"+" or b"-") for all who are present, and then for who comes and goes.
+
+        Repeats can occur.
+        """
+        self._check()
+        subscriber = self._session.liveliness().declare_subscriber(key_expr, _queue(inbox), history=True)
+        self._drain(subscriber, channel, inbox, _presence)
+
+    def alive(self, key_expr: str) -> set[str]:
+        """Ask for the names that are present: a cross-check of what `watch_alive` brought."""
+        self._check()
+        replies = self._session.liveliness().get(key_expr, timeout=QUERY_S)
+        return {_name(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
+
+    def statistics(self) -> SessionStatistics:
+        """Return the account so far."""
+        return SessionStatistics(
+            sum(publisher.sent for publisher in self._publishers),
+            sum(receiver.received for receiver in self._receivers),
+            sum(receiver.refused for receiver in self._receivers),
+            sum(receiver.errors for receiver in self._receivers),
+            next((receiver.error for receiver in self._receivers if receiver.error), ""),
+        )
+
+    def close(self) -> bool:
+        """Take back what was declared and close; False when that took more than `CLOSE_S` and goes on without us."""
+        assert os.getpid() == self.pid, "a session does not survive a fork: spawn processes"
+        if self._closed:
+            return True
+        self._closed = True
+        for inbox in self._inboxes:
+            inbox.detach()
+        closer = threading.Thread(target=self._close, name="close", daemon=True)
+        closer.start()
+        closer.join(CLOSE_S)
+        return not closer.is_alive()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def _close(self) -> None:
+        for declared in (*self._publishers, *self._declared):
+            # Undeclared already, or borrowed by a thread that puts at this moment: then the session's close ends it.
+            with contextlib.suppress(zenoh.ZError, RuntimeError):
+                declared.undeclare()
+        self._session.close()  # type: ignore[no-untyped-call]
+        for thread in self._threads:
+            thread.join()
+
+    def _check(self) -> None:
+        assert os.getpid() == self.pid, "a session does not survive a fork: spawn processes"
+        assert not self._closed, "the session is closed"
+
+    def _drain(self, subscriber: Any, channel: str, inbox: Inbox, content: Callable[[zenoh.Sample], bytes]) -> None:
+        drain = _Drain(subscriber.handler, channel, inbox, content)
+        self._declared.append(subscriber)
+        self._receivers.append(drain)
+        thread = threading.Thread(target=drain.run, name=f"receive {channel}", daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+
+_sessions: weakref.WeakSet[Session] = weakref.WeakSet()
+
+
+class _Receiver:
+    """What a receiving side counts. It belongs to one thread."""
+
+    def __init__(self, handler: Any) -> None:
+        self.received = 0
+        self.refused = 0
+        self.errors = 0
+        self.error = ""
+        self._handler = handler
+
+    def _concrete_key(self, sample: zenoh.Sample) -> str | None:
+        """Return the key; None, and counted, for one with wildcards: Zenoh lets them pass, and they name nobody."""
+        key = str(sample.key_expr)
+        if "*" in key or "$" in key:
+            self.refused += 1
+            return None
+        return key
+
+    def _count_error(self, error: Exception) -> None:
+        """Keep an error for the statistics: raised, it would end the thread and silence its channel."""
+        self.errors += 1
+        self.error = self.error or show(f"{type(error).__name__}: {error}", 200)
+
+
+class _Drain(_Receiver):
+    """The thread between a subscriber's queue and an inbox.
+
+    A plain callback of Zenoh would also have a thread and a queue, but one of 256 messages (full, it stops the link
+    while Python is busy) and one that keeps a process from ending.
+    """
+
+    def __init__(self, handler: Any, channel: str, inbox: Inbox, content: Callable[[zenoh.Sample], bytes]) -> None:
+        super().__init__(handler)
+        self._channel = channel
+        self._inbox = inbox
+        self._content = content
+
+    def run(self) -> None:
+        """Offer samples until the subscriber is undeclared."""
+        for sample in self._handler:
+            try:
+                key = self._concrete_key(sample)
+                if key is not None:
+                    self.received += 1
+                    self._inbox.offer((self._channel, _name(key), self._content(sample)))
+            except Exception as error:  # noqa: BLE001
+                self._count_error(error)
+
+
+class _Source(_Receiver):
+    """A subscriber's queue as an inbox's source. Its bell is a message on a key of it that stays in this session."""
+
+    def __init__(self, handler: Any, read_key: KeyReader, bell_key: str, bell: zenoh.Publisher, limit: int) -> None:
+        """`limit` is how many messages are taken at a time: a flood would keep the reader from all else."""
+        super().__init__(handler)
+        self._limit = limit
+        self._read_key = read_key
+        self._bell_key = bell_key
+        self._bell = bell
+        self._keys: dict[str, tuple[str, str]] = {}
+
+    def poll(self) -> list[Item]:
+        """Return what is there, without waiting."""
+        items: list[Item] = []
+        try:
+            while len(items) < self._limit and (sample := self._handler.try_recv()) is not None:
+                self._read(sample, items)
+        except zenoh.ZError:  # the subscriber was undeclared
+            pass
+        return items
+
+    def wait(self, count: int) -> list[Item]:
+        """Wait for `count` messages or the bell, and return what is there."""
+        items: list[Item] = []
+        try:
+            for expected in range(1, count + 1):
+                self._read(self._handler.recv(), items)
+                if len(items) < expected:
+                    break
+        except zenoh.ZError:  # the subscriber was undeclared
+            return items
+        return items + self.poll()
+
+    def ring(self) -> None:
+        """End a wait."""
+        with contextlib.suppress(zenoh.ZError):  # undeclared, which ends a wait as well
+            self._bell.put(b"")
+
+    def _read(self, sample: zenoh.Sample, items: list[Item]) -> None:
+        key = str(sample.key_expr)
+        known = self._keys.get(key)
+        if known is None:
+            if key == self._bell_key or self._concrete_key(sample) is None:
+                return
+            known = self._learn(key)
+            if known is None:
+                return
+        self.received += 1
+        items.append((*known, sample.payload.to_bytes()))
+
+    def _learn(self, key: str) -> tuple[str, str] | None:
+        try:
+            known = self._read_key(key)
+        except Exception as error:  # noqa: BLE001
+            self._count_error(error)
+            return None
+        if known is None:
+            self.refused += 1
+        elif len(self._keys) < KEYS_KEPT:
+            self._keys[key] = known
+        return known
+
+
+def _queue(inbox: Inbox) -> Any:
+    return zenoh.handlers.FifoChannel(inbox.limit)
+
+
+def _payload(sample: zenoh.Sample) -> bytes:
+    return sample.payload.to_bytes()
+
+
+def _presence(sample: zenoh.Sample) -> bytes:
+    return b"+" if sample.kind == zenoh.SampleKind.PUT else b"-"
+
+
+def _name(key: str) -> str:
+    return key.rpartition("/")[2]
+
+
+def _open(settings: dict[str, Any]) -> zenoh.Session:
+    config = zenoh.Config()
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    for key, value in settings.items():  # earlier versions took misspelt keys silently, and a later line could undo one
+        assert holds(json.loads(config.get_json(key)), value), f"Zenoh has not taken {key}"
+    with _runtime_variable():
+        return zenoh.open(config)
+
+
+@contextlib.contextmanager
+def _runtime_variable() -> Iterator[None]:
+    """Set the variable for the one time that Zenoh reads it: left there, processes that we start would inherit it."""
+    global _opened
+    first, _opened = not _opened, True
+    if not first or _RUNTIME_VARIABLE in os.environ:
+        yield
+        return
+    os.environ[_RUNTIME_VARIABLE] = _runtime
+    try:
+        yield
+    finally:
+        del os.environ[_RUNTIME_VARIABLE]
+
+
+def _locators(session: zenoh.Session) -> list[str]:
+    """Ask the session's own admin space where it listens."""
+    for reply in session.get(f"@/{session.zid()}/router", timeout=QUERY_S):
+        if reply.ok is not None:
+            locators = json.loads(reply.ok.payload.to_bytes())["locators"]
+            return [str(locator) for locator in locators]
+    return []
+
+
+def _close_all() -> None:
+    """Close what was left open. A thread that Python ends inside Zenoh, as it does at exit, aborts the process."""
+    for session in list(_sessions):
+        if session.pid == os.getpid():
+            session.close()
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """Return what the system said, out of a text that names Zenoh's source files."""
+    text = str(error)
+    said = re.search(r"([A-Z][^:()\[\]]*) \(os error \d+\)", text)
+    return said[1] if said is not None else text.partition(" at /")[0][:160]
+
+
+atexit.register(_close_all)

@@ -1,0 +1,67 @@
+"""Why a router did not let us in: a TLS handshake of our own, since Zenoh calls every refusal a timeout.
+
+Only what is sure is said early: a certificate that we do not trust, or an alert of the other side about ours. Who is
+not there at all may still start.
+"""
+
+from __future__ import annotations
+
+import socket
+import ssl
+from typing import Final
+
+from foosim.common.addresses import Address
+from foosim.runtime.transport.certificates import Credentials, NotAuthorised
+
+PROBE_S: Final = 1.0
+ALERT_S: Final = 0.5
+"""How long the other side has to complain about our certificate: in TLS 1.3 it does so behind the handshake."""
+
+
+def probe(address: Address, credentials: Credentials | None, is_last: bool) -> None:
+    """Raise NotAuthorised when it is sure that there is no way in; `is_last`: also when it is likely."""
+    try:
+        with socket.create_connection((address.host.strip("[]"), address.port), PROBE_S) as link:
+            _shake(link, address, credentials)
+    except OSError:
+        return  # nobody there, or not yet; ssl's errors are among these
+    else:
+        if credentials is not None and is_last:
+            raise NotAuthorised(
+                f"{credentials.identity}: not authorised, or not reachable: {address} speaks TLS, and lets nobody in "
+                "by this " + ("user and password" if credentials.password else "certificate")
+            )
+
+
+def _shake(link: socket.socket, address: Address, credentials: Credentials | None) -> None:
+    """Go through the handshake; raises NotAuthorised, or OSError when it comes to nothing."""
+    if credentials is None:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        context.check_hostname = False
+        context.verify_mode = ssl.CERT_NONE
+        with context.wrap_socket(link):
+            raise NotAuthorised(f"{address} lets in only who has a certificate or a password: --pki DIR says where")
+    context = ssl.create_default_context(ssl.Purpose.SERVER_AUTH, cafile=str(credentials.ca))
+    if credentials.certificate is not None:
+        context.load_cert_chain(credentials.certificate, credentials.key)
+    try:
+        with context.wrap_socket(link, server_hostname=address.host.strip("[]")) as secured:
+            secured.settimeout(ALERT_S)
+            try:
+                secured.recv(1)
+            except TimeoutError:
+                return  # it waits for what Zenoh would say: we are let in as far as TLS goes
+    except ssl.SSLCertVerificationError as error:
+        raise NotAuthorised(f"{address}: its certificate is not accepted here: {error.verify_message}") from None
+    except ssl.SSLError as error:
+        if "ALERT" in (error.reason or ""):
+            raise NotAuthorised(
+                f"{address}: not authorised: it does not accept {credentials.certificate or 'who has no certificate'}"
+                f" ({_alert(error)})"
+            ) from None
+        raise
+
+
+def _alert(error: ssl.SSLError) -> str:
+    """Return what the other side complained of, in words."""
+    return (error.reason or "").lower().rpartition("alert_")[2].replace("_", " ")

@@ -1,0 +1,106 @@
+"""What was typed and is no use of a command, in one line: where, what is wrong, the value, what is valid.
+
+`command` shows it. What typer raises has the faults apart, but not their classes: they are told by their attributes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+
+from foosim.common.errors import BadValue, show
+from foosim.common.names import nearest_name
+
+
+class BadUsage(BadValue):
+    """What was typed is no use of the command: an option or argument that it does not have, or has otherwise."""
+
+
+def bad_usage(error: typer.TyperException, root: Any, program: str, words: Sequence[str]) -> BadUsage:
+    """Return what is wrong with `words`, which typer has refused with `error`; `root` is what `program` is."""
+    command, place, words = _meant(error, root, program, words)
+    option, parameter = getattr(error, "option_name", None), getattr(error, "param", None)
+    if option is not None:
+        if hasattr(error, "possibilities"):
+            return _unknown(f"{place}: there is no such option", option, "options", _options(command))
+        return _value_of_option(command, place, option, words)
+    if parameter is None:
+        return _arguments(command, error, place, words)
+    if hasattr(error, "param_type"):
+        needed = [_shown(one) for one in command.params if one.required]
+        also = f"; needed are {', '.join(needed)}" if len(needed) > 1 else ""
+        return BadUsage(f"{place}: {_shown(parameter)} is missing{also}")
+    return _value(error, parameter, f"{place} {_shown(parameter)}")
+
+
+def _meant(error: Exception, root: Any, program: str, words: Sequence[str]) -> tuple[Any, str, list[str]]:
+    """Return the command that was refused, what it is called, and the words behind its name."""
+    commands, context = getattr(root, "commands", {}), getattr(error, "ctx", None)
+    if context is None or context.parent is not None:
+        for number, word in enumerate(words):
+            if word in commands:
+                return commands[word], f"{program} {word}", list(words[number + 1 :])
+    return root, program, list(words)
+
+
+def _shown(parameter: Any) -> str:
+    """A parameter as the docs call it: `--seed`, `COUNT`."""
+    if parameter.param_type_name == "option":
+        return str(max(parameter.opts, key=len))
+    return str(parameter.metavar or parameter.name.upper())
+
+
+def _options(command: Any) -> list[str]:
+    return [_shown(one) for one in command.params if one.param_type_name == "option"] + ["--help"]
+
+
+def _unknown(what: str, word: str, kind: str, valid: Sequence[str]) -> BadUsage:
+    near = nearest_name(word, valid)
+    return (
+        BadUsage(what, word, near)
+        if near is not None
+        else BadUsage(f"{what}, {show(word)}; {kind} are {', '.join(valid)}")
+    )
+
+
+def _value_of_option(command: Any, place: str, option: str, words: Sequence[str]) -> BadUsage:
+    """An option with too few values, or with one where it is said or not."""
+    parameter = next(one for one in command.params if option in one.opts)
+    where = f"{place} {option}"
+    if getattr(parameter, "is_flag", False):
+        given = next((word for word in words if word.startswith(f"{option}=")), option)
+        return BadUsage(f"{where}: it takes no value", given.partition("=")[2])
+    if parameter.nargs == 1:
+        return BadUsage(f"{where}: its value is missing; of it --help says: {parameter.help}")
+    behind = words[words.index(option) + 1 :] if option in words else []
+    count = f"{where}: {parameter.nargs} values are needed, {parameter.metavar}; here are {len(behind)}"
+    return BadUsage(count, " ".join(behind)) if behind else BadUsage(count)
+
+
+def _value(error: Exception, parameter: Any, where: str) -> BadUsage:
+    """A value that is not of its option's type."""
+    problems: list[Any] = getattr(error.__cause__, "errors", list)()  # of pydantic, by which typer reads values
+    if not problems or parameter.type_descriptor.annotation is not int:
+        return BadUsage(f"{where}: {getattr(error, 'message', error)}")
+    least, most = parameter.min, parameter.max
+    span = "" if least is None else f" from {least} on" if most is None else f" from {least} to {most}"
+    return BadUsage(f"{where}: a whole number{span} is needed", str(problems[0]["input"]))
+
+
+def _arguments(command: Any, error: typer.TyperException, place: str, words: Sequence[str]) -> BadUsage:
+    """A word that is no command, no command at all, or more words than there are arguments."""
+    commands, context = getattr(command, "commands", None), getattr(error, "ctx", None)
+    if commands is not None:
+        word = next((word for word in words if not word.startswith("-")), None)
+        if word is None:
+            return BadUsage(f"{place}: a command is missing; commands are {', '.join(commands)}")
+        return _unknown(f"{place}: there is no such command", word, "commands", list(commands))
+    extra = [] if context is None else command.make_parser(context).parse_args(list(words))[1]
+    if not extra:
+        return BadUsage(f"{place}: {error.format_message()}")
+    taken = [_shown(one) for one in command.params if one.param_type_name == "argument"]
+    if not taken:
+        return BadUsage(f"{place}: it takes no arguments", " ".join(extra))
+    return BadUsage(f"{place}: too many arguments, {show(' '.join(extra))}; it takes {' '.join(taken)}")

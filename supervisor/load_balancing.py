@@ -1,0 +1,122 @@
+"""Balancing: robots move, one at a time, from the busiest node to the idlest.
+
+A node's load is the share of its time in which its loop does not sleep, as its heartbeats tell. A move is an epoch as
+any other: the world does not notice. A robot's cost is taken to be an equal share of its node's load; it moves only
+when that makes the two nodes more alike, and then the loads settle before the next one. Where an operator asks for it,
+all move at once of which that is expected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from foosim.supervisor.core import SupervisorCore
+
+EVERY_NS: Final = 1_000_000_000
+"""How often loads are looked at: a heartbeat tells the load of the last second."""
+SETTLE_NS: Final = 5_000_000_000
+"""After a move, loads are new."""
+STAY_NS: Final = 60_000_000_000
+"""A robot that was moved stays for so long."""
+SMOOTHING: Final = 0.5
+"""Weight of the newest load in the running mean."""
+WORTH: Final = 0.15
+"""A smaller difference of loads is left alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """A robot that should move, and why: the loads of the two nodes."""
+
+    robot: str
+    source: str
+    target: str
+    source_load: float
+    target_load: float
+
+
+def best_shift(
+    loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str], stay: Collection[str]
+) -> Shift | None:
+    """Return which robot should move now, if any, but none of those that `stay`: from the busiest to the idlest node,
+    and home rather than elsewhere."""
+    source = max(sorted(loads), key=lambda name: loads[name])
+    target = min(sorted(loads), key=lambda name: loads[name])
+    mine = sorted(robot for robot, owner in owners.items() if owner == source)
+    difference = loads[source] - loads[target]
+    if len(mine) < 2 or difference <= max(WORTH, loads[source] / len(mine)):
+        return None
+    free = [robot for robot in mine if robot not in stay]
+    if not free:
+        return None
+    robot = min(free, key=lambda name: (homes.get(name) != target, name))
+    return Shift(robot, source, target, loads[source], loads[target])
+
+
+def shifts_at_once(loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str]) -> list[Shift]:
+    """Return all that should move if each takes its share of the load with it; a node gives, or takes. The loads in a
+    shift are those that were measured."""
+    expected, placed = dict(loads), dict(owners)
+    shifts: list[Shift] = []
+    while (shift := best_shift(expected, placed, homes, {known.robot for known in shifts})) is not None:
+        if any(shift.source == known.target or shift.target == known.source for known in shifts):
+            break
+        share = shift.source_load / sum(owner == shift.source for owner in placed.values())
+        expected[shift.source] -= share
+        expected[shift.target] += share
+        placed[shift.robot] = shift.target
+        shifts.append(Shift(shift.robot, shift.source, shift.target, loads[shift.source], loads[shift.target]))
+    return shifts
+
+
+def loads_of(core: SupervisorCore) -> dict[str, float]:
+    """Return the load of each node that takes part and has told it."""
+    known = core.roster.by_name
+    beats = {name: known[name].heartbeat for name in core.members if name in known}
+    return {name: beat.busy for name, beat in beats.items() if beat is not None}
+
+
+class Balancer:
+    """Decides when which robot moves. Loads are shares of a core, from 0 to 1."""
+
+    def __init__(self, homes: Mapping[str, str]) -> None:
+        """`homes` is the node of each robot by the deployment: it moves there rather than elsewhere."""
+        self._homes = dict(homes)
+        self._means: dict[str, float] = {}
+        self._moved_ns: dict[str, int] = {}
+        self._next_ns = 0
+
+    def look(self, loads: Mapping[str, float], owners: Mapping[str, str], now_ns: int) -> Shift | None:
+        """Return what should move now, given the load of every node that takes part; None for nothing."""
+        if now_ns < self._next_ns or len(loads) < 2:
+            return None
+        self._next_ns = now_ns + EVERY_NS
+        before = self._means
+        self._means = {
+            name: load if name not in before else SMOOTHING * load + (1 - SMOOTHING) * before[name]
+            for name, load in loads.items()
+        }
+        stay = {robot for robot, moved_ns in self._moved_ns.items() if now_ns < moved_ns + STAY_NS}
+        shift = best_shift(self._means, owners, self._homes, stay)
+        if shift is None:
+            return None
+        self._moved_ns[shift.robot] = now_ns
+        self._next_ns = now_ns + SETTLE_NS
+        self._means = {}
+        return shift
+
+    def wake(self, core: SupervisorCore, now_ns: int) -> None:
+        """Look at the nodes of a running world, and move what should."""
+        if not core.is_open or core.end is not None or core.pacer.paused:
+            return
+        loads = loads_of(core)
+        shift = self.look(loads, core.owners, now_ns) if len(loads) == len(core.members) else None
+        if shift is None:
+            return
+        core.account.moves += 1
+        core.open_epoch({**core.owners, shift.robot: shift.target}, now_ns)
+        source, target = f"{shift.source} ({shift.source_load:.0%})", f"{shift.target} ({shift.target_load:.0%})"
+        core.say("info", f"{shift.robot} moves from {source} to {target} at tick {core.frame.tick}")

@@ -1,0 +1,400 @@
+"""Line of sight: which things of the world a straight line between two antennas crosses, and how far inside of each.
+
+The things are those of the scene: the scenery, prepared once, and the bodies, placed by the one forward kinematics
+when somebody asks for a line in that frame. What is crossed is worked out from the lesser of the two ends, so both
+directions of a pair have the same crossings to the last bit. Boxes around things say in one pass for many lines where
+to look; what is said then comes from one spelling of plain floats, so it does not matter in which company or order a
+line is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from math import inf, sqrt
+from typing import Final, Generic, NamedTuple, TypeVar
+
+from foosim.deployment.schema import Deployment
+from foosim.vhub.line_of_sight.rays import MARGIN_M, Pillar, Triangles, boxes_around, boxes_met_by, pillars_met_by
+from foosim.vhub.line_of_sight.solids import BOX, CYLINDER, MESH, SPHERE, Line, Piece, Solid, chord_of, joined, ray_of
+from foosim.world.frame import Frame
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import Layout
+from foosim.world.materials import RadioMaterial
+from foosim.world.mesh import Mesh
+from foosim.world.scene import (
+    ORIGIN,
+    Body,
+    Box,
+    Cylinder,
+    Link,
+    Quaternion,
+    Scene,
+    Shape,
+    Sphere,
+    Vector,
+    enclosing,
+    rotate,
+    shape_box,
+    swept_box,
+)
+from foosim.world.scenes.build import build_scene
+
+REACH_M: Final = 0.5
+"""Of a line it is remembered what of the scenery may be there as long as no end has moved further along an axis."""
+CELL_M: Final = 1.0
+"""What is remembered of a line is found by the cells of this size that its ends are in."""
+PAIRS_KEPT: Final = 4096
+"""Pairs of cells of which it is remembered, at least."""
+UNKNOWN: Vector = (inf, inf, inf)
+"""In place of a place: nothing is there."""
+
+Key = tuple[Line, frozenset[str]]
+"""A line from its lesser end, and the bodies that are ignored."""
+
+
+class Crossing(NamedTuple):
+    """A thing that a line crosses: its name (of the scenery, or the entity's), what it is made of, the way through it.
+
+    `chord_m` is how far the line is inside of it, 0 for a wall without a thickness of its own. `entry_m` and `exit_m`
+    are the distances from the lesser end at which it begins and ends.
+    """
+
+    name: str
+    material: RadioMaterial
+    chord_m: float
+    entry_m: float = 0.0
+    exit_m: float = 0.0
+
+
+class _Groups:
+    """Names and materials of which shapes that overlap count as one."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, RadioMaterial], int] = {}
+        self._named: list[tuple[str, RadioMaterial]] = []
+        self._meshes: dict[bytes, Triangles] = {}
+
+    def solids(self, shapes: Iterable[Shape], body: str | None = None) -> list[Solid]:
+        """Return shapes of a body, or of the scenery, as solids."""
+        return [self._solid(shape, self._number(shape, body)) for shape in shapes]
+
+    def _solid(self, shape: Shape, group: int) -> Solid:
+        geometry, position, orientation = shape.geometry, shape.position, shape.orientation
+        if isinstance(geometry, Box):
+            return Solid(BOX, geometry.half, None, group, position, orientation)
+        if isinstance(geometry, Cylinder):
+            half = geometry.radius, geometry.radius, geometry.length / 2
+            return Solid(CYLINDER, half, None, group, position, orientation)
+        if isinstance(geometry, Sphere):
+            half = geometry.radius, geometry.radius, geometry.radius
+            return Solid(SPHERE, half, None, group, position, orientation)
+        return Solid(MESH, ORIGIN, self._prepared(geometry), group, position, orientation)
+
+    def _number(self, shape: Shape, body: str | None) -> int:
+        key = shape.name if body is None else body, shape.radio
+        number = self._known.setdefault(key, len(self._named))
+        if number == len(self._named):
+            self._named.append(key)
+        return number
+
+    def _prepared(self, mesh: Mesh) -> Triangles:
+        """Return the triangles of a mesh, those of equal ones once."""
+        if mesh.digest not in self._meshes:
+            self._meshes[mesh.digest] = Triangles(mesh)
+        return self._meshes[mesh.digest]
+
+    def crossings(self, line: Line, solids: list[Solid]) -> list[Crossing]:
+        """Return what a line crosses of some solids, in their order."""
+        ray = ray_of(line)
+        if not ray[2] > 0.0:
+            return []
+        found: dict[int, list[Piece]] = {}
+        for solid in solids:
+            pieces = solid.pieces(ray)
+            if pieces:
+                before = found.get(solid.group)
+                if before is None:
+                    found[solid.group] = pieces
+                else:
+                    before.extend(pieces)
+        crossings: list[Crossing] = []
+        for group, pieces in found.items():
+            name, material = self._named[group]
+            for piece in joined(pieces) if len(pieces) > 1 else pieces:
+                enter, leave = piece[0][0], piece[-1][1]
+                chord = leave - enter if len(piece) == 1 else chord_of(piece)
+                crossings.append(Crossing(name, material, chord, enter, leave))
+        return _in_order(crossings)
+
+
+def _in_order(crossings: list[Crossing]) -> list[Crossing]:
+    """Return crossings in the order of their distance from the lesser end, then of their names."""
+    return sorted(crossings, key=_by_distance) if len(crossings) > 1 else crossings
+
+
+def _by_distance(crossing: Crossing) -> tuple[float, str]:
+    return crossing.entry_m, crossing.name
+
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+class _Memory(Generic[K, V]):
+    """What was worked out lately: what nobody has asked for since PAIRS_KEPT others came is forgotten."""
+
+    def __init__(self) -> None:
+        self._newer: dict[K, V] = {}
+        self._older: dict[K, V] = {}
+
+    def known(self, key: K) -> V | None:
+        """Return what is remembered, None if it is not."""
+        found = self._newer.get(key)
+        if found is None:
+            found = self._older.get(key)
+            if found is not None:
+                self.keep(key, found)
+        return found
+
+    def keep(self, key: K, value: V) -> None:
+        """Remember."""
+        if len(self._newer) >= PAIRS_KEPT:
+            self._older, self._newer = self._newer, {}
+        self._newer[key] = value
+
+
+class Trace:
+    """What is remembered of a line whose ends move: what of the scenery is near, and what of it the line crosses."""
+
+    __slots__ = ("a", "b", "crossed", "line", "near", "still")
+
+    def __init__(self) -> None:
+        self.still: Still | None = None
+        """The scenery that all of it is about."""
+        self.a = self.b = UNKNOWN
+        """Where the ends were when `near` was found."""
+        self.near: list[Solid] = []
+        self.line: Line = (UNKNOWN, UNKNOWN)
+        self.crossed: tuple[Crossing, ...] = ()
+
+    def covers(self, line: Line) -> bool:
+        """Whether all of the scenery that a line may cross is in `near`."""
+        ((ax, ay, az), (bx, by, bz)), (x, y, z), (u, v, w) = line, self.a, self.b
+        return (
+            abs(ax - x) <= REACH_M
+            and abs(ay - y) <= REACH_M
+            and abs(az - z) <= REACH_M
+            and abs(bx - u) <= REACH_M
+            and abs(by - v) <= REACH_M
+            and abs(bz - w) <= REACH_M
+        )
+
+
+class Still:
+    """The scenery, and what is remembered of lines through it that nobody else remembers."""
+
+    def __init__(self, shapes: Sequence[Shape]) -> None:
+        self.shapes = shapes
+        self.groups = _Groups()
+        opaque = [shape for shape in shapes if not shape.radio.is_transparent]
+        self.solids = self.groups.solids(opaque)
+        boxes = [shape_box(shape) for shape in opaque]
+        self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes], REACH_M + MARGIN_M)
+        self._traces = _Memory[Line, Trace]()
+
+    def trace(self, line: Line) -> Trace:
+        """Return what is remembered of lines from cell to cell."""
+        (ax, ay, az), (bx, by, bz) = line
+        cells = (ax // CELL_M, ay // CELL_M, az // CELL_M), (bx // CELL_M, by // CELL_M, bz // CELL_M)
+        found = self._traces.known(cells)
+        if found is None:
+            found = Trace()
+            self._traces.keep(cells, found)
+        return found
+
+    def crossed(self, line: Line, trace: Trace) -> tuple[Crossing, ...]:
+        """Return what a line crosses of the scenery; `trace` is what is remembered of it, or of one like it."""
+        if trace.still is not self or trace.line != line:
+            if trace.still is not self or not trace.covers(line):
+                trace.still = self
+                trace.a, trace.b = line
+                trace.near = [self.solids[index] for index in boxes_met_by(self._boxes, line)]
+            trace.crossed = tuple(self.groups.crossings(line, trace.near)) if trace.near else ()
+            trace.line = line
+        return trace.crossed
+
+
+class _Limb:
+    """A link as rays meet it: its solids, and the sphere around them in the link's frame."""
+
+    __slots__ = ("middle", "radius", "solids")
+
+    def __init__(self, body: str, link: Link, groups: _Groups) -> None:
+        opaque = [shape for shape in link.shapes if not shape.radio.is_transparent]
+        self.solids = groups.solids(opaque, body)
+        low, high = enclosing([shape_box(shape) for shape in opaque] or [(ORIGIN, ORIGIN)])
+        x, y, z = high[0] - low[0], high[1] - low[1], high[2] - low[2]
+        self.middle = (low[0] + x / 2, low[1] + y / 2, low[2] + z / 2)
+        self.radius = sqrt(x * x + y * y + z * z) / 2
+
+
+def _reach(body: Body) -> float | Pillar:
+    """Return how far a body reaches: about its own origin (m) when it is free to move, else in the world."""
+    (lx, ly, lz), (hx, hy, hz) = swept_box(body)
+    if body.links[0].joint != "free":
+        x, y = hx - lx, hy - ly
+        return Pillar(body.name, lx + x / 2, ly + y / 2, sqrt(x * x + y * y) / 2, lz, hz)
+    x, y, z = body.position
+    x, y, z = max(abs(lx - x), abs(hx - x)), max(abs(ly - y), abs(hy - y)), max(abs(lz - z), abs(hz - z))
+    return sqrt(x * x + y * y + z * z)
+
+
+class Geometry:
+    """A scene as rays meet it: scenery that stands, and the links of bodies, to be placed for each frame."""
+
+    def __init__(self, scene: Scene, still: Still | None = None) -> None:
+        """`still` is the same scenery, prepared before."""
+        self.scene = scene
+        self.still = Still(scene.scenery) if still is None else still
+        self.groups = _Groups()
+        self.limbs = {
+            body.name: [_Limb(body.name, link, self.groups) for link in body.links] for body in scene.bodies.values()
+        }
+        self.reaches = {name: _reach(body) for name, body in sorted(scene.bodies.items())}
+
+    def sight(self, layout: Layout, numbers: Sequence[float]) -> Sight:
+        """Return what there is to see at a frame: `numbers` are its values, `layout` has the scene's bodies."""
+        return Sight(self, layout, numbers)
+
+
+class _Placed:
+    """A link at its pose in one frame."""
+
+    __slots__ = ("_limb", "_middle", "_orientation", "_position", "_solids")
+
+    def __init__(self, limb: _Limb, position: Vector, orientation: Quaternion) -> None:
+        self._limb, self._position, self._orientation = limb, position, orientation
+        x, y, z = rotate(orientation, limb.middle)
+        self._middle = x + position[0], y + position[1], z + position[2]
+        self._solids: list[Solid] | None = None
+
+    def is_near(self, line: Line) -> bool:
+        """Whether a line comes as near as the sphere around the link, or nearly so."""
+        (x, y, z), ((ax, ay, az), (bx, by, bz)) = self._middle, line
+        px, py, pz = x - ax, y - ay, z - az
+        dx, dy, dz = bx - ax, by - ay, bz - az
+        square = dx * dx + dy * dy + dz * dz
+        along = px * dx + py * dy + pz * dz
+        if along > 0.0:
+            share = along / square if along < square else 1.0
+            px, py, pz = px - share * dx, py - share * dy, pz - share * dz
+        reach = self._limb.radius + MARGIN_M
+        return px * px + py * py + pz * pz <= reach * reach
+
+    def in_world(self) -> list[Solid]:
+        if self._solids is None:
+            self._solids = [solid.placed(self._position, self._orientation) for solid in self._limb.solids]
+        return self._solids
+
+
+class Sight:
+    """Lines of sight in one frame, each worked out once."""
+
+    def __init__(self, geometry: Geometry, layout: Layout, numbers: Sequence[float]) -> None:
+        self._geometry, self._layout, self._numbers = geometry, layout, numbers
+        self._found: dict[Key, tuple[Crossing, ...]] = {}
+        self._placed: dict[str, list[_Placed]] = {}
+        self._around: list[Pillar] | None = None
+        """What is around bodies."""
+
+    def between(self, a: Vector, b: Vector, ignoring: Collection[str] = ()) -> tuple[Crossing, ...]:
+        """Return what the line between two points (m, world frame) crosses, the bodies `ignoring` (entities) aside.
+
+        In the order of their distance from the lesser end, then of their names: the same for both directions. Shapes
+        of one body, or of scenery with one name, that overlap and are of the same material count as one. A closed mesh
+        counts as one however often the line enters it: its chords add up. Of a mesh that is not closed each wall that
+        the line passes counts. An end that is inside of something is where its chord begins or ends. What is
+        transparent is left out.
+        """
+        line = (a, b) if a <= b else (b, a)
+        key = line, frozenset(ignoring)
+        found = self._found.get(key)
+        if found is None:
+            trace = self._geometry.still.trace(line)
+            found = self._found[key] = self.look(line, key[1], trace)
+        return found
+
+    def look(self, line: Line, ignoring: frozenset[str], trace: Trace) -> tuple[Crossing, ...]:
+        """Work out what a line from its lesser end crosses, for who remembers it: `between` says what that is.
+
+        `trace` is what who asks remembers of the same line in frames before.
+        """
+        standing = self._geometry.still.crossed(line, trace)
+        if self._around is None:
+            self._around = self._pillars()
+        near = pillars_met_by(self._around, line)
+        moving: list[Solid] = []
+        for name in near:
+            if name not in ignoring:
+                moving.extend(self._solids(name, line))
+        if not moving:
+            return standing
+        crossed = self._geometry.groups.crossings(line, moving)
+        if not standing or not crossed:
+            return tuple(crossed) or standing
+        return tuple(_in_order([*standing, *crossed]))
+
+    def _pillars(self) -> list[Pillar]:
+        """Return a pillar around each body: however a free one is turned, wherever another one's joints are."""
+        pillars = []
+        for name, reach in self._geometry.reaches.items():
+            if isinstance(reach, float):
+                start = self._layout[name].offsets["position"]
+                x, y, z = self._numbers[start : start + 3]
+                pillars.append(Pillar(name, x, y, reach, z - reach, z + reach))
+            else:
+                pillars.append(reach)
+        return pillars
+
+    def _solids(self, name: str, line: Line) -> list[Solid]:
+        """Return the solids of a body's links that a line comes near to."""
+        placed = self._placed.get(name)
+        if placed is None:
+            placed = self._placed[name] = self._place(name)
+        return [solid for link in placed if link.is_near(line) for solid in link.in_world()]
+
+    def _place(self, name: str) -> list[_Placed]:
+        """Place the links of a body that have shapes."""
+        geometry = self._geometry
+        poses = forward_kinematics(geometry.scene.bodies[name], self._layout[name], self._numbers)
+        return [
+            _Placed(limb, position, orientation)
+            for limb, (_, position, orientation) in zip(geometry.limbs[name], poses, strict=True)
+            if limb.solids
+        ]
+
+
+class LineOfSight:
+    """Lines of sight in the frames of a run. It remembers the scene of the newest layout, and the newest frame's."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._deployment = deployment
+        self._geometry = Geometry(Scene({}, ()))
+        self._layout = Layout({}, {})
+        self._frame: Frame | None = None
+        self._sight = self._geometry.sight(self._layout, ())
+
+    def at(self, frame: Frame) -> Sight:
+        """Return the sight in a frame; nothing is worked out before somebody asks it for a line."""
+        if frame is not self._frame:
+            if frame.layout.digest != self._layout.digest:
+                self._turn_to(frame.layout)
+            self._frame = frame
+            self._sight = self._geometry.sight(frame.layout, frame.numbers)
+        return self._sight
+
+    def _turn_to(self, layout: Layout) -> None:
+        scene = build_scene(self._deployment, layout)
+        still = self._geometry.still
+        self._geometry = Geometry(scene, still if tuple(still.shapes) == tuple(scene.scenery) else None)
+        self._layout = layout

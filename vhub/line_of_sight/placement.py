@@ -1,0 +1,165 @@
+"""Where endpoints are and what stands between them, as of the newest committed frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from foosim.deployment.network.rules import Network
+from foosim.deployment.schema import Deployment
+from foosim.vhub.line_of_sight.occlusion import Crossing, LineOfSight, Sight, Trace
+from foosim.world.frame import Frame
+from foosim.world.kinematics import forward_kinematics, velocity
+from foosim.world.layout import Entity, Layout
+from foosim.world.robots.rover import RoverRobot
+from foosim.world.scene import ORIGIN, UPRIGHT, Body, Quaternion, Vector, rotate
+from foosim.world.scenes.build import build_scene
+
+
+class _Robot:
+    """A robot, or an endpoint that is on none, in the frames of one layout."""
+
+    __slots__ = ("antenna", "body", "entity", "orientation", "position", "turns")
+
+    def __init__(self, name: str, body: Body | None, layout: Layout | None) -> None:
+        self.body = body
+        self.entity: Entity | None = layout[name] if layout is not None and name in layout else None
+        self.antenna: Vector = ORIGIN if body is None else body.antenna
+        self.turns = -1
+        """The number of the frame of the pose."""
+        self.position: Vector = ORIGIN
+        self.orientation: Quaternion = UPRIGHT
+        """The pose of the last link of its body."""
+
+
+class World:
+    """Antennas and lines of sight. Nothing is computed before somebody asks."""
+
+    def __init__(self, deployment: Deployment, network: Network) -> None:
+        self._deployment, self._places = deployment, network.places
+        self._carriers = deployment.carriers()
+        self._sights: LineOfSight | None = None
+        self._sight: Sight | None = None
+        self._frame: Frame | None = None
+        self._numbers: list[float] | None = None
+        self._bodies: Mapping[str, Body] | None = None
+        self._robots: dict[str, _Robot] = {}
+        """By endpoint, in the frames of a layout."""
+        self._standing: dict[str, Vector] = {}
+        self._down: frozenset[str] = frozenset()
+        self._switched: Layout | None = None
+        self._named: list[str] = []
+        self._switches = np.zeros(0, np.intp)
+        """Of each robot of that layout: the slot that says whether it is out of service."""
+        self._states = b""
+        """What these slots hold in the newest frame."""
+        self.turns = 0
+        """Grows with every frame."""
+
+    def turn_to(self, frame: Frame) -> bool:
+        """Take the newest committed frame; return whether others are out of service in it."""
+        if frame is self._frame:
+            return False
+        if self._frame is None or frame.layout is not self._frame.layout:
+            self._bodies = None
+            self._robots.clear()
+        self._frame, self._sight, self._numbers = frame, None, None
+        self.turns += 1
+        return self._look_who_is_down(frame)
+
+    def _look_who_is_down(self, frame: Frame) -> bool:
+        """Take who is out of service; return whether that are others than before."""
+        if frame.layout is not self._switched:
+            self._switched = frame.layout
+            self._named = [robot.name for robot in frame.layout.robots]
+            self._switches = np.array([robot.offsets["down"] for robot in frame.layout.robots], np.intp)
+            self._states = b""
+        found = frame.values[self._switches]
+        states = found.tobytes()
+        if states == self._states:
+            return False
+        self._states = states
+        robots = {name for name, is_down in zip(self._named, found.tolist(), strict=True) if is_down}
+        down = frozenset((*robots, *(name for name, robot in self._carriers.items() if robot in robots)))
+        changed, self._down = down != self._down, down
+        return changed
+
+    def body(self, endpoint: str) -> str:
+        """Return the robot that an endpoint is or is on board of; its own name where it is on none."""
+        return self._carriers.get(endpoint, endpoint)
+
+    def is_down(self, endpoint: str) -> bool:
+        """Whether the robot that an endpoint is, or is on board of, is out of service."""
+        return endpoint in self._down
+
+    def antenna(self, endpoint: str, mount: Vector) -> Vector:
+        """Return the place (m, world frame) of an antenna: `mount` beside its body's own one, in the body's frame."""
+        robot, (mx, my, mz) = self._robot(endpoint), mount
+        if robot.body is None:
+            px, py, pz = self._place(endpoint)
+            return px + mx, py + my, pz + mz
+        if robot.turns != self.turns:
+            assert robot.entity is not None
+            _, robot.position, robot.orientation = forward_kinematics(robot.body, robot.entity, self._values())[-1]
+            robot.turns = self.turns
+        (px, py, pz), (ox, oy, oz) = robot.position, robot.antenna
+        x, y, z = rotate(robot.orientation, (ox + mx, oy + my, oz + mz))
+        return px + x, py + y, pz + z
+
+    def velocity(self, endpoint: str) -> Vector:
+        """Return how fast the body moves that an endpoint is, or is on board of (m/s, world frame); 0 without one."""
+        robot = self._robot(endpoint)
+        if robot.body is None:
+            return ORIGIN
+        assert robot.entity is not None
+        return velocity(robot.body, robot.entity, self._values())
+
+    def vehicle_height_m(self, name: str) -> float | None:
+        """Return how high the hull of a rover is; None for what is no vehicle."""
+        deployment = self._deployment
+        is_rover = deployment.is_hall and isinstance(deployment.robots.get(name), RoverRobot)
+        return deployment.hall.rover.height if is_rover else None
+
+    def _robot(self, endpoint: str) -> _Robot:
+        """Return the robot that an endpoint is or is on board of, as the newest frame's layout has it."""
+        found = self._robots.get(endpoint)
+        if found is None:
+            layout = None if self._frame is None else self._frame.layout
+            if self._bodies is None:
+                self._bodies = {} if layout is None else build_scene(self._deployment, layout).bodies
+            name = self.body(endpoint)
+            found = self._robots[endpoint] = _Robot(name, self._bodies.get(name), layout)
+        return found
+
+    def _values(self) -> list[float]:
+        """Return the numbers of the newest frame; there is one."""
+        if self._numbers is None:
+            assert self._frame is not None
+            self._numbers = self._frame.numbers
+        return self._numbers
+
+    def _place(self, endpoint: str) -> Vector:
+        """Return where the deployment says that an endpoint without a body is."""
+        found = self._standing.get(endpoint)
+        if found is None:
+            places = (place for glob, place in self._places.items() if fnmatchcase(endpoint, glob))
+            x, y, z = next(places, ORIGIN)
+            found = self._standing[endpoint] = x, y, z
+        return found
+
+    def crossings(
+        self, a: Vector, b: Vector, ignoring: frozenset[str], trace: Trace | None = None
+    ) -> tuple[Crossing, ...]:
+        """Return what the line between two places crosses, some bodies aside.
+
+        `trace` is what who asks in many frames remembers of the line.
+        """
+        if self._frame is None:
+            return ()
+        if self._sight is None:
+            if self._sights is None:
+                self._sights = LineOfSight(self._deployment)
+            self._sight = self._sights.at(self._frame)
+        return self._sight.look((a, b) if a <= b else (b, a), ignoring, Trace() if trace is None else trace)

@@ -1,0 +1,1 @@
+"""All links of a run, and their summary."""

@@ -1,0 +1,404 @@
+"""All links of a run, and what they share: radios, airs, the world, the time line of events.
+
+A link is a directed pair of endpoints with its pipeline of stages, what they remember, and its account. It exists from
+the first packet on it; channels for which the deployment has another rule are links of their own. Its stages are made
+anew where an event changes its settings; what they remember stays. Everything that is remembered is a plain value
+(`memory`), so that a state can be written down and taken up again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from foosim.common.keyed_random import Slot, draw_key, draw_words
+from foosim.deployment.network.impairments import Impairments, TableJitter
+from foosim.deployment.network.radios import Radio
+from foosim.deployment.network.rules import Network, event_of
+from foosim.deployment.network.traces import read_opportunities, read_table
+from foosim.deployment.schema import Deployment
+from foosim.vhub.line_of_sight.placement import World
+from foosim.vhub.network.air import Air
+from foosim.vhub.network.custom_models import LinkModel, make_model
+from foosim.vhub.network.good_bad_periods import Times
+from foosim.vhub.network.jitter import quantiles_ns
+from foosim.vhub.network.link_budget import Budget
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.link_settings import NO_RADIO, Profile, Profiles, over
+from foosim.vhub.network.memory import AirState, LinkState, RadioState
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.timeline import FOREVER_NS, Timeline
+from foosim.vhub.radio.propagation import Propagation
+from foosim.vhub.stages import STAGES
+from foosim.vhub.stages.capacity import leave
+from foosim.vhub.stages.custom_model import Own
+from foosim.vhub.stages.delay import Delay
+from foosim.vhub.stages.queue import Queue
+from foosim.vhub.stages.stage import Stage, at_arrival, at_sending
+from foosim.world.frame import Frame
+
+LinkKey = tuple[str, str, str]
+"""Source, destination, and the name of what decides the link's settings."""
+RadioKey = tuple[str, str]
+"""An endpoint and the name of a radio of its; or a link's own queue: its ends joined, and its rule."""
+
+_OWN_QUEUE: Final = ">"
+
+
+Settled = tuple[int, int, int, list[Stage], list[Stage], list[Stage], int, int, bool]
+"""By version of the time line, from when, until when: stages, at sending, at arrival, draws, phase, being apart."""
+
+
+class Link:
+    """One directed pair with its stages."""
+
+    def __init__(self, source: str, destination: str, profile: Profile, fabric: Fabric, state: LinkState) -> None:
+        self.source, self.destination = source, destination
+        self.profile = profile
+        self.state = state
+        self._fabric, self._timeline = fabric, fabric.timeline
+        via = (profile.radio,) if profile.radio else ()
+        self._key = draw_key(fabric.seed, "link", source, destination, *via)
+        self._version = -1
+        self._since_ns = self._until_ns = -1
+        self._stages: list[Stage] = []
+        self._at_sending: list[Stage] = []
+        self._at_arrival: list[Stage] = []
+        self._is_apart = False
+        self._slots = self._phase_ns = 0
+        self._times = Times()
+        self._other: Settled | None = None
+        """What holds in another time: packets arrive by the settings of when they were sent."""
+
+    @property
+    def rule(self) -> str:
+        return self.profile.rule
+
+    def settings_at(self, time_ns: int) -> tuple[Radio, int, int]:
+        """Return the link's settings at a time, and from when and until when they hold."""
+        settings, since_ns, until_ns = self.profile.settings, -1, FOREVER_NS
+        for change in self._timeline.changes_of(self.rule, self.source, self.destination):
+            if change.start_ns <= time_ns < change.end_ns:
+                settings = over(settings, change.changes)
+            for edge_ns in (change.start_ns, change.end_ns):
+                if edge_ns <= time_ns:
+                    since_ns = max(since_ns, edge_ns)
+                else:
+                    until_ns = min(until_ns, edge_ns)
+        return settings, since_ns, until_ns
+
+    def setup_at(self, time_ns: int) -> LinkSetup:
+        """Return what the link's stages are made from at a time."""
+        return self._setup(self.settings_at(time_ns)[0])
+
+    def _setup(self, settings: Radio) -> LinkSetup:
+        source, destination, profile = self.source, self.destination, self.profile
+        return self._fabric.setup(source, destination, profile, settings, self._key, self.state, self._times)
+
+    def _settle(self, time_ns: int) -> None:
+        """Have the stages of a time: made anew where settings have changed, or what is known of them."""
+        version, other = self._timeline.version, self._other
+        if self._version == version and self._since_ns <= time_ns < self._until_ns:
+            return
+        self._other = self._settled()
+        if other is not None and other[0] == version and other[1] <= time_ns < other[2]:
+            self._version, self._since_ns, self._until_ns, self._stages, self._at_sending, self._at_arrival = other[:6]
+            self._slots, self._phase_ns, self._is_apart = other[6:]
+            return
+        settings, self._since_ns, self._until_ns = self.settings_at(time_ns)
+        self._version = version
+        setup = self._setup(settings)
+        self._stages = [stage for make in STAGES if (stage := make(setup)) is not None]
+        self._at_sending, self._at_arrival = at_sending(self._stages), at_arrival(self._stages)
+        self._slots = slots_of(settings, is_radio=setup.is_radio)
+        self._phase_ns = self._fabric.phase_ns(self.source) if setup.is_radio else 0
+        self._is_apart = not (setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self._stages))
+
+    def _settled(self) -> Settled:
+        times = self._version, self._since_ns, self._until_ns
+        stages = self._stages, self._at_sending, self._at_arrival
+        return *times, *stages, self._slots, self._phase_ns, self._is_apart
+
+    def is_apart(self, time_ns: int) -> bool:
+        """Whether what is sent at a time shares no radio, queue or air with other links, and no model of one's own."""
+        self._settle(time_ns)
+        return self._is_apart
+
+    def restore(self, flight: Flight) -> None:
+        """Take up a packet on its way of a state that was written down: its turn may not have begun."""
+        self._settle(flight.sent_ns)
+        for stage in self._stages:
+            if isinstance(stage, Delay):
+                stage.plan(flight)
+
+    def retime(self, flights: Iterable[Flight], now_ns: int) -> None:
+        """Clogs have changed: give packets on their way, in the order of sending, new due times."""
+        judged = [(flight, self._is_late(flight)) for flight in flights]
+        self._settle(now_ns)
+        for stage in self._stages:
+            if isinstance(stage, Delay):
+                stage.retime(judged, now_ns)
+
+    def _is_late(self, flight: Flight) -> bool:
+        """Whether those behind a packet overtake it, by the settings of when it was sent."""
+        self._settle(flight.sent_ns)
+        return any(isinstance(stage, Delay) and stage.is_late(flight) for stage in self._stages)
+
+    def send(self, flight: Flight) -> bool:
+        """Judge a packet at sending: True when it is on its way with its due time, False when it is dropped."""
+        sent_ns, is_offered = flight.sent_ns, flight.copy == 0
+        if not self._since_ns <= sent_ns < self._until_ns or self._version != self._timeline.version:
+            self._settle(sent_ns)
+        if is_offered:
+            self.state.offered += 1
+        flight.rule, flight.radio = self.profile.rule, self.profile.radio
+        flight.due_ns = sent_ns
+        flight.phase_ns = self._phase_ns
+        if self._slots:
+            flight.slots = self._slots
+            flight.words = draw_words(self._key, flight.sequence, flight.copy)
+        for stage in self._at_sending:
+            cause = stage.at_sending(flight)
+            if cause:
+                self._drop(flight, cause)
+                return False
+        return True
+
+    def _drop(self, flight: Flight, cause: str) -> None:
+        flight.cause = cause
+        if flight.copy == 0:
+            self.state.dropped += 1
+            self.state.causes[cause] = self.state.causes.get(cause, 0) + 1
+
+    def turn_away(self, flight: Flight, cause: str) -> None:
+        """Drop a packet that would be on its way: there is no room for it."""
+        self._drop(flight, cause)
+        if self.state.under_way:
+            leave(self.state, flight)
+
+    def arrive(self, flight: Flight, hindered: str) -> bool:
+        """Judge a packet at arrival, by the settings of when it was sent: whatever was sent on the link meanwhile.
+
+        True when it is delivered, False when it is dropped. `hindered` is why its receiver does not take it; empty when
+        it does.
+        """
+        if not self._since_ns <= flight.sent_ns < self._until_ns or self._version != self._timeline.version:
+            self._settle(flight.sent_ns)
+        state, is_offered = self.state, flight.copy == 0
+        for stage in self._at_arrival:
+            cause = stage.at_arrival(flight, hindered)
+            if cause:
+                self._drop(flight, cause)
+                break
+        else:
+            state.delivered += is_offered
+            state.delay_ns += (flight.due_ns - flight.sent_ns) * is_offered
+        if state.under_way:
+            leave(state, flight)
+        return not flight.cause
+
+
+def slots_of(settings: Radio, *, is_radio: bool) -> int:
+    """Return which draws settings use: bit n for slot n."""
+    bursts = settings.burst, settings.gilbert_elliott, settings.markov4, settings.outages
+    used = {
+        Slot.LOSS: settings.loss > 0.0 or any(model is not None for model in bursts),
+        Slot.ERROR: is_radio,
+        Slot.JITTER: settings.jitter is not None,
+        Slot.DUPLICATE: settings.duplicate > 0.0,
+        Slot.CORRUPT: settings.corrupt is not None,
+        Slot.REORDER: settings.reorder is not None,
+    }
+    return sum(1 << slot for slot, is_used in used.items() if is_used)
+
+
+class Fabric:
+    """The network of a run."""
+
+    def __init__(self, deployment: Deployment, network: Network | None = None) -> None:
+        """`network` stands in for the deployment's."""
+        self.deployment = deployment
+        self.network = deployment.network if network is None else network
+        self.seed = deployment.seed if self.network.seed is None else self.network.seed
+        self.timeline = Timeline(self.network, self.seed, deployment.endpoints())
+        self.world = World(deployment, self.network)
+        self.profiles = Profiles(deployment, self.network)
+        self.states: dict[LinkKey, LinkState] = {}
+        """What the links remember that packets were sent on."""
+        self.radios: dict[RadioKey, RadioState] = {}
+        self.airs: dict[str, Air] = {}
+        self.asked: list[tuple[int, str]] = []
+        """Events that were asked for while the run went on: the tick, and the event as JSON."""
+        self.faults: list[str] = []
+        """Why a link model of one's own has failed; nothing after it is what was asked for."""
+        self._models: dict[str, LinkModel] = {}
+        self._links: dict[tuple[str, str, str], Link] = {}
+        """By source, destination and what of the channel decides."""
+        self._by_rule: dict[LinkKey, Link] = {}
+        """The same ones by the rule that matches: channels of one rule are one link."""
+        self._phases: dict[str, int] = {}
+        self._propagations: dict[str, Propagation] = {}
+        for rule in (*self.network.links, *self.network.radios.values()):
+            if rule.jitter is not None:  # the tables are made before the run starts: they would hold up a tick
+                quantiles_ns(rule.jitter, self._table(rule))
+
+    def turn_to(self, frame: Frame) -> None:
+        """Take the newest committed frame. Links are made anew where bodies go out of service in it, or come back."""
+        if self.world.turn_to(frame):
+            self.timeline.version += 1
+
+    def take(self, tick: int, at_ns: int, text: str) -> None:
+        """Take an event that was asked for, as JSON; it happens at a tick."""
+        self.asked.append((tick, text))
+        self.timeline.add(event_of(text, at_ns))
+
+    def phase_ns(self, source: str) -> int:
+        """Return by how much later than its tick the packets of an endpoint come to its radio."""
+        most_ns = self.network.defaults.phase_ns
+        if not most_ns:
+            return 0
+        found = self._phases.get(source)
+        if found is None:
+            word = draw_words(draw_key(self.seed, "phase", self.world.body(source)), 0)[0]
+            found = self._phases[source] = word * most_ns >> 64
+        return found
+
+    def link(self, source: str, destination: str, channel: str) -> Link:
+        """Return the link of a packet."""
+        kind = self.profiles.kind(channel)
+        link = self._links.get((source, destination, kind))
+        if link is None:
+            rule = self.network.rule_for(source, destination, channel)
+            key = source, destination, "" if rule is None else rule.id
+            link = self._by_rule.get(key)
+            if link is None:
+                profile = self.profiles.of_rule(rule, source, destination)
+                state = self.states.setdefault((source, destination, name_of(profile)), LinkState())
+                link = self._by_rule[key] = Link(source, destination, profile, self, state)
+            self._links[source, destination, kind] = link
+        return link
+
+    def restore(
+        self,
+        links: Sequence[tuple[str, str, str, LinkState]],
+        radios: Sequence[tuple[str, str, RadioState]],
+        airs: Sequence[tuple[str, AirState]],
+        asked: Sequence[tuple[int, str]],
+    ) -> None:
+        """Take up what was written down of a network in which nothing has been sent yet."""
+        self.states = {(source, destination, name): state for source, destination, name, state in links}
+        self.radios = {(endpoint, radio): state for endpoint, radio, state in radios}
+        self.airs = {name: Air(state, self.radios) for name, state in airs}
+        for tick, text in asked:
+            self.take(tick, tick * self.deployment.tick_ns, text)
+
+    def restore_flight(self, flight: Flight) -> None:
+        """Take up a packet in flight of such a state: it may be on air."""
+        profile = self.profiles.find(flight.source, flight.destination, flight.channel)
+        settings, name = profile.settings, profile.radio or self.network.defaults.preset
+        if settings.is_on_air:
+            self._air(name, settings).restore(flight, self._propagation(name, settings))
+            self.link(flight.source, flight.destination, flight.channel).restore(flight)
+
+    def setup(
+        self,
+        source: str,
+        destination: str,
+        profile: Profile,
+        settings: Radio,
+        key: bytes,
+        memory: LinkState,
+        times: Times,
+    ) -> LinkSetup:
+        """Return what the stages of a link are made from, for some time."""
+        timeline = self.timeline
+        radio = _sender(source, destination, profile)
+        sender = self.radios.get(radio)
+        if sender is None:
+            sender = self.radios[radio] = RadioState()
+        air, budget, own = None, None, None
+        if settings.is_on_air:
+            name = profile.radio or self.network.defaults.preset
+            own = self.profiles.base(profile.radio)
+            propagation = self._propagation(name, settings)
+            air = self._air(name, settings)
+            budget = Budget(propagation, source, destination, self.seed, settings.air or name)
+        return LinkSetup(
+            source,
+            destination,
+            settings,
+            profile.radio,
+            key,
+            draw_key(self.seed, "sending", *radio),
+            memory,
+            times,
+            sender,
+            self.world,
+            profile.rule != NO_RADIO,
+            air,
+            budget,
+            tuple(timeline.cuts_of(source, destination)),
+            tuple(timeline.holds_of(source, destination)),
+            self.network.defaults.in_flight_on_partition == "drop",
+            self._table(settings),
+            self._opportunities(settings),
+            self._model(settings),
+            self.faults,
+            own,
+        )
+
+    def queue_ns(self, key: LinkKey, now_ns: int) -> int:
+        """Return how long what is sent on a link now waits before its turn comes."""
+        source, destination, name = key
+        rule, _, radio = name.partition("/")
+        senders = (source + _OWN_QUEUE + destination, rule), (source, radio or rule), (source, "")
+        found = next((self.radios[sender] for sender in senders if sender in self.radios), None)
+        return 0 if found is None else max(0, found.free_ns - now_ns)
+
+    def _propagation(self, name: str, settings: Radio) -> Propagation:
+        found = self._propagations.get(name)
+        if found is None:
+            key = draw_key(self.seed, "shadowing", settings.air or name)
+            found = self._propagations[name] = Propagation(settings, self.world, key)
+        return found
+
+    def _air(self, name: str, settings: Radio) -> Air:
+        name = settings.air or name
+        found = self.airs.get(name)
+        if found is None:
+            found = self.airs[name] = Air(AirState(), self.radios)
+        return found
+
+    def _model(self, settings: Radio) -> LinkModel | None:
+        """Return the link model that settings name, one for equal parameters; raises ModelError."""
+        if settings.model is None:
+            return None
+        key = settings.model.model_dump_json()
+        if key not in self._models:
+            self._models[key] = make_model(settings.model)
+        return self._models[key]
+
+    def _table(self, settings: Impairments) -> tuple[int, ...]:
+        jitter = settings.jitter
+        return read_table(self._text(jitter.file)) if isinstance(jitter, TableJitter) else ()
+
+    def _opportunities(self, settings: Radio) -> tuple[int, ...]:
+        return () if settings.trace is None else read_opportunities(self._text(settings.trace.file))
+
+    def _text(self, path: str) -> str:
+        return self.deployment.asset_files[path].decode("ascii", "replace")
+
+
+def _sender(source: str, destination: str, profile: Profile) -> RadioKey:
+    """Return whose queue a link's packets wait in."""
+    return (source + _OWN_QUEUE + destination, profile.rule) if profile.is_own_queue else (source, profile.radio)
+
+
+def name_of(profile: Profile) -> str:
+    """Return a profile's name: its rule, and the radio where the rule does not say it."""
+    return link_name(profile.rule, profile.radio)
+
+
+def link_name(rule: str, radio: str) -> str:
+    """Return the name of a rule over a radio, which is empty where there is none."""
+    return rule if not radio or radio == rule else f"{rule}/{radio}"

@@ -1,0 +1,463 @@
+"""What a network means, in the figures that people think in: mean loss, bursts, delay, airtime, throughput, range.
+
+Nothing here decides a fate: the same formulas as in the stages, asked for their means. Ranges are without shadowing and
+fading, of ends 1.5 m above the ground where no place is written, and antennas mounted as they are.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, inf
+from typing import Final
+
+from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairments, Markov4, TableJitter
+from foosim.deployment.network.radios import Radio
+from foosim.deployment.network.rules import Network
+from foosim.deployment.network.traces import read_opportunities, read_table
+from foosim.deployment.radio_checks import unheeded
+from foosim.deployment.schema import Deployment
+from foosim.vhub.links.offered_load import flows_of, offered_hz, used_links
+from foosim.vhub.links.phase import phase_warnings
+from foosim.vhub.network.jitter import interpolate_ns, moments_ns, quantiles_ns
+from foosim.vhub.network.link_settings import NO_RADIO, Profiles, over, preset_radio
+from foosim.vhub.radio import errors
+from foosim.vhub.radio.airtime import (
+    LRWPAN_OVERHEAD_BYTES,
+    WIFI_OVERHEAD_BYTES,
+    lora_airtime_ns,
+    lrwpan_airtime_ns,
+    serialisation_ns,
+    wifi_ack_ns,
+    wifi_airtime_ns,
+)
+from foosim.vhub.radio.contention import saturation_rate_hz, sensing
+from foosim.vhub.radio.noise import noise_dbm as radio_noise_dbm
+from foosim.vhub.radio.path_loss import range_m
+from foosim.vhub.radio.propagation import environment_of
+from foosim.vhub.radio.timings import LORA_DUTY_CYCLES, LRWPAN
+from foosim.vhub.stages.duty import packets_an_hour
+from foosim.vhub.stages.medium import BASE_STATION_DBM, OPPORTUNITY_BYTES, mode_of, wifi_modes, wifi_timing
+from foosim.vhub.stages.residual import chain_of_burst
+
+SMALL_BYTES: Final = 100
+LARGE_BYTES: Final = 1500
+MANY: Final = 10
+"""Stations of a channel that is full."""
+HEIGHT_M: Final = 1.5
+SPACING_NS: Final = 10_000_000
+"""Between packets of which it is asked whether they overtake each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """Settings that links have: those of a rule over a radio, of a radio alone, or of neither."""
+
+    rule: str
+    radio: str
+    settings: Radio
+    links: int | None = None
+    """Directed pairs that have them; None where endpoints are not known."""
+    used: int | None = None
+    """Those that carry packets, by what is declared."""
+    example: tuple[str, str] | None = None
+    heights_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)
+    """Of the ends of the example above the ground, without the mount of the antennas."""
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """How packets of one size go: airtime of one attempt, bit/s that one station and MANY together get across."""
+
+    size: int
+    airtime_ns: int
+    goodput_bps: int
+    shared_bps: int | None
+    """None where senders do not share the medium."""
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What settings mean. Times are in ns, lengths in m; None is where there is no such thing, inf without an end."""
+
+    rule: str
+    radio: str
+    links: int | None
+    used: int | None
+    example: tuple[str, str] | None
+    medium: str
+    loss: float
+    """Of what geometry and others on air do not explain: 0 to 1."""
+    burst_packets: float | None
+    """Mean number of losses in a row."""
+    burst_ns: int | None
+    """Mean length of a bad time."""
+    delay_mean_ns: int
+    """Beside queue, medium and way: the constant delay, jitter, what bad times and reordering add."""
+    delay_sd_ns: int
+    delay_p99_ns: int
+    reordered: float | None
+    """The share of packets that the next one overtakes, when one comes every SPACING_NS; None where none does."""
+    rate_bps: int | None
+    carried: tuple[Carried, ...]
+    range_los_m: float | None
+    """At which 90 % of single frames of SMALL_BYTES arrive, at the lowest rate, in line of sight."""
+    range_nlos_m: float | None
+    duty_packets_h: int | None
+    """Packets of SMALL_BYTES in an hour that the duty cycle allows, hour after hour."""
+    queue_ns: int | None
+    """How long the last packet of a full queue waits."""
+    model: str | None
+    """The link model of one's own that decides beside all this; the figures are without it."""
+    warnings: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        name = self.rule if self.radio in ("", self.rule) else f"{self.rule} via {self.radio}"
+        return name if self.model is None else f"{name} with link model {self.model}"
+
+
+# --- which settings there are ----------------------------------------------------------------------------------------
+
+
+def uses_of(deployment: Deployment) -> list[Use]:
+    """Return the settings of all links of a deployment, in the order of rules, and radios that no link uses; the
+    example of each is a link that carries packets, if there is one."""
+    network, profiles = deployment.network, Profiles(deployment, deployment.network)
+    used = used_links(flows_of(deployment, profiles))
+    found: dict[tuple[str, str], Use] = {}
+    endpoints = deployment.endpoints()
+    pairs = ((source, destination) for source in endpoints for destination in endpoints if source != destination)
+    for source, destination, rule in ((*pair, rule) for pair in pairs for rule in network.rules_for(*pair)):
+        profile = profiles.of_rule(rule, source, destination)
+        key = profile.rule, profile.radio
+        known, carrying = found.get(key), used.get(key, set())
+        links = 1 if known is None or known.links is None else known.links + 1
+        pair = source, destination
+        if known is not None and (known.example in carrying or pair not in carrying):
+            found[key] = replace(known, links=links)
+            continue
+        one, other = (HEIGHT_M if place is None else place[2] for place in map(network.place_of, pair))
+        count = len(carrying)
+        found[key] = Use(profile.rule, profile.radio, profile.settings, links, count, pair, (one, other))
+    order = {rule.id: number for number, rule in enumerate(network.links)}
+    uses = sorted(found.values(), key=lambda use: (order.get(use.rule, len(order)), use.rule, use.radio))
+    idle = [name for name in network.radios if all(use.radio != name for use in uses)]
+    return [*uses, *(Use(name, name, network.radios[name], 0, 0) for name in idle)]
+
+
+def uses_alone(network: Network) -> list[Use]:
+    """Return the settings that a network's section has, without endpoints: each radio, each rule over its radio, or
+    over each that there is."""
+    uses = [Use(name, name, radio) for name, radio in network.radios.items()]
+    for rule in network.links:
+        via = [rule.via] if rule.via is not None else [*network.radios] or [""]
+        for name in via:
+            base = network.radios[name] if name else preset_radio(network.defaults.preset)
+            uses.append(Use(rule.id, name, over(base, rule)))
+    return uses or [Use(network.defaults.preset, "", preset_radio(network.defaults.preset))]
+
+
+# --- what they mean --------------------------------------------------------------------------------------------------
+
+
+def meanings(deployment: Deployment) -> list[Meaning]:
+    """Return what the network of a deployment means; the deployment has its files."""
+    uses = uses_of(deployment)
+    offered = offered_hz(flows_of(deployment, Profiles(deployment, deployment.network)))
+    files = deployment.asset_files
+    phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])
+    found = []
+    for use in uses:
+        meaning = meaning_of(use, files)
+        warnings = [*meaning.warnings, *phased.get((use.rule, use.radio), ())]
+        if use.links == 0:
+            warnings.append("no link uses it")
+        capacity_hz = _capacity_hz(meaning)
+        load_hz = offered.get((use.rule, use.radio), 0.0)
+        if capacity_hz is not None and load_hz > capacity_hz:
+            which = "all together offer" if use.settings.is_on_air else "one sender offers"
+            warnings.append(
+                f"{which} {load_hz:.0f} packets/s by what is declared; of {SMALL_BYTES} B it carries "
+                f"{capacity_hz:.3g}/s"
+            )
+        found.append(replace(meaning, warnings=tuple(warnings)))
+    return found
+
+
+def meaning_of(use: Use, files: Mapping[str, bytes]) -> Meaning:
+    """Return what settings mean; `files` are those that they name, by path."""
+    settings = use.settings
+    loss, burst_packets, burst_ns = residual_of(settings)
+    mean_ns, sd_ns, p99_ns = delay_of(settings, files)
+    carried = carried_of(settings, files)
+    los_m, nlos_m = ranges_of(settings, use.heights_m)
+    duty = settings.duty_cycle
+    is_limited = settings.is_on_air and duty < 1.0 and carried
+    meaning = Meaning(
+        use.rule,
+        use.radio,
+        use.links,
+        use.used,
+        use.example,
+        settings.medium,
+        loss,
+        burst_packets,
+        burst_ns,
+        mean_ns,
+        sd_ns,
+        p99_ns,
+        reordered_of(settings, files),
+        rate_of(settings, files),
+        carried,
+        los_m,
+        nlos_m,
+        packets_an_hour(duty, settings.duty_window_ns, carried[0].airtime_ns) if is_limited else None,
+        _queue_ns(settings, carried),
+        None if settings.model is None else settings.model.name,
+        (),
+    )
+    return replace(meaning, warnings=tuple(_warnings(use, meaning)))
+
+
+def residual_of(settings: Impairments) -> tuple[float, float | None, int | None]:
+    """Return the mean loss of a link's residual stage; of bursts the mean number of losses in a row, and the mean
+    length of a bad time in ns; None where there is no such thing."""
+    burst, outages, chain = settings.burst, settings.outages, settings.gilbert_elliott
+    if burst is not None and burst.mean_burst is not None:
+        chain = chain_of_burst(burst)
+    lost, run, bad_ns = settings.loss, None, None
+    if chain is not None or settings.markov4 is not None:
+        steps, losses = _chain(chain) if chain is not None else _four_states(settings.markov4)
+        lost, run = _runs(steps, [state + (1.0 - state) * lost for state in losses])
+    elif burst is not None:
+        lost, bad_ns = lost + (1.0 - lost) * burst.loss, burst.mean_bad_ns
+    if outages is not None:
+        on_ns, off_ns = outages.mean_on_ns, outages.mean_off_ns
+        lost, bad_ns = lost + (1.0 - lost) * off_ns / (on_ns + off_ns), max(bad_ns or 0, off_ns)
+    return lost, run, bad_ns
+
+
+Matrix = list[list[float]]
+
+
+def _chain(chain: GilbertElliott) -> tuple[Matrix, list[float]]:
+    return [[1.0 - chain.p, chain.p], [chain.r, 1.0 - chain.r]], [1.0 - chain.k, 1.0 - chain.h]
+
+
+def _four_states(chain: Markov4 | None) -> tuple[Matrix, list[float]]:
+    """Return the steps between good, a delivery within a burst, a burst, a single loss; and what each loses."""
+    assert chain is not None
+    steps = [
+        [1.0 - chain.p14 - chain.p13, 0.0, chain.p13, chain.p14],
+        [0.0, 1.0 - chain.p23, chain.p23, 0.0],
+        [chain.p31, chain.p32, 1.0 - chain.p31 - chain.p32, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+    ]
+    return steps, [0.0, 0.0, 1.0, 1.0]
+
+
+def _runs(steps: Matrix, lost: Sequence[float]) -> tuple[float, float | None]:
+    """Return the mean loss L of a chain from its first state on, and of its runs of losses: L / (L - P(two))."""
+    count = len(steps)
+    power = [[(step + (row == column)) / 2.0 for column, step in enumerate(line)] for row, line in enumerate(steps)]
+    for _ in range(64):  # the chain that stays with 1/2 has the same shares, and no period
+        squared = [
+            [sum(power[row][inner] * power[inner][column] for inner in range(count)) for column in range(count)]
+            for row in range(count)
+        ]
+        power = [[step / sum(line) for step in line] for line in squared]  # else rounding errors double, too
+    shares = power[0]
+    loss = sum(share * of for share, of in zip(shares, lost, strict=True))
+    two = sum(shares[a] * lost[a] * steps[a][b] * lost[b] for a in range(count) for b in range(count))
+    return loss, loss / (loss - two) if loss > two else None
+
+
+def delay_of(settings: Impairments, files: Mapping[str, bytes]) -> tuple[int, int, int]:
+    """Return mean, standard deviation and 99th percentile of a link's own delay, in ns, by the table of its jitter.
+
+    What bad times and reordering add to what passes is in the mean alone, and shifts the percentile by it.
+    """
+    base_ns = settings.delay_ns
+    if settings.burst is not None:
+        base_ns += round(settings.burst.bad_extra_delay_ns * _bad_share(settings.burst))
+    if settings.reorder is not None:
+        base_ns += round(settings.reorder.extra_ns * settings.reorder.probability)
+    jitter = settings.jitter
+    if jitter is None:
+        return base_ns, 0, base_ns
+    table = read_table(files[jitter.file].decode("ascii")) if isinstance(jitter, TableJitter) else ()
+    quantiles = quantiles_ns(jitter, table)
+    mean_ns, sd_ns = moments_ns(quantiles)
+    p99_ns = interpolate_ns(quantiles, int(0.99 * 2**64))
+    return base_ns + round(mean_ns), round(sd_ns), base_ns + p99_ns
+
+
+def reordered_of(settings: Impairments, files: Mapping[str, bytes]) -> float | None:
+    """Return the share of packets that the next one overtakes, one every SPACING_NS; None where order is kept.
+
+    That is P(J > d + J') for two draws of jitter a time d apart, where order is free; and the same with its `extra` for
+    the share that is reordered on purpose.
+    """
+    reorder, jitter = settings.reorder, settings.jitter
+    if reorder is None and (settings.order == "fifo" or jitter is None):
+        return None
+    drawn_ns = [0]
+    if jitter is not None:
+        table = read_table(files[jitter.file].decode("ascii")) if isinstance(jitter, TableJitter) else ()
+        quantiles = quantiles_ns(jitter, table)
+        drawn_ns = [interpolate_ns(quantiles, (2 * n + 1) << 54) for n in range(512)]
+
+    def overtaken(extra_ns: int) -> float:
+        later = sum(bisect_left(drawn_ns, one + extra_ns - SPACING_NS) for one in drawn_ns)
+        return later / len(drawn_ns) / len(drawn_ns)
+
+    share = 0.0 if settings.order == "fifo" else overtaken(0)
+    if reorder is not None:
+        share += reorder.probability * (overtaken(reorder.extra_ns) - share)
+    return share
+
+
+def _bad_share(burst: Burst) -> float:
+    """Return the share of what passes that passes in a bad time."""
+    passing = 1.0 - burst.loss
+    return burst.loss / burst.bad_loss * (1.0 - burst.bad_loss) / passing if passing else 0.0
+
+
+def rate_of(settings: Radio, files: Mapping[str, bytes]) -> int | None:
+    """Return the bit rate of a unicast near by; None where there is none."""
+    if settings.medium == "wifi":
+        return errors.MODES[_wifi_mode(settings)].rate_bps
+    if settings.medium == "ieee802154":
+        return errors.MODES["oqpsk_250"].rate_bps
+    if settings.medium == "lora":
+        factor = settings.spreading_factor
+        return factor * 4 * int(settings.bandwidth_hz) // ((4 + settings.coding_rate) << factor)
+    if settings.medium == "lte":
+        direction = "down" if settings.tx_power_dbm >= BASE_STATION_DBM else "up"
+        return errors.lte_rate_bps(errors.SNR_MAX, int(settings.bandwidth_hz), direction)
+    if settings.trace is not None and not settings.is_on_air:
+        times_ms = read_opportunities(files[settings.trace.file].decode("ascii"))
+        return len(times_ms) * OPPORTUNITY_BYTES * 8000 // times_ms[-1]
+    return settings.rate_bps
+
+
+def _wifi_mode(settings: Radio, *, lowest: bool = False) -> str:
+    modes = wifi_modes(settings)
+    if settings.rates == "fixed":
+        return mode_of(modes, settings.fixed_rate_bps)
+    return modes[0] if lowest else modes[-1]
+
+
+def carried_of(settings: Radio, files: Mapping[str, bytes]) -> tuple[Carried, ...]:
+    """Return how small and large packets go; nothing where no rate limits them."""
+    longest = LARGE_BYTES if settings.payload_max is None else min(LARGE_BYTES, settings.payload_max)
+    sizes = sorted({min(SMALL_BYTES, longest), longest})
+    rate_bps = rate_of(settings, files)
+    return () if not rate_bps else tuple(_carried(settings, size, rate_bps) for size in sizes if size)
+
+
+def _carried(settings: Radio, size: int, rate_bps: int) -> Carried:
+    bits = 8 * size
+    if settings.medium == "wifi":
+        mode, timing = _wifi_mode(settings), wifi_timing(settings)
+        airtime_ns, ack_ns = wifi_airtime_ns(mode, size, timing), wifi_ack_ns(mode, timing)
+        one, many = (saturation_rate_hz(n, airtime_ns, ack_ns, timing) for n in (1, MANY))
+        return Carried(size, airtime_ns, int(bits * one), int(bits * many))
+    if settings.medium == "ieee802154":
+        airtime_ns = lrwpan_airtime_ns(size)
+        timing_154 = replace(LRWPAN, retries=settings.retries)
+        one, many = (sensing(n, airtime_ns, True, timing_154).rate_hz for n in (1, MANY))
+        return Carried(size, airtime_ns, int(bits * one), int(bits * many))
+    if settings.medium == "lora":
+        airtime_ns = lora_airtime_ns(settings.spreading_factor, size, int(settings.bandwidth_hz), settings.coding_rate)
+        load = min(0.5, MANY * settings.duty_cycle)  # pure ALOHA: G e^-2G, at most at G = 1/2
+        one, many = (share * bits * 1e9 / airtime_ns for share in (settings.duty_cycle, load * exp(-2.0 * load)))
+        return Carried(size, airtime_ns, int(one), int(many))
+    airtime_ns = serialisation_ns(size + settings.overhead_bytes, rate_bps)
+    return Carried(size, airtime_ns, bits * 1_000_000_000 // airtime_ns, None)
+
+
+def ranges_of(settings: Radio, ends_m: tuple[float, float] = (HEIGHT_M, HEIGHT_M)) -> tuple[float | None, float | None]:
+    """Return the range with and without line of sight; None on wires, and where walls alone decide it.
+
+    `ends_m` are the heights of the two ends above the ground, beside which the antennas are mounted.
+    """
+    if not settings.is_on_air:
+        return None, None
+    gain_db, path_loss = settings.antenna.gain_dbi, settings.path_loss
+    power_dbm = settings.tx_power_dbm + 2.0 * gain_db
+    noise_dbm = radio_noise_dbm(settings.bandwidth_hz, settings.noise_figure_db)
+    loss_db = power_dbm - max(settings.sensitivity_dbm, _least_dbm(settings, noise_dbm))
+    environment = environment_of(settings)
+    hard_m = inf if path_loss.range_m is None else path_loss.range_m
+    heights = ends_m[0] + settings.antenna.mount[2], ends_m[1] + settings.antenna.mount[2]
+    los_m = min(hard_m, range_m(environment, loss_db, settings.frequency_hz, *heights))
+    if path_loss.strict_los:
+        return los_m, 0.0
+    if not environment.has_nlos_curve:
+        return los_m, None
+    return los_m, min(hard_m, range_m(environment, loss_db, settings.frequency_hz, *heights, nlos=True))
+
+
+def _least_dbm(settings: Radio, noise_dbm: float) -> float:
+    """Return the power that 90 % of single frames need."""
+    if settings.medium == "lora":
+        floors = errors.LORA_GATEWAY_SENSITIVITY_DBM if settings.gateway else errors.LORA_SENSITIVITY_DBM
+        return floors[settings.spreading_factor - 7]
+    if settings.medium == "lte":
+        return noise_dbm + errors.LTE_FLOOR_CENTI_DB / 100.0
+    if settings.medium == "wifi":
+        mode = _wifi_mode(settings, lowest=True)
+        return noise_dbm + errors.snr_needed(mode, SMALL_BYTES + WIFI_OVERHEAD_BYTES) / 100.0
+    if settings.medium == "ieee802154":
+        return noise_dbm + errors.snr_needed("oqpsk_250", SMALL_BYTES + LRWPAN_OVERHEAD_BYTES) / 100.0
+    return -inf
+
+
+def _queue_ns(settings: Radio, carried: Sequence[Carried]) -> int | None:
+    if not carried:
+        return None
+    last, queue = carried[-1], settings.queue
+    packets = min(queue.packets, queue.bytes_max // max(1, last.size + settings.overhead_bytes))
+    share = settings.duty_cycle if settings.medium == "lora" else 1.0
+    return min(queue.wait_ns, int(packets * 8e9 * last.size / max(1.0, last.goodput_bps / share)))
+
+
+def _warnings(use: Use, meaning: Meaning) -> Iterator[str]:
+    settings = use.settings
+    if meaning.loss > 0.5:
+        yield f"more than half of all packets is lost: {100.0 * meaning.loss:.1f} %"
+    if settings.ttl_ns is not None and meaning.delay_mean_ns > settings.ttl_ns:
+        yield f"the mean delay of {meaning.delay_mean_ns / 1e6:g} ms is above ttl, {settings.ttl_ns / 1e6:g} ms"
+    if not settings.allow:
+        yield "nothing passes: allow is off"
+    if meaning.range_los_m is not None and meaning.range_los_m < 1.0:
+        yield f"it does not reach 1 m ({meaning.range_los_m:.2f} m)"
+    for low_hz, high_hz, share in LORA_DUTY_CYCLES if settings.medium == "lora" else ():
+        at_hz = settings.frequency_hz
+        if low_hz <= at_hz <= high_hz and settings.duty_cycle > share:
+            yield f"duty_cycle is above the {100.0 * share:g} % that the EU allows at {at_hz / 1e6:g} MHz"
+    for key, value in (("rate", settings.rate_bps), ("trace", settings.trace), ("overhead", settings.overhead_bytes)):
+        what = unheeded(key, settings.medium) if value else None
+        if what is not None:
+            yield f"{key} {what}"
+    if meaning.carried and settings.queue.bytes_max < meaning.carried[-1].size:
+        yield f"a packet of {meaning.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
+    if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and _has_queue(settings):
+        yield "the queue has no effect: no rate, no medium"
+    if use.rule == NO_RADIO:
+        yield "these endpoints have no radio in common, or not that of their rule: nothing passes (no_route)"
+
+
+def _has_queue(settings: Radio) -> bool:
+    return "queue" in settings.model_fields_set
+
+
+def _capacity_hz(meaning: Meaning) -> float | None:
+    if not meaning.carried:
+        return None
+    small = meaning.carried[0]
+    bps = small.goodput_bps if small.shared_bps is None else max(small.goodput_bps, small.shared_bps)
+    return bps / 8.0 / small.size

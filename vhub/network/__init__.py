@@ -1,0 +1,1 @@
+"""What links remember and share: packets in flight, settings, events, air, jitter."""

@@ -1,0 +1,123 @@
+"""How old the newest packet of each channel is when its receiver acts: the *age at use*, counted by the vHub.
+
+A link's delay says how late a packet comes; what a controller sees is older by the time until its next turn, and by how
+long ago the newest packet was sent. Counted at each tick at which a client in lockstep is asked, and of a free-running
+one at each tick that admits packets of it; channels that it hears and of which something has come. Ages are whole
+ticks, since all is sent at the start of its tick. Part of the vHub's state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from foosim.vhub.network.memory import Age, Counts, HeardState
+
+_EXACT_BITS: Final = 6
+"""Ages below 2^6 ticks are counted each by itself, others to 1/32: so there is a limit to how many counts there are."""
+
+LEFT_MAX: Final = 1_000
+"""Of how many channels that a client has heard and hears no more the counts are kept."""
+
+
+def quantile(counts: Mapping[int, int], share: float) -> int:
+    """Return the least age, in ticks, that this share of all counts is not above."""
+    needed = share * sum(counts.values())
+    seen = 0
+    for age, count in sorted(counts.items()):
+        seen += count
+        if seen >= needed:
+            return age
+    return 0
+
+
+def add_counts(counts: Counts, more: Mapping[int, int]) -> None:
+    """Add counts to others."""
+    for age, count in more.items():
+        counts[age] = counts.get(age, 0) + count
+
+
+class Ages:
+    """The ages of all clients."""
+
+    def __init__(self, tick_ns: int) -> None:
+        self._tick_ns = tick_ns
+        self._every = max(1, 1_000_000_000 // tick_ns)
+        """Ticks from one row to the next: a second."""
+        self._heard: dict[str, dict[tuple[str, str], HeardState]] = {}
+        """By client, and by (endpoint, channel) in order; also what it heard before it came back."""
+
+    def joins(self, client: str, subscriptions: Iterable[tuple[str, str]]) -> None:
+        """A client takes part (again), with nothing that it knows."""
+        known = self._heard.get(client, {})
+        heard = {pair: known.get(pair, HeardState(*pair, -1, True, {}, {})) for pair in set(subscriptions)}
+        left = [(pair, state) for pair, state in known.items() if pair not in heard and (state.whole or state.recent)]
+        self._heard[client] = dict(sorted([*heard.items(), *left[:LEFT_MAX]]))
+        for pair, state in self._heard[client].items():
+            state.sent_ns, state.is_heard = -1, pair in heard
+
+    def reached(self, client: str, source: str, channel: str, sent_ns: int) -> None:
+        """A packet has reached a client."""
+        pairs = self._heard.get(client)
+        heard = None if pairs is None else pairs.get((source, channel))
+        if heard is not None and sent_ns > heard.sent_ns and heard.is_heard:
+            heard.sent_ns = sent_ns
+
+    def used(self, client: str, tick: int) -> None:
+        """A client acts at a tick, with what has reached it."""
+        pairs = self._heard.get(client)
+        if pairs is None:
+            return
+        for heard in pairs.values():
+            sent_ns = heard.sent_ns
+            if sent_ns >= 0:
+                age = tick - sent_ns // self._tick_ns
+                if age >> _EXACT_BITS:
+                    rest = age.bit_length() - _EXACT_BITS
+                    age = age >> rest << rest
+                recent = heard.recent
+                recent[age] = recent.get(age, 0) + 1
+
+    def take(self, tick: int) -> list[Age]:
+        """Return what was counted since the last row, when another one is due behind the closing of a tick."""
+        if (tick + 1) % self._every:
+            return []
+        taken = self.untold(tick)
+        for pairs in self._heard.values():
+            for heard in pairs.values():
+                add_counts(heard.whole, heard.recent)
+                heard.recent = {}
+        return taken
+
+    def untold(self, tick: int) -> list[Age]:
+        """Return what was counted since the last row up to the closing of a tick, by client, source and channel."""
+        return [
+            Age(tick, client, heard.source, heard.channel, dict(heard.recent))
+            for client, pairs in sorted(self._heard.items())
+            for heard in pairs.values()
+            if heard.recent
+        ]
+
+    def of(self, client: str, tick: int) -> list[Age]:
+        """Return the ages of what a client hears, in the whole run up to the closing of a tick, the last one."""
+        found = []
+        for heard in self._heard.get(client, {}).values():
+            counts = dict(heard.whole)
+            add_counts(counts, heard.recent)
+            if counts:
+                found.append(Age(tick, client, heard.source, heard.channel, counts))
+        return found
+
+    def state(self) -> list[tuple[str, list[HeardState]]]:
+        """Return all of it as it is written down."""
+        return [(client, list(map(_written, pairs.values()))) for client, pairs in sorted(self._heard.items())]
+
+    def restore(self, state: Iterable[tuple[str, list[HeardState]]]) -> None:
+        """Go on from what was written down."""
+        for client, heard in state:
+            self._heard[client] = {(one.source, one.channel): one for one in heard}
+
+
+def _written(heard: HeardState) -> HeardState:
+    whole, recent = dict(sorted(heard.whole.items())), dict(sorted(heard.recent.items()))
+    return HeardState(heard.source, heard.channel, heard.sent_ns, heard.is_heard, whole, recent)

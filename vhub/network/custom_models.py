@@ -1,0 +1,189 @@
+"""Link models of one's own: what a package brings that decides, beside the vHub's stages, what becomes of packets.
+
+A deployment names a model and its parameters; it never brings code. The code is an entry point of the group
+`foosim.link_models` in a package that is installed where the vHub runs: a class, or a function, that takes the
+parameters and returns an object with the method of `LinkModel`. A model is a function of what it is given: it owns no
+clock, file or generator, so that a run whose vHub was started again has the same fates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Final, Literal, NamedTuple, NoReturn, Protocol
+
+from foosim.common.errors import Refused
+from foosim.common.finding import Finding, Location
+from foosim.common.names import nearest_name
+from foosim.deployment.checks import quoted
+from foosim.deployment.loader import refuse_findings
+from foosim.deployment.network.impairments import OwnModel
+from foosim.deployment.network.rules import Network
+from foosim.world.scene import Vector
+
+GROUP: Final = "foosim.link_models"
+VERSION_KEY: Final = "link model "
+"""Before the name of a model in a capture's versions."""
+NOT_INSTALLED: Final = "not installed"
+
+
+class Wall(NamedTuple):
+    """A thing between the two ends: its name, how far the line is inside of it (m), what it takes at the radio's
+    frequency (dB)."""
+
+    name: str
+    chord_m: float
+    loss_db: float
+
+
+class End(NamedTuple):
+    """One end of a link in the newest committed frame: its antenna's place (m) and its body's velocity (m/s), both in
+    the world frame. What has no body stands still."""
+
+    name: str
+    position_m: Vector
+    velocity_m_s: Vector
+
+
+class Passage(NamedTuple):
+    """One packet on one link, as a model sees it."""
+
+    source: End
+    destination: End
+    channel: str
+    sequence: int
+    copy: int
+    """1 for a copy that the link makes."""
+    sent_ns: int
+    """In simulated time."""
+    size: int
+    """Of the payload, in bytes."""
+    distance_m: float
+    """Between the antennas."""
+    walls: tuple[Wall, ...]
+    """What stands between them; their own bodies do not."""
+    words: tuple[int, ...]
+    """Eight 64-bit draws that are the model's own: a function of seed, link, sequence number and copy.
+    `foosim.common.keyed_random` makes numbers of them."""
+
+
+class Judged(NamedTuple):
+    """What a model makes of a packet. `memory` is what it is given with the link's next one.
+
+    It is a plain value, `None`, true or false, a number, a text, or lists and dicts with texts for keys of these, and
+    has at most MEMORY_BYTES_MAX bytes as msgpack. It is kept in the vHub's journal.
+    """
+
+    is_dropped: bool = False
+    """It is lost, with the cause `model`."""
+    extra_ns: int = 0
+    """By how much later it comes."""
+    memory: Any = None
+
+
+class LinkModel(Protocol):
+    """What an entry point makes of a deployment's parameters. It raises ValueError for those that it does not take."""
+
+    def judge(self, passage: Passage, memory: Any) -> Judged:
+        """Judge one packet, offered on a link behind the one that left this memory; None before the first."""
+
+
+class ModelError(Refused):
+    """A link model that cannot be had: which key of its setting is wrong, and why."""
+
+    exit_code = 2
+
+    def __init__(self, key: Literal["name", "parameters"], what: str, model: OwnModel, nearest: str | None) -> None:
+        super().__init__(f"link model {model.name!r}: {what}")
+        self.key: Literal["name", "parameters"] = key
+        self.problem, self.nearest = what, nearest
+
+
+# --- finding one ------------------------------------------------------------------------------------------------------
+
+
+def installed() -> dict[str, list[EntryPoint]]:
+    """Return the models that are installed here, by name; more than one where packages give the same name."""
+    found: dict[str, list[EntryPoint]] = {}
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.name, giver_of(entry))):
+        found.setdefault(entry.name, []).append(entry)
+    return found
+
+
+def giver_of(entry: EntryPoint) -> str:
+    """Return the package that gives a model, and its version: `mylink 1.2`."""
+    return "" if entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
+
+
+def make_model(model: OwnModel) -> LinkModel:
+    """Return the model that a setting names, with its parameters; raises ModelError."""
+    known = installed()
+    entries = known.get(model.name, [])
+    if not entries:
+        names = ", ".join(known) or "none"
+        nearest = quoted(nearest_name(model.name, known))
+        raise ModelError("name", f"not a link model that is installed here, there are {names}", model, nearest)
+    if len(entries) > 1:
+        givers = " and ".join(map(giver_of, entries))
+        raise ModelError("name", f"a link model of {givers}: which one is not said", model, None)
+    (entry,) = entries
+    try:
+        make: Any = entry.load()
+    except Exception as error:  # noqa: BLE001  # of somebody else's module
+        _refuse("name", f"of {giver_of(entry)}, cannot be loaded", error, model)
+    try:
+        made: Any = make(deepcopy(model.parameters))
+    except Exception as error:  # noqa: BLE001  # of somebody else's code
+        _refuse("parameters", f"not taken by link model {model.name} of {giver_of(entry)}", error, model)
+    if not callable(getattr(made, "judge", None)):
+        raise ModelError("name", f"of {giver_of(entry)}, makes {type(made).__name__}, without `judge`", model, None)
+    judging: LinkModel = made
+    return judging
+
+
+def _refuse(key: Literal["name", "parameters"], what: str, error: Exception, model: OwnModel) -> NoReturn:
+    raise ModelError(key, f"{what}: {type(error).__name__}: {error}", model, None) from error
+
+
+# --- those of a network -----------------------------------------------------------------------------------------------
+
+
+def models_of(network: Network) -> Iterator[tuple[Location, OwnModel]]:
+    """Yield the link models of a network, with their places in the deployment."""
+    for name, radio in network.radios.items():
+        if radio.model is not None:
+            yield ("network", "radios", name, "model"), radio.model
+    for number, rule in enumerate(network.links):
+        if rule.model is not None:
+            yield ("network", "links", number, "model"), rule.model
+
+
+def check_link_models(network: Network, text: str, name: str, sets: Sequence[str] = ()) -> None:
+    """Refuse link models that cannot be had here, each at its place in the file.
+
+    `text`, `name` and `sets` are what the network was loaded from. Raises DeploymentError.
+    """
+    findings = []
+    for location, model in models_of(network):
+        try:
+            make_model(model)
+        except ModelError as error:
+            value = model.name if error.key == "name" else model.parameters
+            findings.append(Finding((*location, error.key), error.problem, value, error.nearest))
+    refuse_findings(text, name, findings, sets)
+
+
+def model_versions(network: Network) -> dict[str, str]:
+    """Return the package and version of each link model of a network, as a capture's versions have them."""
+    names = sorted({model.name for _, model in models_of(network)})
+    known = installed() if names else {}
+    return {VERSION_KEY + name: ", ".join(map(giver_of, known.get(name, ()))) or NOT_INSTALLED for name in names}
+
+
+def differing_models(network: Network, versions: Mapping[str, str]) -> Iterator[str]:
+    """Yield what to know about link models that a capture has from other packages than are installed here."""
+    for key, here in model_versions(network).items():
+        there = versions.get(key)
+        if there is not None and there != here:
+            yield f"{key} is of {there} in the capture, here it is {'' if here == NOT_INSTALLED else 'of '}{here}"

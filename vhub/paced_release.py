@@ -1,0 +1,93 @@
+"""When what is due leaves for a free-running client: in realtime at anchor + due, in fast in tick order, at once.
+
+The anchor is the least of (arrival of Commit(k) - k T) over the last second, on the hub's own clock: the best estimate
+of wall time 0 that late commits do not spoil. How much later than that packets leave is counted.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Final
+
+from foosim.common.histogram import Lags
+from foosim.vhub.network.packet import Flight
+
+ANCHOR_WINDOW_NS: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Flights that leave together for one client, as its downlink `number`, at wall time `at_ns`.
+
+    Their latest was due at wall time `due_ns`; None where nothing is due by the clock.
+    """
+
+    at_ns: int
+    client: str
+    number: int
+    tick: int
+    flights: list[Flight]
+    due_ns: int | None = None
+
+
+class Releases:
+    """What waits to be released, by wall time. `factor` is simulated over wall time; 0 in fast."""
+
+    def __init__(self, tick_ns: int) -> None:
+        self.factor = 0.0
+        self.paused = False
+        self.lateness = Lags()
+        """By how much later than they were due packets left; of this process, and without those of the run's end."""
+        self._tick_ns = tick_ns
+        self._anchors: deque[tuple[int, int]] = deque()
+        self._waiting: list[Release] = []
+
+    def set_tempo(self, factor: float, paused: bool) -> None:
+        """Take a new pace: the anchor is learnt anew, and what waited by the old one leaves at once."""
+        if factor != self.factor or paused != self.paused:
+            self._anchors.clear()
+            self._waiting = [replace(release, at_ns=0, due_ns=None) for release in self._waiting]
+        self.factor = factor
+        self.paused = paused
+
+    def committed(self, tick: int, now_ns: int) -> None:
+        """Learn from the arrival of a commit."""
+        if not self.factor:
+            return
+        self._anchors.append((now_ns, now_ns - int(tick * self._tick_ns / self.factor)))
+        while self._anchors[0][0] < now_ns - ANCHOR_WINDOW_NS:
+            self._anchors.popleft()
+
+    def add(self, client: str, number: int, tick: int, flights: list[Flight], now_ns: int) -> None:
+        """Take what a closed tick releases to a client: never before what it was released earlier."""
+        at_ns = max([now_ns, *(release.at_ns for release in self._waiting if release.client == client)])
+        due_ns = None
+        if self.factor and self._anchors:
+            anchor_ns = min(anchor for _, anchor in self._anchors)
+            due_ns = anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor)
+            at_ns = max(at_ns, due_ns)
+        self._waiting.append(Release(at_ns, client, number, tick, flights, due_ns))
+        self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
+
+    def take(self, now_ns: int, everything: bool = False) -> list[Release]:
+        """Take what is due by now, in order; at the end of the run `everything`."""
+        due = [release for release in self._waiting if everything or release.at_ns <= now_ns]
+        self._waiting = self._waiting[len(due) :]
+        for release in due:
+            if release.due_ns is not None and not everything:
+                self.lateness.add(max(0, now_ns - release.due_ns), len(release.flights))
+        return due
+
+    def first_number(self, client: str) -> int | None:
+        """Return the number of the oldest downlink that waits for a client."""
+        return min((release.number for release in self._waiting if release.client == client), default=None)
+
+    @property
+    def waiting_tick(self) -> int | None:
+        """The oldest tick of which something waits."""
+        return min((release.tick for release in self._waiting), default=None)
+
+    @property
+    def deadline_ns(self) -> int | None:
+        return self._waiting[0].at_ns if self._waiting else None

@@ -1,0 +1,1 @@
+"""How closings become a capture."""

@@ -1,0 +1,92 @@
+"""Looks after the room that the vHub has to write: of its capture, and of its journal, without which no run goes on.
+
+It says once what gets little, and when the run has to end: while what is left to be written still fits.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from foosim.runtime.disk import Level, room_on_disk
+from foosim.vhub.recording.disk_progress import DiskProgress
+from foosim.vhub.recording.writer import CaptureState, CaptureWriter
+
+LOOK_NS: Final = 1_000_000_000
+"""How often the disk of the journal is looked at."""
+_STATES: Final = {Level.FINE: "on", Level.LOW: "low", Level.FULL: "full", Level.OUT: "ended"}
+CLOSING: Final = "closing"
+NOT_RECORDED: Final = {"state": "off", "problem": "", "offered": 0, "written": 0, "refused": 0, "bytes": 0}
+
+
+class RoomWatch:
+    """Watches one capture (or none) and the folder of one journal."""
+
+    def __init__(self, capture: CaptureWriter | None, journals: Path, reserve: int) -> None:
+        self.ends: tuple[str, str] | None = None
+        """What the run is lost by, and why, when it has to end."""
+        self._capture = capture
+        self._journals = journals
+        self._reserve = reserve
+        self._level = Level.FINE
+        self._journal_level = Level.FINE
+        self._look_ns = 0
+        self._disk = None if capture is None else DiskProgress(capture.path)
+
+    def look(self, now_ns: int) -> list[tuple[str, str]]:
+        """Return what is new for people, as (level, text)."""
+        said = []
+        while self._capture is not None and self._capture.states:
+            said += self._tell(self._capture.states.popleft(), self._capture.stops_world)
+        if now_ns >= self._look_ns:
+            self._look_ns = now_ns + LOOK_NS
+            said += self._look_at_journal()
+        return said
+
+    def _tell(self, state: CaptureState, stops_world: bool) -> list[tuple[str, str]]:
+        """Note a state that the capture came to."""
+        before, self._level = self._level, state.level
+        if state.level is Level.LOW:
+            then = "the run ends" if stops_world else "the run goes on without its capture"
+            return [("warning", f"room gets little, at the reserve {then}: {state.text}")]
+        if stops_world:
+            if before < Level.FULL:
+                self.ends = ("the capture", state.text)
+            return [("error", f"not captured further: {state.text}")] if state.level is Level.OUT else []
+        return [("error", f"the run goes on without its capture: {state.text}")]
+
+    def _look_at_journal(self) -> list[tuple[str, str]]:
+        try:
+            room = room_on_disk(self._journals, self._reserve)
+        except OSError:
+            return []  # the next record will tell
+        level, before = room.level, self._journal_level
+        self._journal_level = max(level, before)
+        if level <= before or before >= Level.FULL:
+            return []
+        if level is Level.LOW:
+            return [("warning", f"room gets little, at the reserve the run ends: {self._journals}: {room}")]
+        self.ends = ("room for the journal", f"{self._journals}: {room}")
+        return []
+
+    def disk_progress(self, now_ns: int) -> int:
+        """Return a number that changes as long as the disk goes on with the capture that is brought to it."""
+        if self._capture is None or self._disk is None:
+            return 0
+        return self._disk.look(self._capture.is_syncing, now_ns)
+
+    @property
+    def recording(self) -> dict[str, Any]:
+        """How the capture does, for the status and the result of the run."""
+        if self._capture is None:
+            return NOT_RECORDED
+        state, counts = self._capture.state, self._capture.statistics()
+        is_closing = self._capture.is_closing and state.level <= Level.LOW
+        return {
+            "state": CLOSING if is_closing else _STATES[state.level],
+            "problem": state.text,
+            "offered": counts.offered,
+            "written": counts.written,
+            "refused": counts.refused,
+            "bytes": counts.bytes,
+        }

@@ -1,0 +1,80 @@
+"""What goes to the capture and when: a closing goes once all that it released to clients has left.
+
+Until then its packets do not know when that was. Closings go in the order of their ticks, so one that waits holds up
+those behind it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+from foosim.protocol.messages import Epoch
+from foosim.vhub.commits import Commits, Committed
+from foosim.vhub.network.packet import IN_FLIGHT, flight_of, state_of
+from foosim.vhub.records import Closing, closing_of
+from foosim.vhub.state import HubState
+
+
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """Rows for the capture, behind the journal: what one closing gave."""
+
+    closing: Closing
+
+
+@dataclass(frozen=True, slots=True)
+class KeepEpoch:
+    """A row for the capture: an epoch that begins."""
+
+    epoch: Epoch
+
+
+class Keeping:
+    """The closings that the capture does not have yet, oldest first."""
+
+    def __init__(self) -> None:
+        self._closings: deque[Closing] = deque()
+
+    def add(self, closing: Closing) -> None:
+        """Take the closing of the next tick."""
+        self._closings.append(closing)
+
+    def take(self, waiting_tick: int | None) -> list[Keep]:
+        """Take the closings before `waiting_tick`, the oldest whose packets still wait; None: none do."""
+        taken = []
+        while self._closings and (waiting_tick is None or self._closings[0].frame.tick < waiting_tick):
+            taken.append(Keep(self._closings.popleft()))
+        return taken
+
+
+def last_closings(
+    state: HubState, commits: Commits, end_tick: int, half_closed: Closing | None, now_ns: int
+) -> list[Closing]:
+    """Return what a run ends with: the tick that is half closed, with its fates, and all frames that are committed
+    behind it, up to that of `end_tick`; the last has what is in flight.
+
+    Nodes run ahead of closings as far as deliveries let them, so there may be many. What is not closed is not judged.
+    """
+    closings = [] if half_closed is None else [half_closed]
+    behind = state.closed + len(closings)
+    for tick in range(behind + 1, end_tick + 1):
+        committed = commits.get(tick)
+        if committed is None:
+            break
+        closings.append(_unjudged(state, commits, committed, now_ns))
+    closed = commits.get(state.closed)
+    if not closings and closed is not None:
+        closings.append(_unjudged(state, commits, closed, now_ns))
+    for closing in closings[-1:]:
+        closing.ages = state.ages.untold(state.closed)
+        for flight in state.in_flight():
+            left = flight_of(state_of(flight))
+            left.cause = IN_FLIGHT
+            closing.fates.append(left)
+    return closings
+
+
+def _unjudged(state: HubState, commits: Commits, committed: Committed, now_ns: int) -> Closing:
+    _, commit, frame = committed
+    return closing_of(frame, commit, commits.chain_at(frame.tick), state, [], [], now_ns)

@@ -1,0 +1,306 @@
+"""How a closing becomes the rows of a capture, and how those of packets become messages in its file.
+
+All rows are pure functions of closings, so what the writer missed can be made again from a fold of the journal
+(`records.fold`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from msgspec.structs import replace
+
+from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.rows import (
+    AGES,
+    CLIENTS,
+    EPOCHS,
+    FRAME,
+    LAYOUT,
+    PACKETS,
+    RECOVERIES,
+    TICK,
+    AddedRow,
+    AgeRow,
+    ClientRow,
+    DecidedRow,
+    DeliveredRow,
+    EditRow,
+    EntityRow,
+    EpochRow,
+    Fate,
+    FrameRow,
+    LayoutRow,
+    OutboxRow,
+    OwnerRow,
+    PacketRow,
+    RecoveryRow,
+    Row,
+    SubscriptionRow,
+    TickRow,
+)
+from foosim.common.keyed_random import Slot
+from foosim.deployment.schema import Deployment
+from foosim.protocol.messages import Epoch, Recovered
+from foosim.vhub.network.ages import quantile
+from foosim.vhub.network.air import DEAF
+from foosim.vhub.network.memory import Age
+from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
+from foosim.vhub.records import Closing
+from foosim.vhub.stages.capacity import EVICTED
+from foosim.vhub.stages.duty import DUTY_CYCLE
+from foosim.vhub.stages.medium import COLLISION
+from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
+from foosim.vhub.stages.receiver import RECEIVER_FULL
+from foosim.world.edits import Add, Disrupt, Edit, Freeze, Push, Remove
+from foosim.world.frame import Frame
+from foosim.world.layout import Layout, build_layout
+
+Entry = tuple[str, int, int, int, Row]
+"""A row with its place: topic, log time and publish time (simulated ns), sequence number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What decides how a closing becomes rows: a function of the deployment."""
+
+    tick_ns: int
+    frames_every: int
+    base: Layout
+
+
+def plan_of(deployment: Deployment) -> Plan:
+    """Return the plan of a deployment's captures."""
+    return Plan(deployment.tick_ns, deployment.capture.frames_every, build_layout(deployment))
+
+
+def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
+    """Return the rows of one closing but for those of packets (`packet_entry`), which are written behind them.
+
+    `known` is the frame of the closing before, None at the start. The last closing of a run may bring a frame that is
+    known already: then its packets alone are new.
+    """
+    frame = closing.frame
+    at_ns = frame.tick * plan.tick_ns
+    mark = frame.tick & 0xFFFF_FFFF
+    entries: list[Entry] = []
+    if known is None or known.tick != frame.tick:
+        if known is None or known.layout.digest != frame.layout.digest:
+            entries.append((LAYOUT, at_ns, at_ns, mark, layout_row(frame, plan.base)))
+        entries += [(CLIENTS, at_ns, at_ns, mark, row) for row in _client_rows(closing)]
+        entries += [_recovery_entry(entry, plan) for entry in closing.recovered]
+        entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
+        if known is None or frame.tick % plan.frames_every == 0:
+            entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
+    return [*entries, *(_age_entry(age, plan.tick_ns) for age in closing.ages)]
+
+
+def _age_entry(age: Age, tick_ns: int) -> Entry:
+    """Return the row of ages at use, at the last tick that it tells of."""
+    ages = sorted(age.counts)
+    p50, p99 = quantile(age.counts, 0.5), quantile(age.counts, 0.99)
+    counts = [age.counts[ticks] for ticks in ages]
+    figures = sum(counts), p50 * tick_ns, p99 * tick_ns, ages[-1] * tick_ns
+    who = age.client, age.source, age.channel
+    row = AgeRow(age.tick, *who, *figures, [ticks * tick_ns for ticks in ages], counts)
+    return AGES, age.tick * tick_ns, age.tick * tick_ns, age.tick & 0xFFFF_FFFF, row
+
+
+def add_packets(
+    mcap: McapWriter,
+    channel: int,
+    flights: list[Flight],
+    encode: Callable[[Row], bytes],
+    kept: Callable[[Row], Row] | None,
+) -> None:
+    """Add the rows of one closing's packets to a file in the order of their log times, as `encode` writes them.
+
+    `kept` makes of a row what is kept of it. The hot path: see the bench before changing it.
+    """
+    for flight in sorted(flights, key=_log_time):
+        _, log_ns, publish_ns, sequence, row = packet_entry(flight)
+        mcap.add_message(channel, log_ns, publish_ns, sequence, encode(row if kept is None else kept(row)))
+
+
+def _log_time(flight: Flight) -> int:
+    """Return when a packet was sent: those of a closing arrive in another order, by their due times."""
+    return flight.sent_ns
+
+
+def packet_entry(flight: Flight) -> Entry:
+    """Return the row of a packet, in its place."""
+    sent_ns, stamp_ns = flight.sent_ns, flight.stamp_ns
+    return PACKETS, sent_ns, stamp_ns or sent_ns, flight.sequence & 0xFFFF_FFFF, packet_row(flight)
+
+
+DECIDING: Final[dict[str, tuple[str, ...]]] = {
+    DUTY_CYCLE: ("duty_left_ns",),
+    QUEUE_FULL: ("queue_packets",),
+    CODEL: ("queue_packets", "codel_above_ns", "codel_drops"),
+    EVICTED: ("evicted_by", "evicted_by_copy", "under_way"),
+    RECEIVER_FULL: ("room_left", "room_share"),
+}
+"""The fields of a row for what a flight was dropped by, `decided_by`, by cause."""
+_FATES: Final[dict[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
+_LOSS: Final = int(Slot.LOSS)
+_JITTER: Final = int(Slot.JITTER)
+_ERROR: Final = int(Slot.ERROR)
+
+
+def packet_row(flight: Flight) -> PacketRow:
+    """Return the row of a packet whose fate is final, or that is in flight at the end."""
+    cause, radio = flight.cause, flight.radio
+    fate = _FATES.get(cause, DROPPED)
+    on_its_way = flight.arrival_tick >= 0
+    slots, words, payload = flight.slots, flight.words, flight.payload
+    common = (
+        flight.source,
+        flight.sequence,
+        flight.copy,
+        flight.destination,
+        flight.channel,
+        flight.sent_ns,
+        flight.stamp_ns,
+        flight.due_ns if on_its_way else -1,
+        flight.arrival_tick,
+        fate,
+        cause if fate is DROPPED else "",
+        flight.rule,
+        words[_LOSS].to_bytes(8).hex() if slots >> _LOSS & 1 else "",
+        words[_JITTER].to_bytes(8).hex() if slots >> _JITTER & 1 and on_its_way else "",
+        len(payload),
+        payload,
+        flight.released_wall_ns,
+        radio,
+        flight.published,
+        flight.queue_bytes,
+        flight.queue_ns,
+        flight.access_ns,
+        flight.airtime_ns,
+        flight.propagation_ns,
+        flight.jitter_ns,
+        flight.held_ns,
+        flight.model_ns,
+        flight.phase_ns,
+        flight.is_bad,
+        flight.bits_flipped,
+        flight.rate_bps,
+    )
+    if not radio:
+        row = PacketRow(*common)
+        return _with_decision(row, flight) if cause and flight.decided_by else row
+    row = PacketRow(*common, *_radio_inputs(flight))
+    return _with_decision(row, flight) if cause or flight.by_factor else row
+
+
+def _with_decision(row: PacketRow, flight: Flight) -> PacketRow:
+    """Return the row of a packet with what it was dropped by, where there is more to say than its cause."""
+    cause, by_factor = flight.cause, flight.by_factor
+    found: dict[str, Any] = dict(zip(DECIDING.get(cause, ()), flight.decided_by, strict=False))
+    if by_factor:
+        found["by_factor_cdbm"] = [level_cdbm(power) for power in by_factor]
+    if cause == COLLISION:
+        found["collision"] = _collision_of(flight)
+    return replace(row, decided_by=DecidedRow(**found)) if found else row
+
+
+def _radio_inputs(flight: Flight) -> tuple[Any, ...]:
+    """Return what the stages of a radio found, in the order of a row."""
+    threshold, walls = flight.error_threshold, flight.walls
+    interference = flight.interference if flight.interference < DEAF else 0
+    return (
+        flight.distance_mm,
+        list(walls) if walls else [],
+        flight.walls_cdb,
+        flight.path_loss_cdb,
+        flight.shadowing_cdb,
+        flight.fading_cdb,
+        flight.received_cdbm,
+        flight.snr_cdb,
+        level_cdbm(interference) if interference else 0,
+        threshold * 1_000_000 >> 64,
+        flight.words[_ERROR].to_bytes(8).hex() if threshold else "",
+        flight.contenders,
+        flight.retries,
+    )
+
+
+def _collision_of(flight: Flight) -> str:
+    """Return what a packet collided with: the medium says so itself, of the rest the channel does."""
+    if flight.outcome == COLLISION:
+        return "contention"
+    return "half_duplex" if flight.interference >= DEAF else "interference"
+
+
+def _tick_row(closing: Closing) -> TickRow:
+    frame = closing.frame
+    return TickRow(
+        frame.tick,
+        closing.digest.hex(),
+        [frame.entity_digest(entity).hex() for entity in frame.layout.entities],
+        [edit_row(edit) for edit in closing.edits],
+        [
+            DeliveredRow(d.due_ns, d.source, d.sequence, d.copy, d.destination, d.channel, d.payload)
+            for d in closing.delivered
+        ],
+        closing.wall_ns,
+    )
+
+
+def epoch_entry(epoch: Epoch, plan: Plan) -> Entry:
+    """Return the row of an epoch, in its place."""
+    at_ns = epoch.tick * plan.tick_ns
+    owners = [OwnerRow(robot, node) for robot, node in epoch.owners]
+    row = EpochRow(epoch.tick, epoch.epoch, epoch.digest.hex(), list(epoch.roster), owners, epoch.arithmetic.hex())
+    return EPOCHS, at_ns, at_ns, epoch.tick & 0xFFFF_FFFF, row
+
+
+def _recovery_entry(entry: Recovered, plan: Plan) -> Entry:
+    """Return the row of a loss or return, at the tick behind which it was."""
+    at_ns = entry.tick * plan.tick_ns
+    row = RecoveryRow(entry.what, entry.name, entry.reason, entry.tick, entry.epoch, entry.outage_ns)
+    return RECOVERIES, at_ns, at_ns, entry.tick & 0xFFFF_FFFF, row
+
+
+def layout_row(frame: Frame, base: Layout) -> LayoutRow:
+    """Return the row of a frame's layout; `base` is the deployment's own."""
+    layout = frame.layout
+    return LayoutRow(
+        frame.tick,
+        layout.digest.hex(),
+        layout.size,
+        [EntityRow(e.name, e.model, e.start, e.split, e.stop) for e in layout.entities],
+        [AddedRow(e.name, e.model) for e in layout.entities if e.name not in base],
+    )
+
+
+def frame_row(frame: Frame) -> FrameRow:
+    """Return the row of a frame."""
+    return FrameRow(frame.tick, frame.values.tobytes(), [OutboxRow(*item) for item in frame.outboxes.items()])
+
+
+def _client_rows(closing: Closing) -> list[ClientRow]:
+    tick = closing.frame.tick
+    rows = [ClientRow(tick, name, "leaves", 0, []) for name in closing.leaves]
+    for joining in closing.joins:
+        heard, calling = (
+            [SubscriptionRow(source, channel) for source, channel in pairs]
+            for pairs in (joining.subscriptions, joining.arrivals)
+        )
+        rows.append(ClientRow(tick, joining.name, "joins", joining.period, heard, joining.offset, calling))
+    return [*rows, *(ClientRow(tick, name, "leaves_owing", 0, []) for name in closing.owing)]
+
+
+def edit_row(edit: Edit) -> EditRow:
+    """Return the row of an edit."""
+    if isinstance(edit, Add):
+        return EditRow("add", edit.name, edit.model, position=list(edit.position), velocity=list(edit.velocity))
+    if isinstance(edit, Remove):
+        return EditRow("remove", edit.name)
+    if isinstance(edit, Push):
+        return EditRow("push", edit.name, impulse=list(edit.impulse))
+    if isinstance(edit, Disrupt):
+        return EditRow("network", "", event=edit.event)
+    return EditRow("freeze" if isinstance(edit, Freeze) else "thaw", edit.name)

@@ -1,0 +1,391 @@
+"""The writer of a capture: a thread that turns closings into rows behind the journal, and never loses one silently.
+
+`keep` hands a closing over and returns; when the writer lags by more than the queue holds, `keep` waits, which slows
+the run, and says so once. What is written is flushed at least every `capture.flush`, synced each second by a thread of
+its own, and readable when the process is killed. When the room gets little (`protocol.disk`) or the disk refuses,
+`state` says so; the owner ends the run, or goes on without a capture, as the deployment wants it. A writer that has
+given up has an end in its file and counts what it refuses: offered = written + refused.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Final
+
+from foosim.capture import contents as capture_contents
+from foosim.common import limits
+from foosim.deployment.schema import Deployment
+from foosim.protocol.messages import Epoch
+from foosim.runtime.disk import Level
+from foosim.vhub.recording.file import CaptureFile, Described, Item, Line
+from foosim.vhub.recording.unfinished import Journalled
+from foosim.vhub.records import Closing
+from foosim.vhub.resume import Captured
+
+GATHER_S: Final = 0.02
+"""How long the writer lets closings gather: it wakes once for several, instead of taking the interpreter at each."""
+BATCH_ROWS: Final = 2_000
+"""How many rows are written between two looks at the clock."""
+SYNC_NS: Final = 1_000_000_000
+WAIT_S: Final = 0.1
+"""How often whoever waits for a full queue is told so."""
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureStatistics:
+    """How far a capture is: what is written, what waits, and how often the run had to wait for it.
+
+    `offered` counts what was handed over: ticks, packets, epochs and lines of the log. All of it is in the file
+    (`written`), or not (`refused`), or on its way.
+    """
+
+    bytes: int
+    offered: int
+    written: int
+    refused: int
+    queued_rows: int
+    waits: int
+    written_tick: int
+    synced_tick: int
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureState:
+    """How a capture does. At FULL it is to be ended while the rest still fits; at OUT it has its end, and refuses."""
+
+    level: Level = Level.FINE
+    text: str = ""
+
+
+class CaptureWriter:
+    """Writes one capture. `metadata` (texts: run, fingerprint, ...) joins what the deployment tells.
+
+    Raises CaptureError when the file exists already (it is never overwritten) or cannot be written. With `journal_tick`
+    a file that this run left unfinished is gone on with (`CaptureFile`): `keep` everything that the journal has, from
+    that tick on; what the file has already is not written again, and what it has behind `journal_end`, the last tick
+    and epoch of that journal, is cut off. `say` takes what people should know, as (level, text).
+    `keep`, `log`, `finish` and `leave` are for one thread.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        deployment: Deployment,
+        deployment_name: str,
+        deployment_text: str,
+        metadata: Mapping[str, str],
+        say: Callable[[str, str], None] | None = None,
+        journal_tick: int | None = None,
+        journal_end: Captured | None = None,
+    ) -> None:
+        self.path = path
+        self._say = say or (lambda level, text: None)
+        self._flush_ns = deployment.capture.flush_ns
+        self.state = CaptureState()
+        self.states: deque[CaptureState] = deque()
+        """Each state that it came to, in order, for one reader, who takes them out: the thread may be two further when
+        it is looked at."""
+        self.stops_world = deployment.capture.on_full == "stop_world"
+        self._offered = self._written = self._refused = self._pending = self._passed = 0
+        """Rows by what became of them; pending ones are in the chunk that is being collected, passed
+        ones were in the file that is gone on with."""
+        self._error: BaseException | None = None
+        self._queue: deque[Item] = deque()
+        self._queued_rows = self._waits = 0
+        self._is_over = False
+        """Whether nothing comes any more."""
+        self._ending: Mapping[str, str] | None = None
+        """How it ended, where the file gets an end."""
+        self._idle = False
+        """Whether the thread waits to be told of the next row."""
+        self._changed = threading.Condition()
+        """Guards the queue, the error and the ends; notified when any of them changes in a way that is waited for."""
+        described = Described(deployment, deployment_name, deployment_text, metadata)
+        journal = None if journal_tick is None else Journalled(journal_tick, journal_end, at_once=True)
+        self._file = CaptureFile(path, described, journal)
+        self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
+        """How far the file was that is gone on with."""
+        self.has_ended = False
+        """Whether nothing is written any more."""
+        self.on_end: Callable[[], None] = lambda: None
+        """Called then, in the thread that wrote."""
+        self.while_waiting: Callable[[], None] = lambda: None
+        """Called again and again while `keep` or `log` waits, in the thread that does."""
+        self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
+        self._syncer = _Syncer(self._file)
+        self._thread.start()
+
+    # --- what the owner calls ----------------------------------------------------------------------------------------
+
+    def keep(self, item: Closing | Epoch) -> None:
+        """Hand over what one closing gave, or an epoch that begins; wait while the queue is full."""
+        self._put(item)
+
+    def log(self, level: str, text: str, tick: int) -> None:
+        """Hand over a line of the run's log; `level` is info, warning or error."""
+        self._put(Line(level, text, tick))
+
+    def finish(self, metadata: Mapping[str, str] | None = None) -> None:
+        """Write what waits, the last frame and the summary; a second call does nothing. `metadata`: how it ended."""
+        self.begin_finish(metadata)
+        self._end()
+        self._raise_error()
+
+    def begin_finish(self, metadata: Mapping[str, str] | None = None) -> None:
+        """Begin what `finish` does, and return at once."""
+        with self._changed:
+            if not self._is_over:
+                self._ending = {} if metadata is None else dict(metadata)
+            self._is_over = True
+            self._changed.notify_all()
+
+    @property
+    def is_closing(self) -> bool:
+        """Whether nothing comes any more, and what came is still being written."""
+        return self._is_over and not self.has_ended
+
+    @property
+    def is_syncing(self) -> bool:
+        """Whether a call of the system brings the file to the disk at this moment."""
+        return self._file.is_syncing
+
+    def leave(self) -> None:
+        """Write what waits and let go of the file without an end: whoever has its journal can go on with it.
+
+        A second call does nothing. It raises nothing, since it comes behind what is wrong.
+        """
+        self._end()
+
+    def _end(self) -> None:
+        with self._changed:
+            self._is_over = True
+            self._changed.notify_all()
+        self._thread.join()
+
+    @property
+    def synced_tick(self) -> int:
+        """The last tick whose rows no power failure takes away; the journal is done with those before."""
+        return self._syncer.tick
+
+    def statistics(self) -> CaptureStatistics:
+        counts = self._offered - self._passed, self._written, self._refused, self._queued_rows, self._waits
+        return CaptureStatistics(self._file.total_bytes, *counts, self._file.done.tick, self.synced_tick)
+
+    def _put(self, item: Item) -> None:
+        rows = _rows_in(item)
+        with self._changed:
+            assert not self._is_over, "a row after the end"
+            full = self._is_full(rows)
+            self._waits += full
+            first = full and self._waits == 1
+        if first:
+            self._say("warning", f"the run waits for its capture {self.path}: {self._queued_rows} rows are queued")
+        while not self._takes(item, rows):
+            self.while_waiting()
+        self._raise_error()
+
+    def _takes(self, item: Item, rows: int) -> bool:
+        """Queue an item, which may take a wait; return False when it took too long."""
+        with self._changed:
+            if self._is_full(rows) and self._error is None:
+                self._changed.wait(WAIT_S)
+            if self._is_full(rows) and self._error is None:
+                return False
+            self._queue.append(item)
+            self._queued_rows += rows
+            self._offered += rows
+            if self._idle:
+                self._idle = False
+                self._changed.notify_all()
+            return True
+
+    def _is_full(self, rows: int) -> bool:
+        """A single closing larger than the queue goes in alone."""
+        return self._queued_rows > 0 and self._queued_rows + rows > limits.CAPTURE_QUEUE_ROWS_MAX
+
+    def _raise_error(self) -> None:
+        if self._error is not None:
+            raise self._error
+
+    # --- the thread --------------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            self._write_all()
+        except BaseException as error:  # noqa: BLE001  # raised again by what the owner calls next
+            with self._changed:
+                self._error = error
+                self._changed.notify_all()
+        finally:
+            self._syncer.end()
+            self._file.close()
+            self.has_ended = True
+            self.on_end()
+
+    def _write_all(self) -> None:
+        interval_ns = self._flush_ns * 3 // 4  # sooner than asked, by what gathering and a batch take
+        flush_at_ns = sync_at_ns = time.monotonic_ns()
+        ending = False
+        while not ending:
+            until_ns = flush_at_ns if self._pending else sync_at_ns if self._syncer.lags else None
+            items, ending = self._take(until_ns)
+            for item in items:
+                self._write_item(item)
+            now_ns = time.monotonic_ns()
+            if now_ns >= flush_at_ns or self._file.mcap.chunk_bytes > capture_contents.CHUNK_BYTES:
+                self._flush()
+                flush_at_ns = now_ns + interval_ns
+            if now_ns >= sync_at_ns and self._syncer.lags and not self._pending:
+                self._syncer.ask()
+                sync_at_ns = now_ns + SYNC_NS
+        if self._ending is None:
+            self._flush()
+        elif self.state.level < Level.OUT:
+            self._finish(self._ending)
+
+    def _flush(self) -> None:
+        """Write what is collected, and look how much room is left."""
+        if self.state.level is Level.OUT:
+            return
+        try:
+            if self._syncer.error is not None:
+                raise self._syncer.error
+            self._file.end_chunk()
+            self._note_written()
+            room = self._file.room()
+        except OSError as error:
+            self._give_up(str(self._file.disk_error(error)))
+            return
+        if room.level is Level.OUT or (room.level is Level.FULL and not self.stops_world):
+            self._give_up(f"{self.path}: {room}")
+        elif room.level > self.state.level:
+            self._come_to(CaptureState(room.level, f"{self.path}: {room}"))
+
+    def _note_written(self) -> None:
+        self._written += self._pending
+        self._pending = 0
+        self._syncer.written(self._file.done.tick)
+
+    def _give_up(self, text: str) -> None:
+        """End the file in order, as far as the disk takes it; what comes from now on is refused."""
+        self._file.give_up()
+        self._refused += self._pending
+        self._pending = 0
+        self._file.write(Line("error", f"not captured from here on: {text}", max(0, self._file.done.tick)))
+        try:
+            self._file.finish({"reason": f"not captured further: {text}", "last_tick": str(self._file.done.tick)})
+        except OSError as error:
+            self._file.give_up()
+            text = f"{text}; its end could not be written, {error.strerror}"
+        self._come_to(CaptureState(Level.OUT, text))
+
+    def _come_to(self, state: CaptureState) -> None:
+        self.state = state
+        self.states.append(state)
+
+    def _finish(self, ending: Mapping[str, str]) -> None:
+        try:
+            self._syncer.end()
+            if self._syncer.error is not None:
+                raise self._syncer.error
+            self._file.end_chunk()
+            self._note_written()
+            self._file.finish(ending)
+            self._syncer.tick = self._file.done.tick
+        except OSError as error:
+            self._give_up(str(self._file.disk_error(error)))
+
+    def _take(self, until_ns: int | None) -> tuple[list[Item], bool]:
+        """Take a batch of what has gathered, after a wait for anything, or until something is to be flushed.
+
+        Also return whether nothing comes after it.
+        """
+        with self._changed:
+            while not self._queue and not self._is_over:
+                self._idle = True
+                if until_ns is None:
+                    self._changed.wait()
+                elif not self._changed.wait(max(0, until_ns - time.monotonic_ns()) * 1e-9):
+                    break
+            self._idle = False
+            gather = not self._is_over and 0 < self._queued_rows < BATCH_ROWS
+        if gather:
+            time.sleep(GATHER_S)
+        items: list[Item] = []
+        rows = 0
+        with self._changed:
+            while self._queue and rows < BATCH_ROWS:
+                items.append(self._queue.popleft())
+                rows += _rows_in(items[-1])
+            self._queued_rows -= rows
+            self._changed.notify_all()
+            return items, self._is_over and not self._queue
+
+    def _write_item(self, item: Item) -> None:
+        if isinstance(item, Closing) and self._file.begins_next(item):
+            self._go_on(item)
+        if self.state.level is Level.OUT:
+            self._refused += _rows_in(item)
+        elif self._file.write(item):
+            self._pending += _rows_in(item)
+        else:
+            self._passed += _rows_in(item)
+
+    def _go_on(self, closing: Closing) -> None:
+        """Begin the next file with a closing, when all before it is written."""
+        self._flush()
+        try:
+            if self.state.level is not Level.OUT:
+                self._file.go_on(closing)
+                self._syncer.tick = self._file.done.tick
+        except OSError as error:
+            self._give_up(str(self._file.disk_error(error)))
+
+
+class _Syncer:
+    """Brings a file to the disk in a thread of its own, so that a slow disk holds up no flush."""
+
+    def __init__(self, file: CaptureFile) -> None:
+        self.tick = -1
+        """The last tick that is on the disk."""
+        self.lags = False
+        """Whether something was written since it was asked last."""
+        self.error: OSError | None = None
+        self._file = file
+        self._written = -1
+        self._asked: SimpleQueue[int | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name="capture-sync", daemon=True)
+        self._thread.start()
+
+    def written(self, tick: int) -> None:
+        """Note that everything up to a tick is written."""
+        self._written = tick
+        self.lags = True
+
+    def ask(self) -> None:
+        """Have what is written brought to the disk; return at once."""
+        self.lags = False
+        self._asked.put(self._written)
+
+    def end(self) -> None:
+        """Wait for what was asked, and end; a second call does nothing."""
+        self._asked.put(None)
+        self._thread.join()
+
+    def _run(self) -> None:
+        while (tick := self._asked.get()) is not None:
+            try:
+                self._file.sync()
+                self.tick = tick
+            except OSError as error:
+                self.error = error
+
+
+def _rows_in(item: Item) -> int:
+    return 1 + len(item.fates) if isinstance(item, Closing) else 1

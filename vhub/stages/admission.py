@@ -1,0 +1,43 @@
+"""Admission: what is too long for the link, or comes from a body that is out of service, is not sent.
+
+By radio or by wire: who is on board of a body that is out of service has no power. Links are made anew when a body goes
+out of service (`Fabric.turn_to`), so that the others need not ask.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages.stage import Stage
+
+TOO_BIG: Final = "too_big"
+NODE_DOWN: Final = "node_down"
+NO_ROUTE: Final = "no_route"
+
+
+class Admit(Stage):
+    """Knows the longest payload, and whether the sender's body works in the newest frame."""
+
+    def __init__(self, setup: LinkSetup) -> None:
+        self._longest = setup.settings.payload_max
+        self._is_down = setup.world.is_down(setup.source)
+
+    @classmethod
+    def for_link(cls, setup: LinkSetup) -> Admit | None:
+        if not setup.is_routed:
+            return NoRoute(setup)
+        return cls(setup) if setup.settings.payload_max is not None or setup.world.is_down(setup.source) else None
+
+    def at_sending(self, flight: Flight) -> str:
+        if self._longest is not None and len(flight.payload) > self._longest:
+            return TOO_BIG
+        return NODE_DOWN if self._is_down else ""
+
+
+class NoRoute(Admit):
+    """The ends have no radio in common, or not that of their rule."""
+
+    def at_sending(self, flight: Flight) -> str:
+        return NO_ROUTE

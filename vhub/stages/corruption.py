@@ -1,0 +1,100 @@
+"""Mangling: bit errors that nothing corrects, and copies.
+
+The number of flipped bits is binomial, at least 1 in a packet with errors; their places come from further blocks of
+the packet's own draws, so that a replay flips the same bits.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Final
+
+from foosim.common.exact_math import exp, ln, ln_gamma
+from foosim.common.keyed_random import UNIT, Slot, chance_threshold
+from foosim.vhub.network.link_context import LinkSetup
+from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages.stage import Stage
+
+CRC_FAIL: Final = "crc_fail"
+FLIP_BLOCK: Final = 1024
+"""From here on the blocks of a packet's draws say which bits are flipped."""
+SIZES_KEPT: Final = 1024
+MEAN_SMALL: Final = 400.0
+DEVIATIONS: Final = 12.0
+"""Fewer flipped bits than the mean less this many deviations: less likely than 2^-64."""
+
+
+class Mangle(Stage):
+    """Flips bits of a packet, or loses it for them; says whether it comes twice."""
+
+    def __init__(self, setup: LinkSetup) -> None:
+        self._setup = setup
+        corrupt = setup.settings.corrupt
+        self._error_rate = 0.0 if corrupt is None else corrupt.bit_error_rate
+        self._delivers = corrupt is not None and corrupt.deliver
+        self._doubled = chance_threshold(setup.settings.duplicate)
+        self._thresholds: dict[int, int] = {}
+
+    @classmethod
+    def for_link(cls, setup: LinkSetup) -> Mangle | None:
+        settings = setup.settings
+        errors = settings.corrupt is not None and settings.corrupt.bit_error_rate > 0.0
+        return cls(setup) if errors or settings.duplicate > 0.0 else None
+
+    def at_sending(self, flight: Flight) -> str:
+        words, bits = flight.words, 8 * len(flight.payload)
+        if self._error_rate and bits and words[Slot.CORRUPT] < self.threshold(bits):
+            if not self._delivers:
+                return CRC_FAIL
+            self._flip(flight, bits)
+        if flight.copy == 0 and words[Slot.DUPLICATE] < self._doubled:
+            flight.is_doubled = True
+            self._setup.memory.copies += 1
+        return ""
+
+    def threshold(self, bits: int) -> int:
+        """Return the probability of any error in so many bits, in units of 2^-64."""
+        found = self._thresholds.get(bits)
+        if found is None:
+            if len(self._thresholds) >= SIZES_KEPT:
+                self._thresholds.clear()
+            found = self._thresholds[bits] = chance_threshold(1.0 - exp(bits * ln(1.0 - self._error_rate)))
+        return found
+
+    def _flip(self, flight: Flight, bits: int) -> None:
+        count = min(bits, self._count(flight.words[Slot.CORRUPT], bits))
+        places: set[int] = set()
+        block = FLIP_BLOCK
+        while len(places) < count:
+            for word in self._setup.words(flight, block):
+                if len(places) < count:
+                    places.add(word * bits // UNIT)
+            block += 1
+        payload = bytearray(flight.payload)
+        for place in places:
+            payload[place >> 3] ^= 1 << (place & 7)
+        flight.mangled, flight.bits_flipped = bytes(payload), count
+
+    def _count(self, word: int, bits: int) -> int:
+        """Return how many of the bits are flipped, given that the draw says that some are: the binomial law."""
+        rate = self._error_rate
+        odds = rate / (1.0 - rate)
+        count = self._least(bits)
+        chance = below = exp(self._ln_mass(count, bits))
+        while word >= chance_threshold(min(1.0, below)) and count < bits:
+            chance *= (bits - count) / (count + 1) * odds
+            count += 1
+            if below + chance == below:
+                break
+            below += chance
+        return count
+
+    def _least(self, bits: int) -> int:
+        """Return from which count on the law is looked at: 1, unless no float is as small as what it has there."""
+        mean = bits * self._error_rate
+        return 1 if mean < MEAN_SMALL else max(1, int(mean - DEVIATIONS * sqrt(mean)))
+
+    def _ln_mass(self, count: int, bits: int) -> float:
+        rate = self._error_rate
+        ln_ways = ln_gamma(bits + 1.0) - ln_gamma(count + 1.0) - ln_gamma(bits - count + 1.0)
+        return ln_ways + count * ln(rate) + (bits - count) * ln(1.0 - rate)

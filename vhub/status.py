@@ -1,0 +1,122 @@
+"""What the vHub reports of itself in heartbeats and its farewell, as JSON: totals, refusals, a line per link."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import msgspec
+
+from foosim.common.json_text import encode_json
+from foosim.vhub.links.fabric import LinkKey, name_of
+from foosim.vhub.network.ages import quantile
+from foosim.vhub.state import HubState
+
+if TYPE_CHECKING:
+    from foosim.vhub.core import HubCore
+
+
+LINKS_TOLD_MAX: Final = 200
+LINKS_TOLD_EVERY: Final = 5
+"""Heartbeats, which are half a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class HubStatistics:
+    """The hub's account so far."""
+
+    closed: int
+    offered: int
+    delivered: int
+    dropped: int
+    in_flight: int
+    refused: int
+    malformed: int
+    repeated: int
+
+
+def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStatistics:
+    """Return the account so far as a frozen value."""
+    if state is None:
+        return HubStatistics(-1, 0, 0, 0, 0, 0, malformed, repeated)
+    p = state.packets
+    return HubStatistics(state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated)
+
+
+class LinksTold:
+    """The lines about links, which several heartbeats share: of hundreds of links they cost as much as a few ticks."""
+
+    def __init__(self) -> None:
+        self._lines = msgspec.Raw(b"[]")
+        self._heartbeats = 0
+
+    def lines(self, state: HubState, watched: Collection[tuple[str, str]], *, anew: bool) -> msgspec.Raw:
+        """Return the lines as JSON for one more heartbeat, made anew when it is their turn: of the links with the most
+        traffic, and of those that somebody watches."""
+        if anew or self._heartbeats % LINKS_TOLD_EVERY == 0:
+            self._lines = msgspec.Raw(encode_json(_links(state, watched)))
+        self._heartbeats += 1
+        return self._lines
+
+
+def report(core: HubCore, *, is_last: bool = False) -> bytes:
+    """Return the account so far, where the radio plane and the capture are, and how the capture does.
+
+    Only the last report has everything as it is at this moment.
+
+    `links` are those with the most traffic, and those that are watched: [from, to, offered, delivered, dropped, mean
+    delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
+    Ages at use are [channel, uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts
+    messages by channel and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime,
+    null if none did. What somebody looks at is under `watched` (`Watching.report`).
+    """
+    state, refused = core.state, core.refusals.by_sender()
+    if state is None:
+        return encode_json({"refused": refused})
+    packets = state.packets
+    lateness = None if core.releases is None else core.releases.lateness
+    return encode_json(
+        {
+            "packets": {
+                "offered": packets.offered,
+                "delivered": packets.delivered,
+                "dropped": packets.dropped,
+                "in_flight": packets.in_flight,
+                "refused": packets.refused,
+            },
+            "refused": refused,
+            "refusals": state.refusals,
+            "links": core.links_told.lines(state, core.watching.links, anew=is_last),
+            "links_in_all": len(state.fabric.states),
+            "clients": sorted(state.members),
+            **core.watching.report(state),
+            "absences": {"boot": core.member.boot, **core.door.absences.report()},
+            "lateness_ms": lateness.as_json() if lateness is not None and lateness.count else None,
+            "capture": core.capture,
+            "recording": core.recording,
+            "disk_progress": core.disk_progress,
+            "radio_address": core.radio_address,
+        }
+    )
+
+
+def _links(state: HubState, watched: Collection[tuple[str, str]]) -> list[list[Any]]:
+    """Return the links that are told, by name."""
+    fabric, now_ns = state.fabric, state.closed * state.tick_ns
+    ages: dict[LinkKey, list[tuple[str, int, int, int]]] = {}
+    for name in state.members:
+        for age in state.ages.of(name, state.closed):
+            key = age.source, name, name_of(fabric.profiles.find(age.source, name, age.channel))
+            p50, p99 = (quantile(age.counts, share) * state.tick_ns for share in (0.5, 0.99))
+            ages.setdefault(key, []).append((age.channel, sum(age.counts.values()), p50, p99))
+    order = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))
+    told = order[:LINKS_TOLD_MAX] + [item for item in order[LINKS_TOLD_MAX:] if item[0][:2] in watched]
+    return [
+        [
+            *key[:2],
+            *(its.offered, its.delivered, its.dropped, its.delay_ns // its.delivered if its.delivered else 0),
+            *(key[2], fabric.queue_ns(key, now_ns), dict(sorted(its.causes.items())), ages.get(key, [])),
+        ]
+        for key, its in sorted(told, key=lambda item: item[0])
+    ]

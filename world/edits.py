@@ -1,0 +1,159 @@
+"""The edits of an order: what adds, removes, pushes, freezes and thaws, and how frame k is edited before it is solved.
+
+Pure, and evaluated by every node alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Annotated
+
+from msgspec import Meta
+
+from foosim.common import limits
+from foosim.common.errors import Malformed
+from foosim.common.struct_types import Message, Name, Vector
+from foosim.world.frame import Frame
+from foosim.world.initial_state import place_ball
+from foosim.world.layout import ADDABLE, BALL, ROBOTS, WORLD, Entity, Layout
+from foosim.world.spec import WorldSpec
+
+
+class Add(Message, frozen=True):
+    """Add entity `name` of `model` at `position` (m, world frame) with `velocity` (m/s)."""
+
+    name: Name
+    model: Name
+    position: Vector
+    velocity: Vector
+
+
+class Remove(Message, frozen=True):
+    """Remove an entity that was added."""
+
+    name: Name
+
+
+class Push(Message, frozen=True):
+    """Give a free body an `impulse` (N s, world frame) at its centre of mass."""
+
+    name: Name
+    impulse: Vector
+
+
+class Freeze(Message, frozen=True):
+    """Take a robot out of service: it holds still, senses nothing, and no packet reaches it (`down` in the frame)."""
+
+    name: Name
+
+
+class Thaw(Message, frozen=True):
+    """Put a robot that was frozen back into service."""
+
+    name: Name
+
+
+class Disrupt(Message, frozen=True):
+    """Do to the network what `event` (JSON as in a deployment, without a time) says: order k's, from frame k+1 on."""
+
+    event: Annotated[str, Meta(max_length=limits.EVENT_BYTES_MAX)]
+
+
+Edit = Add | Remove | Push | Freeze | Thaw | Disrupt
+Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
+
+
+def fitting_edits(layout: Layout, edits: Sequence[Edit]) -> list[Edit]:
+    """Return the edits that do something to a world with this layout, in their order.
+
+    An addition of a name that is taken or to a world without a table, the removal of what was not added, a push of what
+    is no free body and a freeze of what is no robot change nothing, and what happens to the network is the vHub's: a
+    function of the order alone, the same for all who read it.
+    """
+    models = dict(layout.models)
+    addable = ADDABLE if WORLD in layout else frozenset[str]()
+    fitting: list[Edit] = []
+    for edit in edits:
+        if isinstance(edit, Disrupt):
+            continue
+        if isinstance(edit, Add):
+            if edit.name in models or edit.model not in addable:
+                continue
+            models[edit.name] = edit.model
+        elif isinstance(edit, Remove):
+            if edit.name == BALL or models.get(edit.name) not in ADDABLE:
+                continue
+            del models[edit.name]
+        elif isinstance(edit, Freeze | Thaw):
+            if models.get(edit.name) not in ROBOTS:
+                continue
+        elif models.get(edit.name) not in ADDABLE:
+            continue
+        fitting.append(edit)
+    return fitting
+
+
+def layout_after(layout: Layout, edits: Sequence[Edit]) -> Layout:
+    """Return the layout of frame k+1 when order k carries `edits`."""
+    if not edits:
+        return layout
+    models = dict(layout.models)
+    for edit in fitting_edits(layout, edits):
+        if isinstance(edit, Add):
+            models[edit.name] = edit.model
+        elif isinstance(edit, Remove):
+            del models[edit.name]
+    return layout if models == layout.models else Layout(models, layout.sensors)
+
+
+def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[Layout, list[float]]:
+    """Return layout and numbers of the edited frame; the order's edits apply in their order."""
+    layout = layout_after(frame.layout, edits)
+    numbers = frame.numbers.copy() if layout is frame.layout else _moved(frame, layout)
+    for change in fitting_edits(frame.layout, edits) if edits else ():
+        if isinstance(change, Add) and change.name in layout:
+            place_ball(numbers, layout[change.name], change.position, change.velocity)
+        elif isinstance(change, Push) and change.name in layout:
+            _push(numbers, layout, change, spec.table.ball.mass)
+        elif isinstance(change, Freeze | Thaw):
+            _take_out(numbers, layout[change.name], isinstance(change, Freeze))
+    return layout, numbers
+
+
+def check_edits(edits: Sequence[Edit]) -> None:
+    """Raise `Malformed` for an edit with a number that is not finite: it would spoil a frame."""
+    for change in edits:
+        numbers: tuple[float, ...] = ()
+        if isinstance(change, Add):
+            numbers = (*change.position, *change.velocity)
+        elif isinstance(change, Push):
+            numbers = change.impulse
+        if not all(isfinite(number) for number in numbers):
+            raise Malformed(f"{type(change).__name__} with numbers that are not finite: {numbers}")
+
+
+def _moved(frame: Frame, layout: Layout) -> list[float]:
+    """Return a frame's numbers in another layout; entities that are new there are zero."""
+    numbers = [0.0] * layout.size
+    for entity in layout.entities:
+        if entity.name in frame.layout:
+            old = frame.layout[entity.name]
+            numbers[entity.start : entity.stop] = frame.numbers[old.start : old.stop]
+    return numbers
+
+
+def _push(numbers: list[float], layout: Layout, push: Push, mass: float) -> None:
+    """Change the velocity by impulse / mass."""
+    start = layout[push.name].offsets["linear_velocity"]
+    for axis, impulse in enumerate(push.impulse):
+        numbers[start + axis] += impulse / mass
+
+
+def _take_out(numbers: list[float], robot: Entity, is_down: bool) -> None:
+    """Mark a robot as out of service or back in it; what it wants from now on is to be where it is, or to stand."""
+    numbers[robot.offsets["down"]] = float(is_down)
+    wanted = robot.offsets.get("wanted")
+    if wanted is not None:
+        position = robot.offsets.get("joint_positions")
+        numbers[wanted : wanted + 2] = [0.0, 0.0] if position is None else numbers[position : position + 2]

@@ -1,0 +1,1 @@
+"""Sections of a deployment that make a world from few numbers: table and hall."""

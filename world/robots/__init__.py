@@ -1,0 +1,1 @@
+"""Robots as a deployment declares them."""

@@ -1,0 +1,1 @@
+"""What a world does by itself."""
