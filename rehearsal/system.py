@@ -136,7 +136,7 @@ class System:
                 self.soon(lambda: self._hub_again(hub))
 
         self.enter(channels.VHUB, hub, turn, channels.VHUB_READS)
-        self.processes[channels.VHUB].took, self.processes[channels.VHUB].stood = hub.waits.took, hub.door.rest
+        self.processes[channels.VHUB].took, self.processes[channels.VHUB].stood = hub.waits.took, hub.rest
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1

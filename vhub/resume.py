@@ -19,8 +19,8 @@ from foosim.protocol.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.protocol.layout import Layout
 from foosim.protocol.messages import Commit, Deliveries, Down, Epoch
 from foosim.vhub.commits import Committed
+from foosim.vhub.downlinks import retag
 from foosim.vhub.keeping import Keep, KeepEpoch
-from foosim.vhub.naming import in_branch
 from foosim.vhub.packet import received
 from foosim.vhub.records import (
     NONE_AWAY,
@@ -137,11 +137,11 @@ def _name_branch(past: Past) -> None:
     branch = past.state.branch
     if not branch:
         return
-    past.sent = {tick: in_branch(Deliveries, payload, branch) for tick, payload in past.sent.items()}
+    past.sent = {tick: retag(Deliveries, payload, branch) for tick, payload in past.sent.items()}
     if past.published:
-        past.published = in_branch(Deliveries, past.published, branch)
+        past.published = retag(Deliveries, past.published, branch)
     for client, said in past.downlinks.items():
-        past.downlinks[client] = [(number, in_branch(Down, payload, branch)) for number, payload in said]
+        past.downlinks[client] = [(number, retag(Down, payload, branch)) for number, payload in said]
 
 
 def _start(found: Sequence[object], captured: Captured | None, kept_ticks: int) -> int:

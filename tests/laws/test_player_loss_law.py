@@ -104,7 +104,7 @@ class LateNews(HubCore):
 
     def say_heartbeat(self) -> None:
         assert self.state is not None
-        if self.door.absences.report()["over"]:
+        if self.clients.absences.report()["over"]:
             self.left = self.left if self.left >= 0 else self.state.closed
         else:
             super().say_heartbeat()

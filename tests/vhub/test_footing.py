@@ -50,10 +50,10 @@ class Waiting(Storm):
             self.carry(self.hand)
 
     def waits(self) -> bool:
-        return self.hub.footing.waits
+        return self.hub.handshake.waits
 
     def lost_machine(self) -> bool:
-        return self.hub.footing.lost_machine
+        return self.hub.handshake.lost_machine
 
     def take(self) -> Said:
         taken: Said = [*self.hub.actions]
