@@ -28,7 +28,7 @@ from foosim.vhub.members import Here, Member
 from foosim.vhub.memory import Age, Joining, Snapshot
 from foosim.vhub.packet import Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.room import Room
-from foosim.vhub.sendings import Sendings
+from foosim.vhub.sendings import SendOrder
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
 from foosim.vhub.transit import TRANSIT_FULL, Transit
 
@@ -66,7 +66,7 @@ class HubState:
         """What the last closing tells of them."""
         self._flights: dict[int, list[Flight]] = {}
         """What is in flight, by the tick at which it arrives."""
-        self._sendings = Sendings(lambda flights, dropped: None)
+        self._sendings = SendOrder()
         """What clients have sent at the last closed tick."""
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
@@ -164,7 +164,7 @@ class HubState:
         self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
         for cause, count in self.refused_at_door:
             self.refuse(cause, count)
-        sendings = self._sendings = Sendings(lambda flights, dropped: self._send(flights, tick, dropped))
+        sendings = self._sendings = SendOrder()
         has_radios = self.fabric.profiles.on_radio
         shares = has_radios and any(not self._is_apart(flight) for flight in self._flights.get(tick + 1, ()))
         for source in sorted(admitted, key=lambda name: (self.fabric.phase_ns(name), name)):
@@ -182,11 +182,14 @@ class HubState:
                 to_robot = has_radios and sent.destination in self._robots
                 is_apart = to_robot and self._is_apart(flights[0])
                 shares = shares or (to_robot and not is_apart)
-                sendings.send(flights, now=is_apart or not has_radios)
+                if is_apart or not has_radios:
+                    self._send(flights, tick, sendings.dropped)
+                else:
+                    sendings.defer(flights)
             if self._sequence_of(source) > before and not self.members[source].period:
                 self.ages.used(source, tick)
         if shares:
-            sendings.judge_rest()
+            self._send_waiting(tick)
         self.closed = tick
         self.aged = self.ages.take(tick)
         deliveries = self._arrive_at_robots(tick + 1, sendings.arrived)
@@ -202,8 +205,13 @@ class HubState:
 
     def close_rest(self) -> list[Flight]:
         """Judge what `close_robots` has left; return the packets whose fate is final by phase two."""
-        self._sendings.judge_rest()
+        self._send_waiting(self.closed)
         return self._sendings.fates()
+
+    def _send_waiting(self, tick: int) -> None:
+        """Judge what was sent at a tick and waits for its turn."""
+        for flights, dropped in self._sendings.take_waiting():
+            self._send(flights, tick, dropped)
 
     def _is_apart(self, flight: Flight) -> bool:
         """Whether a packet's fate has to do with that of no packet on another link; what goes to clients counts so."""
