@@ -15,6 +15,7 @@ from typing import Final
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.impairments import Burst, GilbertElliott, Impairments, Markov4, TableJitter
+from foosim.protocol.link_settings import NO_RADIO, Profiles, over, preset_radio
 from foosim.protocol.network import Network
 from foosim.protocol.radio_references import unheeded
 from foosim.protocol.radios import Radio
@@ -22,7 +23,6 @@ from foosim.protocol.traces import read_opportunities, read_table
 from foosim.vhub.jitter import interpolate_ns, moments_ns, quantiles_ns
 from foosim.vhub.lint_offers import flows_of, offered_hz, used_links
 from foosim.vhub.lint_phase import phase_warnings
-from foosim.vhub.profiles import NO_RADIO, Profiles, over, preset_radio
 from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (
@@ -125,12 +125,12 @@ class Meaning:
 def uses_of(deployment: Deployment) -> list[Use]:
     """Return the settings of all links of a deployment, in the order of rules, and radios that no link uses; the
     example of each is a link that carries packets, if there is one."""
-    network, profiles = deployment.network, Profiles(deployment, deployment.network)
+    network, profiles = deployment.network, Profiles(deployment.network, deployment.carriers())
     used = used_links(flows_of(deployment, profiles))
     found: dict[tuple[str, str], Use] = {}
     endpoints = deployment.endpoints()
     pairs = ((source, destination) for source in endpoints for destination in endpoints if source != destination)
-    for source, destination, rule in ((*pair, rule) for pair in pairs for rule in network.rules_for(*pair)):
+    for source, destination, rule in ((*pair, rule) for pair in pairs for rule in profiles.rules_for(*pair)):
         profile = profiles.of_rule(rule, source, destination)
         key = profile.rule, profile.radio
         known, carrying = found.get(key), used.get(key, set())
@@ -166,7 +166,7 @@ def uses_alone(network: Network) -> list[Use]:
 def meanings(deployment: Deployment) -> list[Meaning]:
     """Return what the network of a deployment means; the deployment has its files."""
     uses = uses_of(deployment)
-    offered = offered_hz(flows_of(deployment, Profiles(deployment, deployment.network)))
+    offered = offered_hz(flows_of(deployment, Profiles(deployment.network, deployment.carriers())))
     files = deployment.asset_files
     phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])
     found = []

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from foosim.protocol.link_settings import preset_radio
 from foosim.protocol.radios import LORA_LONGEST, Radio
 from foosim.vhub.figures import rate_text
-from foosim.vhub.profiles import preset_radio
 from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import LRWPAN_OVERHEAD_BYTES, WIFI_ACK_BYTES, WIFI_OVERHEAD_BYTES

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.link_settings import NO_RADIO, ON_BOARD, Profile, Profiles
 from foosim.protocol.network import LinkRule
 from foosim.vhub.lint import Use, meaning_of
 from foosim.vhub.lint_text import meaning_line
-from foosim.vhub.profiles import NO_RADIO, ON_BOARD, Profile, Profiles
 from foosim.vhub.settings_text import impairments_text, radio_text, rule_ends
 
 
@@ -23,9 +23,9 @@ def rule_text(deployment: Deployment, source: str, destination: str) -> str:
     """
     if not {source, destination} <= {*deployment.endpoints()}:
         return ""
-    network, profiles = deployment.network, Profiles(deployment, deployment.network)
+    profiles = Profiles(deployment.network, deployment.carriers())
     lines: list[str] = []
-    for rule in network.rules_for(source, destination):
+    for rule in profiles.rules_for(source, destination):
         profile = profiles.of_rule(rule, source, destination)
         lines += _lines(deployment, rule, profile)
     return "\n".join(lines)
