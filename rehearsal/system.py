@@ -35,7 +35,7 @@ from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.keeping import RecordClosing, RecordEpoch
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
 
@@ -344,11 +344,11 @@ class System:
                 self.journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
-        elif isinstance(action, Keep):
+        elif isinstance(action, RecordClosing):
             self.hub_journal.captured_tick = action.closing.frame.tick
             if settings.on_closing is not None:
                 settings.on_closing(action.closing)
-        elif isinstance(action, KeepEpoch):
+        elif isinstance(action, RecordEpoch):
             self.hub_journal.captured_epoch = action.epoch.epoch
             if settings.on_epoch is not None:
                 settings.on_epoch(action.epoch)

@@ -139,10 +139,10 @@ SHELLS = {
     "vhub/capture_reader.py",
     "vhub/capture_recovery.py",
     "vhub/capture_split.py",
-    "vhub/capture_standing.py",
     "vhub/capture_writer.py",
     "vhub/disk_progress.py",
     "vhub/earlier_crc.py",
+    "vhub/in_force.py",
     "vhub/main.py",
     "vhub/room_watch.py",
 }

@@ -1,8 +1,4 @@
-"""What the vHub's loop runs once its run has ended, until the capture is closed: it shows that it lives, and how far it
-is, and takes nothing more.
-
-Neighbours: `core` has decided all that there was, `capture_writer` closes, `supervisor.closing` waits.
-"""
+"""The vHub's core between the end of its run and the end of its capture: it sends heartbeats and takes nothing."""
 
 from __future__ import annotations
 
@@ -16,7 +12,7 @@ from foosim.vhub.core import HubCore
 
 
 class ClosingCore:
-    """The core of a vHub that closes its capture. `actions` is what the shell performs next."""
+    """Sends the heartbeat of a vHub that closes its capture. `actions` is what the shell performs next."""
 
     def __init__(self, core: HubCore) -> None:
         self.actions: list[Any] = core.actions
@@ -26,7 +22,7 @@ class ClosingCore:
         """Drop a message: the run has ended."""
 
     def wake(self, now_ns: int) -> None:
-        """Say the heartbeat when it is due; the report in it has the account of the capture."""
+        """Send the heartbeat when it is due; its report has the state of the capture."""
         self._core.member.wake(now_ns, self._heartbeat)
 
     def deadline_ns(self) -> int:

@@ -57,7 +57,7 @@ from foosim.protocol.start import added_to, first_chain
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Clients, lost
 from foosim.vhub.downlinks import retag
-from foosim.vhub.keeping import Keep, KeepEpoch, Keeping, last_closings
+from foosim.vhub.keeping import CaptureQueue, RecordClosing, RecordEpoch, last_closings
 from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.release import Releases
@@ -65,10 +65,10 @@ from foosim.vhub.report import HubStatistics, LinksTold, ShellStatus, report, re
 from foosim.vhub.resume import Past
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
-from foosim.vhub.waits import Waits
+from foosim.vhub.waits import WaitTimes
 from foosim.vhub.watching import Watching
 
-HubAction = Action | Keep | KeepEpoch
+HubAction = Action | RecordClosing | RecordEpoch
 
 
 class _Step(Enum):
@@ -137,7 +137,7 @@ class HubCore:
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
-        self.waits = Waits()
+        self.waits = WaitTimes()
         hooks = self.say_heartbeat, self.give_up
         self.clients = Clients(self.sessions, self.actions, self.waits, *hooks)  # type: ignore[arg-type]
         self.handshake, self.orphan = ResumeHandshake(machine), Orphan()
@@ -153,7 +153,7 @@ class HubCore:
         self.epoch = self._epoch_tick = self._end_ns = self._malformed = self._repeated = 0
         self.epoch_payload = b""
         self._owners: dict[str, str] = {}
-        self._keeping = Keeping()
+        self._keeping = CaptureQueue()
         self.commits = Commits()
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
@@ -477,7 +477,7 @@ class HubCore:
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
         self.clients.go_on(past.inputs, past.absences, now_ns)
-        self.actions += past.words()
+        self.actions += past.actions()
         if past.epoch is not None:
             self._take_epoch(past.epoch)
             self.handshake.begin(past.machine, past.published, past.owing)
@@ -514,7 +514,7 @@ class HubCore:
             return
         branches = self.state.turn_to(epoch)
         self._take_epoch(epoch)
-        self.actions += [Journal(self.epoch_payload), KeepEpoch(epoch)]
+        self.actions += [Journal(self.epoch_payload), RecordEpoch(epoch)]
         if branches:
             self._branch_off(self.state)
         self._enter()
@@ -678,7 +678,7 @@ class HubCore:
         self.finished = True
         self._release(now_ns)
         half = None if self._world is None else self._world.closing  # a tick that is half closed has fates
-        self.actions += map(Keep, last_closings(self.state, self.commits, self.ended.tick, half, now_ns))
+        self.actions += map(RecordClosing, last_closings(self.state, self.commits, self.ended.tick, half, now_ns))
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1

@@ -26,7 +26,7 @@ from foosim.vhub.records import AbsencesRecord, Closing, InputsRecord
 from foosim.vhub.release import Releases
 from foosim.vhub.sessions import Session, Sessions
 from foosim.vhub.state import HubState
-from foosim.vhub.waits import Waits
+from foosim.vhub.waits import WaitTimes
 
 LOST_MEANWHILE: Final = "its process was lost while the vHub was away"
 
@@ -38,7 +38,7 @@ class Clients:
         self,
         sessions: Sessions,
         actions: list[Action],
-        waits: Waits,
+        waits: WaitTimes,
         report: Callable[[], None],
         give_up: Callable[[str], None],
     ) -> None:

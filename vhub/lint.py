@@ -1,8 +1,7 @@
 """What a network means, in the figures that people think in: mean loss, bursts, delay, airtime, throughput, range.
 
 Nothing here decides a fate: the same formulas as in the stages, asked for their means. Ranges are without shadowing and
-fading, of ends 1.5 m above the ground where no place is written, and antennas mounted as they are. Neighbours:
-`profiles` (which settings are a link's), `stages`, `radio`; `foosim-net lint` and the start of a run print it.
+fading, of ends 1.5 m above the ground where no place is written, and antennas mounted as they are.
 """
 
 from __future__ import annotations

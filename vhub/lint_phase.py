@@ -1,6 +1,6 @@
 """What sensor and player make of a delay: where both act at fixed moments, the phase between them adds to every packet.
 
-Pure: `lint` asks, and has the delays. Neighbours: `ages` counts in a run what is foretold here.
+Pure: `lint` asks, and has the delays.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The process `foosim-vhub`: the vHub's core between both planes, its journal and the capture.
 
 It is a client of the simulation plane and the router of the radio plane. Nothing bridges the two but the core. What the
-core writes goes to the journal before it is spoken; the capture follows behind, from a thread of its own. Neighbours:
-`core` decides, `capture_writer`, `protocol.journal`, `protocol.loop`.
+core writes goes to the journal before it is spoken; the capture follows behind, from a thread of its own.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.closing import ClosingCore
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.keeping import RecordClosing, RecordEpoch
 from foosim.vhub.link_models import check_link_models
 from foosim.vhub.lint import meanings
 from foosim.vhub.lint_text import start_lines
@@ -348,9 +347,9 @@ class HubProcess:
             kept = min(kept, self._capture.synced_tick)
         journal.forget_before(kept)
 
-    def _keep(self, action: Keep | KeepEpoch) -> None:
+    def _keep(self, action: RecordClosing | RecordEpoch) -> None:
         if self._capture is not None:
-            self._capture.keep(action.closing if isinstance(action, Keep) else action.epoch)
+            self._capture.keep(action.closing if isinstance(action, RecordClosing) else action.epoch)
 
     def _on_say(self, say: Say) -> None:
         if self._capture is not None and not self._is_closing:

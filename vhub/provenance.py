@@ -1,7 +1,7 @@
 """Where the numbers come from that media have beside their settings: what `foosim-net presets` prints below a preset's.
 
 The numbers are those of the modules that hold them, so what is printed is what decides. The marks before the sources
-are those of `protocol.presets`. Neighbours: `radio` (timings, errors, path loss), `stages.medium` (which a radio has).
+are those of `protocol.presets`.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ world must remember of a client is in `state`.
 
 A hello reserves a name, a Join takes it. A hello may come late, of a process whose end this vHub has not seen: it was
 away, or its news came first. Where that can be, a reservation keeps nobody out: all are welcomed, and the first that
-joins has the name. Neighbours: `core`, `door` (what clients say), `downlinks`.
+joins has the name.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""The hub's state as a value, and the closing of a tick as a function of it.
+"""The vHub's state as a value, and the closing of a tick as a function of it.
 
-Closing tick k has two phases. *World*: what robots sent at k is judged; the clients due get what has reached them.
-*Clients*: what clients sent is judged; the deliveries of tick k+1 are final. Fates know frames, times and draws, never
-nodes. The journal holds the inputs of every closing, so a fold of it through this same class gives the state again,
-byte for byte. Neighbours: `core` (waits, speaks, writes), `links`, `records`.
+Closing tick k has two phases. *World*: the packets that robots sent at k are judged; the clients that are due receive
+what has arrived. *Clients*: the packets that clients sent are judged; the deliveries of tick k+1 are final. Fates
+depend on frames, times and draws, never on nodes. The journal holds the inputs of every closing, so a fold of it
+through this class gives the state again, byte for byte.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from foosim.vhub.fabric import Fabric, Link
 from foosim.vhub.members import Here, Member
 from foosim.vhub.memory import Age, Joining, Snapshot
 from foosim.vhub.packet import Flight, Packets, content_of, flight_of, order_of, state_of
-from foosim.vhub.room import Room
+from foosim.vhub.room import ReceiveBudget
 from foosim.vhub.sendings import SendOrder
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL
-from foosim.vhub.transit import TRANSIT_FULL, Transit
+from foosim.vhub.transit import TRANSIT_FULL, InFlightLimit
 
 OUTBOX_SHIFT = 16
 """A robot's sequence number is tick x 2^16 + index."""
@@ -71,7 +71,7 @@ class HubState:
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
-        self._transit = Transit(len(self._endpoints))
+        self._transit = InFlightLimit(len(self._endpoints))
         self._here = Here(deployment)
 
     def turn_to(self, epoch: Epoch) -> bool:
@@ -399,7 +399,7 @@ class HubState:
         arriving = self._take_arrivals(tick, to_robots=False)
         if not arriving:
             return released
-        room, world = Room(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False), self.fabric.world
+        room, world = ReceiveBudget(arriving, limits.CLIENT_BYTES_PER_TICK_MAX, is_shared=False), self.fabric.world
         judged: list[Flight] = []
         if turns:  # what makes them act is judged first: with it comes what else is there
             arriving.sort(key=self._here.calls, reverse=True)
@@ -434,7 +434,7 @@ class HubState:
         arriving = self._take_arrivals(tick, to_robots=True)
         if not arriving:
             return deliveries
-        room, world = Room(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True), self.fabric.world
+        room, world = ReceiveBudget(arriving, limits.ROBOTS_BYTES_PER_TICK_MAX, is_shared=True), self.fabric.world
         for flight in arriving:
             fates.append(flight)
             to = flight.destination

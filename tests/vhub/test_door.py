@@ -14,7 +14,7 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.hub_messages import Proceed
 from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Down, Epoch, Failure, Go, Join, Tempo
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep
+from foosim.vhub.keeping import RecordClosing
 from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.resume import recall
 from foosim.vhub.sessions import BOOTS_KEPT
@@ -63,14 +63,14 @@ def test_a_client_leaves_once_however_often_it_comes_and_goes() -> None:
     hub.core.client_gone("ear", 0)
     for tick in range(1, 5):
         hub.close(tick)
-    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, Keep)]
+    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, RecordClosing)]
     assert [leaves for leaves in left if leaves] == [["ear"]]
     for tick in range(5, 15):
         if hub.state.hears_clients:
             hub.enter("ear", boot=f"at {tick}")
             hub.core.client_gone("ear", 0)
         hub.close(tick)
-    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, Keep)]
+    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, RecordClosing)]
     assert [leaves for leaves in left if leaves] == [["ear"]], "who has left cannot leave"
 
 
