@@ -33,8 +33,7 @@ from foosim.rehearsal.people import OPERATOR, People
 from foosim.rehearsal.settings import AtWork, Process, Settings
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub.closing import ClosingCore
-from foosim.vhub.core import HubCore
+from foosim.vhub.core import ClosingCore, HubCore
 from foosim.vhub.keeping import RecordClosing, RecordEpoch
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]

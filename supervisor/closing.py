@@ -3,7 +3,7 @@
 The account of the capture in the vHub's heartbeats shows whether it does, and what the disk does while the file is
 brought to it. One that stands still for
 `deadlines.close`, or whose vHub ends meanwhile, is cut off: an error, though the run itself may have been in order.
-Neighbours: `core` asks, `status` has the result, `vhub.closing` is the other side.
+Neighbours: `core` asks, `status` has the result, `vhub.core` is the other side.
 """
 
 from __future__ import annotations

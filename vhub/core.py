@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+from msgspec.structs import replace
+
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
 from foosim.protocol.channels import Channel
@@ -26,6 +28,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.hub_messages import Proceed, Standing
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
+    CAPTURE,
     DONE_OF,
     JOIN_OF,
     SAMPLES_OF,
@@ -138,7 +141,7 @@ class HubCore:
         self.member = Member("vhub", channels.VHUB, boot, fingerprint, world, self.actions, now_ns)  # type: ignore[arg-type]
         self.sessions = Sessions(boot, self.actions)  # type: ignore[arg-type]
         self.waits = WaitTimes()
-        hooks = self.say_heartbeat, self.give_up
+        hooks = self.send_heartbeat, self.give_up
         self.clients = Clients(self.sessions, self.actions, self.waits, *hooks)  # type: ignore[arg-type]
         self.handshake, self.orphan = ResumeHandshake(machine), Orphan()
         self.deployment: Deployment | None = None
@@ -182,7 +185,7 @@ class HubCore:
     # --- what the shell calls --------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Take one message as it came; what does not fit is counted and dropped."""
+        """Take one message; a malformed or misplaced one is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
                 self._repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
@@ -283,7 +286,7 @@ class HubCore:
 
     @property
     def waiting_for(self) -> str:
-        """What the closing of the current tick lacks, for people and for the supervisor."""
+        """What the closing of the current tick waits for, for people and for the supervisor."""
         if self.state is None:
             return "start"
         if self.handshake.waits:
@@ -308,7 +311,7 @@ class HubCore:
     # --- closing a tick ----------------------------------------------------------------------------------------------
 
     def _close_world(self, now_ns: int) -> bool:
-        """Phase one, when commit and all samples are there: judge what robots sent, say Go."""
+        """Phase one, when commit and all samples have come: judge what robots sent, send Go."""
         state = self.state
         assert state is not None
         tick = state.closed + 1
@@ -353,7 +356,7 @@ class HubCore:
             state.members[name].downlink += 1
         record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
         self.actions.append(Journal(record))
-        self.clients.say_owed(world.closing, now_ns)
+        self.clients.send_owed(world.closing, now_ns)
         self.clients.tell()
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         if not state.was_final:
@@ -395,7 +398,7 @@ class HubCore:
         self._patience.progress(state.tick_ns, world.sent_ns)
 
     def _tell_of_waits(self, now_ns: int) -> None:
-        """Before late deliveries, tell the supervisor whom they waited for."""
+        """Before late deliveries, report to the supervisor what they waited for."""
         assert self.releases is not None and self.state is not None
         factor = self.releases.factor
         text = self.waits.close(now_ns, int(self.state.tick_ns / factor / 2) if factor else limits.COUNTER_MAX)
@@ -426,7 +429,7 @@ class HubCore:
         )
 
     def _release(self, now_ns: int) -> None:
-        """Say what is released to free-running clients by now; closings of which nothing waits go to the capture."""
+        """Send what is released to free-running clients by now; closings of which nothing waits go to the capture."""
         if self.releases is None or self.state is None:
             return
         for release in self.releases.take(now_ns, everything=self.finished):
@@ -435,7 +438,7 @@ class HubCore:
             member = self.state.members[release.client]
             packets, branch = received(release.flights), self.state.branch
             down = Down(release.number, release.tick, member.sequence, packets, False, branch)
-            self.sessions.say_down(release.client, down, now_ns)
+            self.sessions.send_down(release.client, down, now_ns)
         self.actions += self._keeping.take(self.releases.waiting_tick)
 
     # --- messages ----------------------------------------------------------------------------------------------------
@@ -598,7 +601,7 @@ class HubCore:
         for payload in handshake.published:
             self.actions.append(Publish(channels.DELIVERIES, channels.VHUB, payload))
         for name in handshake.owing:
-            self.sessions.say_again(name, state.members[name].downlink)
+            self.sessions.resend(name, state.members[name].downlink)
         for tick in range(state.closed + 1, state.final + 2):
             for kind in (channels.COMMIT, channels.SAMPLES):
                 want = encode(Want(channels.VHUB, kind.name, tick, self.epoch, []))
@@ -635,22 +638,22 @@ class HubCore:
         self._patience.asked(now_ns)
 
     def lose(self, name: str, why: str) -> None:
-        """What the run cannot do without is lost: a client, the capture, room for the journal."""
+        """End the run, since it has lost what it cannot do without: a client, the capture, space for the journal."""
         self.give_up(lost(name, why))
 
     def give_up(self, reason: str) -> None:
-        """The run cannot go on: the supervisor ends it for the first reason that it hears."""
+        """Ask the supervisor to end the run; the first reason counts."""
         if not self.lost:
             self.lost = reason
             self.actions.append(Say("error", reason))
-            self.say_heartbeat()
+            self.send_heartbeat()
 
-    def say_heartbeat(self) -> None:
-        """Say at once what the next heartbeat would."""
+    def send_heartbeat(self) -> None:
+        """Send a heartbeat at once."""
         self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(self.heartbeat())))
 
     def heartbeat(self) -> Heartbeat:
-        """Return what it says of itself."""
+        """Return the heartbeat of now."""
         tick = 0 if self.state is None else self.state.closed + 1
         return Heartbeat(channels.VHUB, tick, self.epoch, self.waiting_for, self.lost, self.busy, self._report())
 
@@ -670,7 +673,7 @@ class HubCore:
             self._end_ns = now_ns + limits.DOWNLINK_KEPT_NS
 
     def _finish(self, now_ns: int) -> None:
-        """Record what is committed and not closed, and what is in flight; tell the clients. The shell says farewell."""
+        """Record what is committed and not closed, and what is in flight; notify the clients."""
         assert self.state is not None and self.ended is not None
         lacks = self.ended.tick not in self.commits
         if lacks and self.state.closed + 1 >= self.ended.tick and now_ns < self._end_ns:
@@ -682,8 +685,30 @@ class HubCore:
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1
-            self.sessions.say_down(name, Down(number, self.ended.tick, 0, [], True, self.state.branch), now_ns)
+            self.sessions.send_down(name, Down(number, self.ended.tick, 0, [], True, self.state.branch), now_ns)
 
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""
         return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, self._report(is_last=True))))
+
+
+class ClosingCore:
+    """Sends the heartbeat of a vHub that closes its capture. `actions` is what the shell performs next."""
+
+    def __init__(self, core: HubCore) -> None:
+        self.actions: list[Any] = core.actions
+        self._core = core
+
+    def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
+        """Drop a message: the run has ended."""
+
+    def wake(self, now_ns: int) -> None:
+        """Send the heartbeat when it is due; its report has the state of the capture."""
+        self._core.member.wake(now_ns, self._heartbeat)
+
+    def deadline_ns(self) -> int:
+        """When `wake` has something to do next."""
+        return self._core.member.deadline_ns
+
+    def _heartbeat(self) -> Heartbeat:
+        return replace(self._core.heartbeat(), waiting_for=CAPTURE)

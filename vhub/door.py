@@ -124,7 +124,7 @@ class Clients:
         for flight in flights:
             flight.released_wall_ns = now_ns
         go = Go(member.downlink, tick, member.sequence, received(flights), self._state.branch)
-        self._sessions.say_go(session, go)
+        self._sessions.send_go(session, go)
         session.deadline = "lockstep_realtime" if self._releases.factor else "lockstep_fast"
         allowed_ns: int = getattr(self._deployment.deadlines, f"{session.deadline}_ns")
         session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * self._deployment.tick_ns))
@@ -222,7 +222,7 @@ class Clients:
 
     def _joining(self, join: Join) -> Session | None:
         """Return the session of a process that joins. One that was welcomed while another one had its name gets it
-        where that has not joined, and is refused where it has."""
+        if that has not joined, and is refused otherwise."""
         session = self._sessions.by_name.get(join.name)
         if self._sessions.is_for_another(join):
             self.repeated += 1
@@ -247,7 +247,7 @@ class Clients:
         return session
 
     def _said(self, name: str) -> int | None:
-        """Return the last downlink that was said to a client: not the Go that it has not answered, nor what waits."""
+        """Return the last downlink sent to a client: neither a Go without a Done nor one that is yet to be released."""
         member = None if self._state is None else self._state.members.get(name)
         if member is None or self._releases is None:
             return None
@@ -280,13 +280,13 @@ class Clients:
         self._leave(name)
 
     def _miss(self, name: str, boot: str, reason: str) -> None:
-        """Note that a player's process is away from a run that has begun."""
+        """Record that a player's process is away from a run that has begun."""
         if self._deployment is not None and may_restart(self._deployment, name) and self.has_begun:
             self.absences.begin(name, boot, reason, self._tick)
             self.tell()
 
     def tell(self) -> None:
-        """Tell the supervisor at once of whoever has gone or come, when that is written: a run may end soon."""
+        """Report new absences and returns at once, after their record: a run may end soon."""
         if self.absences.is_new:
             self.absences.is_new = False
             self._actions.append(Journal(encode(self.absences.record())))
@@ -305,7 +305,7 @@ class Clients:
         return may_restart(self._deployment, name) and is_realtime and self.has_begun
 
     def _turn_to_pace(self, now_ns: int) -> None:
-        """The run goes by the wall clock now, or does not any more: players that are away have the time of then."""
+        """The pace has turned to or from realtime: give players that are away the deadline of the new pace."""
         deployment = self._deployment
         for name, session in self._sessions.by_name.items():
             if session.away_ns >= 0 and deployment is not None and may_restart(deployment, name):
@@ -360,7 +360,7 @@ class Clients:
         return session.why_gone if session.boot else "it did not come back to the vHub"
 
     def _go_on_without(self, name: str) -> None:
-        """A player leaves until it is started again: at the tick whose Done it owes, or at the next one."""
+        """Have a player leave until its process is restarted: at the tick whose Done it owes, or at the next one."""
         self._sessions.joins.pop(name, None)
         self._sessions.by_name[name].answered()
         if self.waits_for(name):
@@ -370,17 +370,17 @@ class Clients:
             self._leaves.append(name)
 
     def leave_owing(self, state: HubState, closing: Closing) -> None:
-        """Let those go without whose Dones the tick is closed; its record says so, before anything else does."""
+        """Have the clients leave without whose Dones the tick is closed; its record is the first to name them."""
         closing.owing += sorted(self._owing)
         for name in closing.owing:
             state.leave(name)
             self.absences.leave(name, closing.frame.tick)
         self._owing = []
 
-    def say_owed(self, closing: Closing, now_ns: int) -> None:
-        """Behind the record of a tick, say what its Go had to the processes that come for those who left owing."""
+    def send_owed(self, closing: Closing, now_ns: int) -> None:
+        """After the record of a tick, send the packets of its Go to the clients that left without a Done."""
         for name in closing.owing:
-            self._sessions.say_owed(name, now_ns)
+            self._sessions.send_owed(name, now_ns)
 
     def _is_waited_for(self, name: str) -> bool:
         """Whether the run waits for a client: it is in lockstep, or the tick that is being closed goes by its Done."""

@@ -52,11 +52,10 @@ from foosim.protocol.session_settings import Security
 from foosim.vhub.capture_contents import check_new, ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.closing import ClosingCore
-from foosim.vhub.core import HubCore
+from foosim.vhub.core import ClosingCore, HubCore
 from foosim.vhub.keeping import RecordClosing, RecordEpoch
 from foosim.vhub.link_models import check_link_models
-from foosim.vhub.lint import meanings
+from foosim.vhub.lint import summaries
 from foosim.vhub.lint_text import start_lines
 from foosim.vhub.records import Closing, first_head
 from foosim.vhub.resume import Captured, end_of, first_tick_of, last_tick_of, recall, was_captured
@@ -288,7 +287,7 @@ class HubProcess:
         if self._capture is not None and past is not None and past.known is not None:
             self._capture.keep(Closing(past.known, past.known.digest, [], []))  # which it has: it goes on from there
         core.begin(past, now_ns)
-        for line in start_lines(meanings(deployment), build.deployment_name) if past is None else ():
+        for line in start_lines(summaries(deployment), build.deployment_name) if past is None else ():
             self._log.info(line)
 
     def _refusal(self, build: Build, records: list[bytes], damaged: JournalDamaged) -> Refused:

@@ -33,7 +33,7 @@ _READ: Final = ("best_effort", "voice")
 _LORAWAN: Final = "signetlabdei/lorawan"
 
 
-def held(preset: str) -> Iterator[Row]:
+def parameters_of(preset: str) -> Iterator[Row]:
     """Yield (name, value, source) of each number that decides on a preset's links and is no setting."""
     settings = preset_radio(preset)
     if not settings.is_on_air:

@@ -138,10 +138,10 @@ def _any_done(planting: Planting) -> None:
 
 @register("downlinks are not numbered", "each downlink has the next number", 1)
 def _same_number(planting: Planting) -> None:
-    def say_go(self: Any, session: Any, go: Any) -> None:
+    def send_go(self: Any, session: Any, go: Any) -> None:
         before(self, session, replace(go, number=go.number - go.number % 2))
 
-    before: Any = planting.swap(Sessions, "say_go", say_go)
+    before: Any = planting.swap(Sessions, "send_go", send_go)
 
 
 @register("fold forgets downlinks", "a fold of the journal gives the state again", 1)
@@ -195,7 +195,7 @@ def _unwritten_leave(planting: Planting) -> None:
 
 @register("what is owed is not said", "what the Go of who leaves owing had is said behind the record", 127)
 def _unsaid(planting: Planting) -> None:
-    planting.swap(Sessions, "say_owed", lambda self, name, now_ns: None)
+    planting.swap(Sessions, "send_owed", lambda self, name, now_ns: None)
 
 
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.link_settings import NO_RADIO, ON_BOARD, Profile, Profiles
 from foosim.protocol.network import LinkRule
-from foosim.vhub.lint import Use, meaning_of
-from foosim.vhub.lint_text import meaning_line
+from foosim.vhub.lint import SharedSettings, summary_of
+from foosim.vhub.lint_text import summary_line
 from foosim.vhub.settings_text import impairments_text, radio_text, rule_ends
 
 
@@ -48,5 +48,5 @@ def _lines(deployment: Deployment, rule: LinkRule | None, profile: Profile) -> I
         yield f"radio {profile.radio}: preset {radio.preset}{', ' if written else ''}{written}"
     elif profile.rule != ON_BOARD:
         yield f"defaults: preset {network.defaults.preset}"
-    meaning = meaning_of(Use(profile.rule, profile.radio, profile.settings), deployment.asset_files)
-    yield f"which is {meaning_line(meaning)}"
+    summary = summary_of(SharedSettings(profile.rule, profile.radio, profile.settings), deployment.asset_files)
+    yield f"which is {summary_line(summary)}"
