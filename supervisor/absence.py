@@ -7,7 +7,7 @@ Neighbours: `watch` finds that it is silent, `recovery` has the account, `core` 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
@@ -46,6 +46,7 @@ class Absence:
             core.roster.lose(process)
         if self.is_away:
             return
+        self._since_ns, self._reason, self._lost_at = now_ns, reason, (core.epoch, core.frame.tick)
         if not core.is_open:  # it is waited for as those are who have not come yet
             if core.take_over is not None:
                 core.take_over.lose_hub()
@@ -53,9 +54,12 @@ class Absence:
             return
         told = None if process is None else process.heartbeat
         self._tick = told.tick if told is not None and "overdue" in reason else -1
-        self.is_away, self._since_ns, self._gap_ns = True, now_ns, 0
-        self._reason, self._lost_at = reason, (core.epoch, core.frame.tick)
+        self.is_away, self._gap_ns = True, 0
         core.say("warning", f"lost the vHub: {reason}; the run waits for it at tick {core.frame.tick}")
+
+    def as_json(self, now_ns: int) -> dict[str, Any]:
+        """Return why the vHub was lost last, at which tick, and how many seconds of wall time ago."""
+        return {"reason": self._reason, "tick": self._lost_at[1], "for_s": round((now_ns - self._since_ns) / 1e9, 1)}
 
     def hear(self, now_ns: int) -> None:
         """The vHub that is lost is heard of: it is back, unless that was said before it went, or it still stands."""

@@ -2,13 +2,14 @@
 
 A node's load is the share of its time in which its loop does not sleep, as its heartbeats tell. A move is an epoch as
 any other: the world does not notice. A robot's cost is taken to be an equal share of its node's load; it moves only
-when that makes the two nodes more alike, and then the loads settle before the next one. Neighbours: `core` asks at its
-wakes, `recovery` gives robots back to nodes that return.
+when that makes the two nodes more alike, and then the loads settle before the next one. Where an operator asks for it,
+all move at once of which that is expected. Neighbours: `core` asks at its wakes, `requests` when an operator does,
+`recovery` gives robots back to nodes that return.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -38,6 +39,47 @@ class Shift:
     target_load: float
 
 
+def best_shift(
+    loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str], stay: Collection[str]
+) -> Shift | None:
+    """Return which robot should move now, if any, but none of those that `stay`: from the busiest to the idlest node,
+    and home rather than elsewhere."""
+    source = max(sorted(loads), key=lambda name: loads[name])
+    target = min(sorted(loads), key=lambda name: loads[name])
+    mine = sorted(robot for robot, owner in owners.items() if owner == source)
+    difference = loads[source] - loads[target]
+    if len(mine) < 2 or difference <= max(WORTH, loads[source] / len(mine)):
+        return None
+    free = [robot for robot in mine if robot not in stay]
+    if not free:
+        return None
+    robot = min(free, key=lambda name: (homes.get(name) != target, name))
+    return Shift(robot, source, target, loads[source], loads[target])
+
+
+def shifts_at_once(loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str]) -> list[Shift]:
+    """Return all that should move if each takes its share of the load with it; a node gives, or takes. The loads in a
+    shift are those that were measured."""
+    expected, placed = dict(loads), dict(owners)
+    shifts: list[Shift] = []
+    while (shift := best_shift(expected, placed, homes, {known.robot for known in shifts})) is not None:
+        if any(shift.source == known.target or shift.target == known.source for known in shifts):
+            break
+        share = shift.source_load / sum(owner == shift.source for owner in placed.values())
+        expected[shift.source] -= share
+        expected[shift.target] += share
+        placed[shift.robot] = shift.target
+        shifts.append(Shift(shift.robot, shift.source, shift.target, loads[shift.source], loads[shift.target]))
+    return shifts
+
+
+def loads_of(core: SupervisorCore) -> dict[str, float]:
+    """Return the load of each node that takes part and has told it."""
+    known = core.roster.by_name
+    beats = {name: known[name].heartbeat for name in core.members if name in known}
+    return {name: beat.busy for name, beat in beats.items() if beat is not None}
+
+
 class Balancer:
     """Decides when which robot moves. Loads are shares of a core, from 0 to 1."""
 
@@ -58,29 +100,20 @@ class Balancer:
             name: load if name not in before else SMOOTHING * load + (1 - SMOOTHING) * before[name]
             for name, load in loads.items()
         }
-        means = self._means
-        source = max(sorted(means), key=lambda name: means[name])
-        target = min(sorted(means), key=lambda name: means[name])
-        mine = sorted(robot for robot, owner in owners.items() if owner == source)
-        difference = means[source] - means[target]
-        if len(mine) < 2 or difference <= max(WORTH, means[source] / len(mine)):
+        stay = {robot for robot, moved_ns in self._moved_ns.items() if now_ns < moved_ns + STAY_NS}
+        shift = best_shift(self._means, owners, self._homes, stay)
+        if shift is None:
             return None
-        free = [robot for robot in mine if now_ns >= self._moved_ns.get(robot, now_ns - STAY_NS) + STAY_NS]
-        if not free:
-            return None
-        robot = min(free, key=lambda name: (self._homes.get(name) != target, name))
-        self._moved_ns[robot] = now_ns
+        self._moved_ns[shift.robot] = now_ns
         self._next_ns = now_ns + SETTLE_NS
         self._means = {}
-        return Shift(robot, source, target, means[source], means[target])
+        return shift
 
     def wake(self, core: SupervisorCore, now_ns: int) -> None:
         """Look at the nodes of a running world, and move what should."""
         if not core.is_open or core.end is not None or core.pacer.paused:
             return
-        known = core.roster.by_name
-        beats = {name: known[name].heartbeat for name in core.members if name in known}
-        loads = {name: beat.busy for name, beat in beats.items() if beat is not None}
+        loads = loads_of(core)
         shift = self.look(loads, core.owners, now_ns) if len(loads) == len(core.members) else None
         if shift is None:
             return

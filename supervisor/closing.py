@@ -1,23 +1,22 @@
 """When a run that has ended is over: once its vHub has closed the capture, which may take as long as it goes on.
 
 The account of the capture in the vHub's heartbeats shows whether it does, and what the disk does while the file is
-brought to it. One that stands still for
-`deadlines.close`, or whose vHub ends meanwhile, is cut off: an error, though the run itself may have been in order.
+brought to it. One that stands still for `deadlines.close`, or whose vHub ends meanwhile, is cut off: an error, though
+the run itself may have been in order. A vHub has ended when its connection has, and nothing is heard of it for
+`deadlines.heartbeat` behind that. The shell looks into the file before that is said: a capture that has its end was
+closed, whatever was heard of its vHub.
 Neighbours: `core` asks, `status` has the result, `vhub.core` is the other side.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from foosim.protocol.channels import VHUB
 from foosim.supervisor.roster import Process
 
 if TYPE_CHECKING:
     from foosim.supervisor.core import SupervisorCore
-
-GONE_NS: Final = 500_000_000
-"""How long what a process said last may take after the news that it is gone: the two come by different ways."""
 
 
 class Closing:
@@ -43,7 +42,8 @@ class Closing:
         account = hub.report.get("recording"), hub.report.get("disk_progress")
         if account != self._account:
             self._account, self._moved_ns = account, now_ns
-        if hub.gone_ns and now_ns > hub.gone_ns + GONE_NS and not hub.in_doubt:
+        silent_ns = now_ns - max(hub.gone_ns, hub.heard_ns)
+        if hub.gone_ns and silent_ns > deadlines.heartbeat_ns and not hub.in_doubt:
             self._cut_off(hub, "its vHub ended before it was closed")
             return True
         if now_ns > max(self._moved_ns, core.watch.ended_ns) + deadlines.close_ns:

@@ -108,8 +108,8 @@ class Handshake:
             core.count_repeat()
             return
         process.heard_ns = now_ns
-        if process.in_doubt and now_ns > process.gone_ns + SAID_NS:
-            process.in_doubt, process.gone_ns = False, 0
+        if not process.lost and now_ns > process.gone_ns + SAID_NS:
+            process.in_doubt, process.gone_ns = False, 0  # it is here: what was said before it went has come by then
         if process.lost and process.name != channels.VHUB:
             core.recovery.hear(process, now_ns)
         if not heartbeat.report:

@@ -38,6 +38,7 @@ from foosim.supervisor.records import History, fold
 from foosim.supervisor.run_folder import RESULT_FILE, RunFolder, RunInfo
 from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import result
+from foosim.vhub.capture_parts import is_complete
 
 
 class SupervisorProcess:
@@ -101,9 +102,16 @@ class SupervisorProcess:
         self._loop.perform()
         if self.core.beginning.abandoned:
             return REFUSED
+        if self.core.closing.cut_off and self._has_capture():
+            self.core.closing.cut_off = ""
         told = result(self.core)
         self._folder.write_result(told)
         return FAILED if told["failed"] else DONE
+
+    def _has_capture(self) -> bool:
+        """Whether the capture's file says that it is closed. One on another machine is not seen from here."""
+        launch = self._folder.launch()
+        return launch is not None and bool(launch.capture) and is_complete(Path(launch.capture))
 
     def stop(self) -> None:
         """Have the run end in order, as the command `down` does; a signal handler may call this."""

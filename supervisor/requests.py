@@ -1,5 +1,5 @@
-"""What people ask of a running system: pause, resume, step, rate, add, remove, move, push, network,
-stop and start (a node), down; status, describe, watch.
+"""What people ask of a running system: pause, resume, step, rate, add, remove, move, balance, push,
+network, stop and start (a node), down; status, describe, watch.
 
 A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push at the
 first tick not yet released, network with what is sent at the one behind it, add and remove at the first not yet
@@ -28,6 +28,7 @@ from foosim.protocol.names import NAME_RULE, is_name
 from foosim.protocol.network import EVENTS_MAX, event_of
 from foosim.protocol.network_request import event_text, told
 from foosim.protocol.units import parse_pace
+from foosim.supervisor.balance import WORTH, loads_of, shifts_at_once
 from foosim.supervisor.choices import chosen
 from foosim.supervisor.issued import Issued
 from foosim.supervisor.records import ASKED_KEPT, Asked, OrderedRecord, RequestRecord, asked
@@ -81,6 +82,7 @@ class Requests:
             "add": self._add,
             "remove": self._remove,
             "move": self._move,
+            "balance": self._balance,
             "push": self._push,
             "network": self._network,
             "stop": self._stop_node,
@@ -359,6 +361,32 @@ class Requests:
         core.recovery.moved(robot)
         answer = self._accept(request, tick, f"{robot} moved to {node} at tick {tick}", owners=owners)
         core.account.moves += 1
+        core.open_epoch(owners, now_ns)
+        return answer
+
+    def _balance(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        """Move what makes the loads of the nodes more alike, and say what and why; or that nothing does."""
+        core, loads = self._core, loads_of(self._core)
+        tick = core.frame.tick
+        silent = [node for node in core.members if node not in loads]
+        if silent or len(loads) < 2:
+            why = f"no load is known of {', '.join(silent)}" if silent else "one node takes part: nothing can move"
+            raise Refused(why)
+        shifts = shifts_at_once(loads, core.owners, core.deployment.owners())
+        told = ", ".join(f"{node} {load:.0%}" for node, load in loads.items())
+        if not shifts:
+            least = f"no move would win more than a robot's share, or {WORTH:.0%}"
+            return self._accept(request, tick, f"nothing moves at tick {tick}: loads are {told}; {least}")
+        owners = dict(core.owners)
+        moved: dict[tuple[str, str], list[str]] = {}
+        for shift in shifts:
+            owners[shift.robot] = shift.target
+            core.recovery.moved(shift.robot)
+            moved.setdefault((shift.source, shift.target), []).append(shift.robot)
+        ways = "; ".join(f"{', '.join(robots)} from {source} to {node}" for (source, node), robots in moved.items())
+        text = f"moved at tick {tick}, for loads were {told}: {ways}"
+        answer = self._accept(request, tick, text[:TEXT_MAX], owners=owners)
+        core.account.moves += len(shifts)
         core.open_epoch(owners, now_ns)
         return answer
 

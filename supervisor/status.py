@@ -100,6 +100,7 @@ def status(core: SupervisorCore, now_ns: int) -> dict[str, Any]:
         "processes": _processes(core, waiting_for),
         "starts": dict(core.roster.starts),
         "vhub_away": core.roster.is_hub_away,
+        "vhub_lost": core.absence.as_json(now_ns) if core.roster.is_hub_away else None,
         "links": report.get("links", []),
         "links_in_all": report.get("links_in_all", 0),
         "disruptions": {

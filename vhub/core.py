@@ -661,7 +661,7 @@ class HubCore:
         refused, absences = self.refusals.by_sender(), {"boot": self.member.boot, **self.clients.absences.report()}
         if self.state is None or self.releases is None:
             return report_before(refused)
-        links = self.links_told.lines(self.state, anew=is_last)
+        links = self.links_told.lines(self.state, self.watching.links, anew=is_last)
         parts = links, self.watching.report(self.state), absences, self.releases.lateness, self.shell
         return report(self.state, refused, *parts)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -58,10 +58,11 @@ class LinksTold:
         self._lines = msgspec.Raw(b"[]")
         self._heartbeats = 0
 
-    def lines(self, state: HubState, *, anew: bool) -> msgspec.Raw:
-        """Return the lines as JSON for one more heartbeat, made anew when it is their turn."""
+    def lines(self, state: HubState, watched: Collection[tuple[str, str]], *, anew: bool) -> msgspec.Raw:
+        """Return the lines as JSON for one more heartbeat, made anew when it is their turn: of the links with the most
+        traffic, and of those that somebody watches."""
         if anew or self._heartbeats % LINKS_TOLD_EVERY == 0:
-            self._lines = msgspec.Raw(encode_json(_links(state)))
+            self._lines = msgspec.Raw(encode_json(_links(state, watched)))
         self._heartbeats += 1
         return self._lines
 
@@ -82,11 +83,11 @@ def report(
 ) -> bytes:
     """Return the account so far, the addresses of the radio plane and the capture, and the state of the recording.
 
-    `links` are those with the most traffic: [from, to, offered, delivered, dropped, mean delay in ns, rule, how long
-    its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any. Ages at use are [channel,
-    uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts messages by channel and sender,
-    `refusals` packets by reason; `lateness_ms` is how late packets left in realtime, null if none did. What somebody
-    looks at is under `watched` (`Watching.report`).
+    `links` are those with the most traffic, and those that are watched: [from, to, offered, delivered, dropped, mean
+    delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
+    Ages at use are [channel, uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts
+    messages by channel and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime,
+    null if none did. What somebody looks at is under `watched` (`Watching.report`).
     """
     packets = state.packets
     return encode_json(
@@ -114,7 +115,7 @@ def report(
     )
 
 
-def _links(state: HubState) -> list[list[Any]]:
+def _links(state: HubState, watched: Collection[tuple[str, str]]) -> list[list[Any]]:
     """Return the links that are told, by name."""
     fabric, now_ns = state.fabric, state.closed * state.tick_ns
     ages: dict[LinkKey, list[tuple[str, int, int, int]]] = {}
@@ -123,12 +124,13 @@ def _links(state: HubState) -> list[list[Any]]:
             key = age.source, name, name_of(fabric.profiles.find(age.source, name, age.channel))
             p50, p99 = (quantile(age.counts, share) * state.tick_ns for share in (0.5, 0.99))
             ages.setdefault(key, []).append((age.channel, sum(age.counts.values()), p50, p99))
-    busiest = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))[:LINKS_TOLD_MAX]
+    order = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))
+    told = order[:LINKS_TOLD_MAX] + [item for item in order[LINKS_TOLD_MAX:] if item[0][:2] in watched]
     return [
         [
             *key[:2],
             *(its.offered, its.delivered, its.dropped, its.delay_ns // its.delivered if its.delivered else 0),
             *(key[2], fabric.queue_ns(key, now_ns), dict(sorted(its.causes.items())), ages.get(key, [])),
         ]
-        for key, its in sorted(busiest, key=lambda item: item[0])
+        for key, its in sorted(told, key=lambda item: item[0])
     ]
