@@ -34,7 +34,7 @@ from foosim.protocol.robot_packets import RobotPacket
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep
+from foosim.vhub.keeping import RecordClosing
 
 CLIENTS: Final = tuple(f"client-{number}" for number in range(4))
 PACKETS_PER_TICK: Final = 25
@@ -167,7 +167,7 @@ def _perform(core: HubCore, journal: Journal | None, writer: CaptureWriter | Non
     for action in core.actions:
         if isinstance(action, actions.Journal) and journal is not None:
             journal.append(action.record)
-        elif isinstance(action, Keep) and writer is not None:
+        elif isinstance(action, RecordClosing) and writer is not None:
             writer.keep(action.closing)
     core.actions.clear()
 

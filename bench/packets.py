@@ -43,7 +43,7 @@ from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.start import initial_numbers
 from foosim.rehearsal.hub_journal import HubJournal
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep
+from foosim.vhub.keeping import RecordClosing
 from foosim.vhub.packet import IN_FLIGHT
 from foosim.vhub.records import Closing
 from foosim.vhub.state import OUTBOX_SHIFT
@@ -212,7 +212,7 @@ class Talk:
         for action in actions:
             if isinstance(action, Journal):
                 self._journal.append(action.record)
-            elif isinstance(action, Keep):
+            elif isinstance(action, RecordClosing):
                 self._journal.captured_tick = action.closing.frame.tick
                 self._take(action.closing)
             elif isinstance(action, Publish) and action.channel is channels.CLIENT_WELCOME:

@@ -20,7 +20,7 @@ from foosim.protocol.units import format_ns
 from foosim.rehearsal.play_entries import Entries, Entry, Selection
 from foosim.rehearsal.playing import Reading, Span
 from foosim.vhub.capture_reader import About, Scan
-from foosim.vhub.capture_standing import Standing
+from foosim.vhub.in_force import LatchedTopics
 from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.viewing import SCENE
 
@@ -78,7 +78,7 @@ class ReadAhead:
         self._span = span
         self._entries_max = entries_max
         self._wake = wake
-        self._scenes: Standing | None = None
+        self._scenes: LatchedTopics | None = None
         self._changed = threading.Condition()
         """Guards what follows; notified at each change that is waited for."""
         self._asked: Reading | None = None
@@ -152,7 +152,7 @@ class ReadAhead:
         if not self.entries.has_scene or not time_ns:
             return None
         if self._scenes is None:
-            self._scenes = Standing(self._path, {SCENE})
+            self._scenes = LatchedTopics(self._path, {SCENE})
         message = self._scenes.before(time_ns)
         return None if message is None else self.entries.view(message, time_ns)
 

@@ -28,7 +28,7 @@ from foosim.supervisor.new_capture import check_rooms
 from foosim.supervisor.plan import Plan, check_models_here, check_players_here, make_plan
 from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.status import score_text
-from foosim.vhub.lint import meanings
+from foosim.vhub.lint import summaries
 from foosim.vhub.lint_text import start_lines
 
 app = new_app()
@@ -88,7 +88,7 @@ def foosim_rehearse(  # noqa: PLR0913, PLR0917  # a command's options
     for warning in check_rooms(plan.deployment.capture, capture, None):
         _note(f"warning: {warning}")
     if not json:
-        for line in (*([plan.branch.text] if plan.branch else []), *start_lines(meanings(plan.deployment), str(file))):
+        for line in (*([plan.branch.text] if plan.branch else []), *start_lines(summaries(plan.deployment), str(file))):
             typer.echo(line)
     raise typer.Exit(_rehearse(plan, nodes, capture, json))
 

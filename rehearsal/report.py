@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from foosim.console.shown.asked import edit_text, moves
 from foosim.console.shown.timeline import WorldEvents
 from foosim.protocol.frame import Frame, chain_next
+from foosim.protocol.link_settings import Profiles
 from foosim.protocol.network import event_of
 from foosim.protocol.radios import Radio
 from foosim.protocol.units import format_ns
@@ -35,7 +36,6 @@ from foosim.vhub.capture_reader import (
 from foosim.vhub.events import Timeline
 from foosim.vhub.lint import delay_of, residual_of
 from foosim.vhub.mcap_checks import CaptureError
-from foosim.vhub.profiles import Profiles
 from foosim.vhub.rows import AGES, PACKETS, TICK, PacketRow
 from foosim.vhub.settings_text import (
     event_text,
@@ -313,9 +313,8 @@ class _Gathered:
         return self._channels[name]
 
     def _profile(self, row: PacketRow) -> Radio:
-        return (
-            Profiles(self._deployment, self._deployment.network).find(row.source, row.destination, row.channel).settings
-        )
+        profiles = Profiles(self._deployment.network, self._deployment.carriers())
+        return profiles.find(row.source, row.destination, row.channel).settings
 
     def take_tick(self, row: TickMark) -> None:
         for edit in row.edits:
@@ -380,12 +379,10 @@ class _Gathered:
         )
 
     def _radios(self) -> Iterator[RadioText]:
-        network, carriers = self._deployment.network, self._deployment.carriers()
-        carried = Counter(
-            radio
-            for endpoint in self._deployment.endpoints()
-            for radio in network.radios_of(endpoint, carriers.get(endpoint, ""))
-        )
+        network = self._deployment.network
+        profiles = Profiles(network, self._deployment.carriers())
+        ends = self._deployment.endpoints()
+        carried = Counter(radio for endpoint in ends for radio in profiles.radios_of(endpoint))
         for name, radio in network.radios.items():
             yield RadioText(name, radio.preset, carried[name], radio_text(radio))
 

@@ -33,9 +33,8 @@ from foosim.rehearsal.people import OPERATOR, People
 from foosim.rehearsal.settings import AtWork, Process, Settings
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub.closing import ClosingCore
-from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.core import ClosingCore, HubCore
+from foosim.vhub.keeping import RecordClosing, RecordEpoch
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
 
@@ -136,7 +135,7 @@ class System:
                 self.soon(lambda: self._hub_again(hub))
 
         self.enter(channels.VHUB, hub, turn, channels.VHUB_READS)
-        self.processes[channels.VHUB].took, self.processes[channels.VHUB].stood = hub.waits.took, hub.door.rest
+        self.processes[channels.VHUB].took, self.processes[channels.VHUB].stood = hub.waits.took, hub.rest
 
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
@@ -344,11 +343,11 @@ class System:
                 self.journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
-        elif isinstance(action, Keep):
+        elif isinstance(action, RecordClosing):
             self.hub_journal.captured_tick = action.closing.frame.tick
             if settings.on_closing is not None:
                 settings.on_closing(action.closing)
-        elif isinstance(action, KeepEpoch):
+        elif isinstance(action, RecordEpoch):
             self.hub_journal.captured_epoch = action.epoch.epoch
             if settings.on_epoch is not None:
                 settings.on_epoch(action.epoch)

@@ -20,6 +20,7 @@ import msgspec
 import numpy as np
 
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.link_settings import Profiles
 from foosim.protocol.messages import Sent
 from foosim.rehearsal.age_tallies import AgeAtUse, AgeTallies
 from foosim.rehearsal.whatif_reading import Frames, Offers, caveats, frames_for, world_of
@@ -27,7 +28,6 @@ from foosim.vhub.capture_reader import CaptureData
 from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import IN_FLIGHT, Flight
-from foosim.vhub.profiles import Profiles
 from foosim.vhub.rows import ClientRow, PacketRow, edit_of
 from foosim.vhub.state import HubState
 from foosim.vhub.to_rows import packet_row
@@ -163,7 +163,7 @@ def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatI
     """
     compared = _Compared(capture)
     deployment = deployment or capture.deployment
-    frames = frames_for(capture, on_radio=Profiles(deployment, deployment.network).on_radio)
+    frames = frames_for(capture, on_radio=Profiles(deployment.network, deployment.carriers()).on_radio)
     before, after = AgeTallies(deployment.tick_ns), AgeTallies(deployment.tick_ns)
     offers = Offers(capture, frames, compared.keep, before.take_row)
     for flight in _judged(capture, deployment, offers, frames, after):

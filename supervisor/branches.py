@@ -4,7 +4,7 @@ What the vHub closed last is the last that it knows: nobody can give it the inpu
 stands where the vHub does, as it does when it takes the later commit of the two, and all that was behind is void:
 commits, arrivals, orders, deliveries. A branch has a number, that of the first epoch in it; deliveries and what is said
 to clients and by them name it, so that nothing that is void and still on its way counts. Requests keep their ids, ticks
-and answers, and what they change is ordered again at their ticks. Neighbours: `vhub.footing` waits for the decision,
+and answers, and what they change is ordered again at their ticks. Neighbours: `vhub.core` waits for the decision,
 `take_over` and `core` hear the vHub, `head` writes it as one record.
 """
 

@@ -5,7 +5,7 @@ brought to it. One that stands still for `deadlines.close`, or whose vHub ends m
 the run itself may have been in order. A vHub has ended when its connection has, and nothing is heard of it for
 `deadlines.heartbeat` behind that. The shell looks into the file before that is said: a capture that has its end was
 closed, whatever was heard of its vHub.
-Neighbours: `core` asks, `status` has the result, `vhub.closing` is the other side.
+Neighbours: `core` asks, `status` has the result, `vhub.core` is the other side.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ from foosim.supervisor.restarts import Restarts
 from foosim.supervisor.run_folder import RunFolder, RunInfo, create_run
 from foosim.supervisor.run_options import launch_of
 from foosim.supervisor.signals import counted_signals
-from foosim.vhub.lint import meanings
+from foosim.vhub.lint import summaries
 from foosim.vhub.lint_text import start_lines
 
 POLL_S: Final = 0.02
@@ -150,7 +150,7 @@ class Up:
         display.say(f"run {folder.name}, logs in {folder.logs}")
         if self.plan.branch is not None:
             display.say(self.plan.branch.text)
-        for line in start_lines(meanings(self.plan.deployment), str(options.file)):
+        for line in start_lines(summaries(self.plan.deployment), str(options.file)):
             display.say(line)
         info = self._await(self._own_info)
         if info is None:

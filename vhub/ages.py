@@ -3,7 +3,7 @@
 A link's delay says how late a packet comes; what a controller sees is older by the time until its next turn, and by how
 long ago the newest packet was sent. Counted at each tick at which a client in lockstep is asked, and of a free-running
 one at each tick that admits packets of it; channels that it hears and of which something has come. Ages are whole
-ticks, since all is sent at the start of its tick. Part of the vHub's state. Neighbours: `state`, `to_rows`, `report`.
+ticks, since all is sent at the start of its tick. Part of the vHub's state.
 """
 
 from __future__ import annotations

@@ -5,8 +5,6 @@ that overlap with it at their receivers, those that were sent before it and are 
 of whole numbers, so no order matters. A station that sends hears nothing meanwhile. Stations that hear one another
 take turns, so they overlap only where they do not. A turn of 802.11 that has not begun is put off by stations that come
 in between; what it spoils, and what spoils it, is found when it has begun.
-Neighbours: `memory` (what is on air, in the hub's state), `turns` (who sends first), `stages.medium` registers,
-`stages.channel` judges, `stages.delay` is told of packets that come later.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """A frame of a capture as the start of another run: `CAPTURE@12.5s`, read with what has to fit.
 
 A branch begins with the newest captured frame at or before the time, keeps its tick, and goes on from the chain over
-all frames up to it: with the inputs of the captured run it has the digests of the captured run. Neighbours:
-`capture_reader`, `protocol.start` (what a run begins with), `supervisor.plan` and `rehearsal.rehearse` use it.
+all frames up to it: with the inputs of the captured run it has the digests of the captured run.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The budget of one radio link: what its receiver gets of a packet's signal, and how that stands to the noise.
-
-Neighbours: `propagation` (the way of the signal), `stages.medium` and `stages.channel` (verdicts).
-"""
+"""The budget of one radio link: what its receiver gets of a packet's signal, and how that stands to the noise."""
 
 from __future__ import annotations
 

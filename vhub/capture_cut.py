@@ -3,7 +3,6 @@
 What was in force at that frame is repeated at the start, as it was written: the layout, the epoch, the clients that
 take part, the scene. Deployment, files and metadata are those of the whole, and the metadata say where the cut begins.
 A run can begin with any of its frames; a verification starts where the run began, unless asked to take its first one.
-Neighbours: `capture_reader` (reads both), `capture_file` (the form of what is written).
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from foosim.vhub.capture_contents import (
 )
 from foosim.vhub.capture_parts import END_METADATA, METADATA, Joined
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
-from foosim.vhub.in_force import InForce
+from foosim.vhub.in_force import ActiveState
 from foosim.vhub.mcap_checks import CHECKS, CaptureError
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.mcap_writer import McapWriter
@@ -56,7 +55,7 @@ class Cut:
 class _Start:
     """What is in force at the last tick that was read."""
 
-    in_force: InForce
+    in_force: ActiveState
     tick: int = -1
     digest: bytes = b""
     chain: bytes = b""
@@ -106,7 +105,7 @@ def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_St
     """Return the frame to begin with and what is in force there, the tick in ns, and the last tick."""
     tick_ns = deployment_of(read_about(path)).tick_ns
     scan = Scan(path)
-    start, held = (_Start(InForce(str(path))) for _ in range(2))
+    start, held = (_Start(ActiveState(str(path))) for _ in range(2))
     for message in scan.messages():
         if message.topic != FRAME:
             held.take(scan, message)

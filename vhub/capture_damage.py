@@ -1,8 +1,7 @@
 """What of a finished capture is damaged, and which of its ticks are whole: for people who have no other copy.
 
 Readers refuse such a file at the first wrong byte. This walks over all of it, record by record, and where a length is
-wrong from one whole chunk to the next. Neighbours: `mcap_file`, `mcap_checks` (what is compared), `capture_cut` (takes
-out what is before the damage).
+wrong from one whole chunk to the next.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """The file of a capture: closings, epochs and lines become rows in it, one after the other, in the caller's thread.
 
 A new file is never written over an old one. A file that its writer left unfinished is gone on with behind its last
-whole chunk: what it has already is not written again, so a whole journal may be fed to it. Neighbours: `to_rows`
-and `viewing` (what is written), `mcap_writer` (how), `capture_split` (in which files), `capture_left` (files that were
-left), `capture_writer` (the thread), `capture_recovery`.
+whole chunk: what it has already is not written again, so a whole journal may be fed to it.
 """
 
 from __future__ import annotations

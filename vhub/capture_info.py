@@ -1,7 +1,4 @@
-"""A capture in short, for people and scripts: by one pass over the file, with nothing of it kept but counts.
-
-Neighbours: `capture_reader` (the pass), `foosim-replay info` shows it.
-"""
+"""A capture in short, for people and scripts: by one pass over the file, with nothing of it kept but counts."""
 
 from __future__ import annotations
 

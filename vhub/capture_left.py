@@ -1,7 +1,7 @@
 """What a writer that ended uncleanly left of a capture's file: how far it is, and where to go on with it.
 
 Everything up to the last whole chunk stays. Bytes that are damaged, not just cut, and what is further than the journal,
-are given up only where the journal has it. Neighbours: `mcap_scan` looks, `capture_file` goes on.
+are given up only where the journal has it.
 """
 
 from __future__ import annotations

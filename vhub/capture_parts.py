@@ -2,7 +2,7 @@
 
 `run.mcap` goes on in `run_0001.mcap`, `run_0002.mcap` and so on. Each can be read by itself: it has the description of
 the run, and its first chunk repeats what holds at its first frame; who comes from the file before passes that chunk by.
-What is read is the file that is named and all behind it. Neighbours: `capture_file` writes, `capture_reader` reads.
+What is read is the file that is named and all behind it.
 """
 
 from __future__ import annotations

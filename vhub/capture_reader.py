@@ -3,7 +3,6 @@
 A file is read from start to end, with no more of it in memory than a chunk and the columns that are asked for: frames,
 packets and rows are read when they are used. What is damaged or is no capture raises `CaptureError`; a file whose
 writer was killed gives everything up to its last whole chunk, and says so.
-Neighbours: `rows`, `capture_columns`, `mcap_file`, `capture_writer`, `capture_info`.
 """
 
 from __future__ import annotations

@@ -3,8 +3,7 @@
 The vHub writes its journal before its capture, so the journal has what the capture lacks: the ticks, frames, packets
 and fates behind the last chunk, and what was in flight. What only a clock or a person knew is not in it: fields that
 begin with `wall_` are 0 in completed rows (but outages, which commits tell), lines of the log that were not flushed
-are gone. Neighbours: `capture_file` (writes), `records` (the journal), `protocol.journal`, `main` (goes on with a
-capture of a run that lives).
+are gone.
 """
 
 from __future__ import annotations

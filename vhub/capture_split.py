@@ -1,7 +1,7 @@
 """When a capture goes on in another file, what that one begins with, and which old files are let go.
 
 A file begins with a captured frame that would be there anyway, so all rows of all files are those of one that is not
-split. Neighbours: `capture_file` writes the files, `capture_parts` says how they are called.
+split.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from foosim.protocol.deployment import Capture
 from foosim.protocol.units import format_ns
 from foosim.vhub.capture_contents import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
 from foosim.vhub.capture_parts import AFTER, LAST, ORIGIN_TICK, PART, head_of, number_of, part_path, parts_at
-from foosim.vhub.in_force import InForce
+from foosim.vhub.in_force import ActiveState
 from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.records import Closing
 
@@ -30,7 +30,7 @@ class Split:
 
     def __init__(self, path: Path, capture: Capture, tick_ns: int) -> None:
         self.number = 0
-        self.in_force = InForce(str(path))
+        self.in_force = ActiveState(str(path))
         self._path = path
         self._tick_ns = tick_ns
         self._every = capture.frames_every

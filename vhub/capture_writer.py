@@ -4,8 +4,7 @@
 the run, and says so once. What is written is flushed at least every `capture.flush`, synced each second by a thread of
 its own, and readable when the process is killed. When the room gets little (`protocol.disk`) or the disk refuses,
 `state` says so; the owner ends the run, or goes on without a capture, as the deployment wants it. A writer that has
-given up has an end in its file and counts what it refuses: offered = written + refused. Neighbours: `capture_file`
-(what is written, and how), `capture_reader`.
+given up has an end in its file and counts what it refuses: offered = written + refused.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Sources: tigerbeetle/tigerbeetle src/vopr.zig (the ranges) and src/testing/packet_simulator.zig (the modes). Its
 probabilities are those of one tick of 10 ms; here the number of ticks between two episodes is drawn at once
-(geometric), which is the same. Neighbours: `events` makes a time line of it.
+(geometric), which is the same.
 """
 
 from __future__ import annotations

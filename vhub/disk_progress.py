@@ -2,7 +2,7 @@
 it lasts, for which nothing else moves.
 
 Of a block device the kernel tells what it has written. Of what has no such account (a network file system, memory) the
-call itself counts: it ends, or fails, when the kernel says so. Neighbours: `room_watch` asks, `report` tells it.
+call itself counts: it ends, or fails, when the kernel says so.
 """
 
 from __future__ import annotations

@@ -1,43 +1,62 @@
-"""What clients say to the vHub: hello, join, packets, Done; and that they are gone.
+"""Handles what clients send to the vHub (hello, join, packets, Done) and their disconnects.
 
-A client that is gone may come back: one that the run waits for within `deadlines.client_back`, any other at any time as
-one that joins. Before the first tick, and after a restart of the vHub, when all that it knew are away, they have
-`deadlines.start`: their processes may have to be started.
-Neighbours: `core` closes the ticks, `sessions` has the clients.
+A client that disconnects may come back: one that the run waits for within `deadlines.client_back`, any other at any
+time by a new join. Before the first tick, and after a restart of the vHub, clients have `deadlines.start`, since their
+processes may have to be started.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Mapping
+from typing import Final
 
 from foosim.protocol import limits
-from foosim.protocol.actions import Journal, Say
+from foosim.protocol.actions import Action, Journal
 from foosim.protocol.codec import encode
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import ClientHello, Done, Failure, Go, Join, Tempo, Up
-from foosim.protocol.standstill import TOLD_NS, told
+from foosim.protocol.messages import Build, ClientHello, Done, Failure, Go, Join, Tempo, Up
+from foosim.protocol.standstill import TOLD_NS
 from foosim.protocol.units import parse_pace
 from foosim.vhub.absences import Absences
 from foosim.vhub.members import Member, may_lockstep, may_restart
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import Flight, received
 from foosim.vhub.records import AbsencesRecord, Closing, InputsRecord
-from foosim.vhub.sessions import Session
+from foosim.vhub.release import Releases
+from foosim.vhub.sessions import Session, Sessions
 from foosim.vhub.state import HubState
-
-if TYPE_CHECKING:
-    from foosim.vhub.core import HubCore
-
+from foosim.vhub.waits import WaitTimes
 
 LOST_MEANWHILE: Final = "its process was lost while the vHub was away"
 
 
-class Door:
-    """Takes what clients say, for one core."""
+class Clients:
+    """The clients of one run: who takes part, who is away, whose Done a tick waits for."""
 
-    def __init__(self, core: HubCore) -> None:
-        self._core = core
+    def __init__(
+        self,
+        sessions: Sessions,
+        actions: list[Action],
+        waits: WaitTimes,
+        report: Callable[[], None],
+        give_up: Callable[[str], None],
+    ) -> None:
+        """`report` sends a heartbeat at once, `give_up` ends the run for a reason."""
+        self.waited: list[str] = []
+        """Clients whose Done the tick that is being closed lacks."""
+        self.repeated = 0
+        """Messages that came twice or too late."""
+        self.has_begun = False
+        """Whether the run is in an epoch."""
+        self._sessions = sessions
+        self._actions = actions
+        self._wait_times = waits
+        self._report = report
+        self._give_up = give_up
+        self._deployment: Deployment | None = None
+        self._state: HubState | None = None
+        self._releases: Releases | None = None
         self.written: InputsRecord | None = None
         """Who joins and leaves at the tick that is closed next, where that is written already."""
         self._leaves: list[str] = []
@@ -46,44 +65,46 @@ class Door:
         self.absences = Absences()
         self._looked_ns = 0
 
+    def begin(self, deployment: Deployment, state: HubState, releases: Releases) -> None:
+        """Take part in a run; before this every message of a client is dropped."""
+        self._deployment, self._state, self._releases = deployment, state, releases
+
     def go_on(self, written: InputsRecord | None, absences: AbsencesRecord, now_ns: int) -> None:
-        """Expect those back who were there with the vHub before; `written` is what it wrote for the next tick, and
-        `absences` which players it knew to be away."""
-        core = self._core
-        assert core.state is not None and core.deployment is not None
+        """Wait for the clients of the vHub process before this one; `written` is its record of who joins and leaves at
+        the next tick, `absences` names the players that it knew to be away."""
+        assert self._state is not None and self._deployment is not None
         self.written = written
-        members, came = core.state.members, set()
+        members, came = self._state.members, set()
         here = {name for name, member in members.items() if member.active}
         if written is not None:
             came = {joining.name for joining in written.joins if _is_return(joining, members)}
             here = (here - set(written.leaves)) | {joining.name for joining in written.joins}
-        self.absences.go_on(absences, here, came, core.state.closed if written is None else written.tick)
-        core.sessions.expect(here, self._start_ns, now_ns)  # theirs may have ended as well, and be started again
+        self.absences.go_on(absences, here, came, self._state.closed if written is None else written.tick)
+        self._sessions.expect(here, self._start_ns, now_ns)  # their processes may have ended as well, and be restarted
 
     def _known(self, name: str) -> Member | Joining | None:
-        """Return what is known of a client, the latest first: as it joins, or as the state has it."""
-        core = self._core
+        """Return the newest record of a client: its pending join, else its member in the state."""
         written = [] if self.written is None else self.written.joins
-        for joining in (core.sessions.joins.get(name), *written):
+        for joining in (self._sessions.joins.get(name), *written):
             if joining is not None and joining.name == name:
                 return joining
-        return None if core.state is None else core.state.members.get(name)
+        return None if self._state is None else self._state.members.get(name)
 
     def come_and_go(self, tick: int) -> tuple[list[Joining], list[str]]:
-        """Take who joins and leaves at a tick. Its Go depends on it, and is said before the record is written."""
-        core = self._core
-        assert core.state is not None
+        """Return who joins and leaves at a tick. The tick's Go depends on it and leaves before the tick's record is
+        written, so it has a record of its own."""
+        assert self._state is not None
         written, self.written = self.written, None
         if written is not None and written.tick == tick:
             return written.joins, written.leaves
-        if not core.state.hears_clients:
+        if not self._state.hears_clients:
             return [], []
-        joins = core.sessions.take_joins(tick)
-        members = core.state.members
+        joins = self._sessions.take_joins(tick)
+        members = self._state.members
         leaves = [name for name in dict.fromkeys(self._leaves) if name in members and members[name].active]
         self._leaves = []
         if joins or leaves:
-            core.actions.append(Journal(encode(InputsRecord(tick, joins, leaves))))
+            self._actions.append(Journal(encode(InputsRecord(tick, joins, leaves))))
             for name in leaves:
                 self.absences.leave(name, tick)
             for joining in joins:
@@ -93,88 +114,86 @@ class Door:
         return joins, leaves
 
     def go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
-        """Give a lockstep client its tick, and begin to wait for its Done."""
-        core = self._core
-        assert core.state is not None and core.deployment is not None and core.releases is not None
-        member = core.state.members[name]
+        """Send a lockstep client the Go of a tick, and begin to wait for its Done."""
+        assert self._state is not None and self._deployment is not None and self._releases is not None
+        member = self._state.members[name]
         member.downlink += 1
-        session = core.sessions.by_name.get(name)
+        session = self._sessions.by_name.get(name)
         if session is None:
             return
         for flight in flights:
             flight.released_wall_ns = now_ns
-        core.sessions.say_go(session, Go(member.downlink, tick, member.sequence, received(flights), core.state.branch))
-        session.deadline = "lockstep_realtime" if core.releases.factor else "lockstep_fast"
-        allowed_ns: int = getattr(core.deployment.deadlines, f"{session.deadline}_ns")
-        session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * core.deployment.tick_ns))
+        go = Go(member.downlink, tick, member.sequence, received(flights), self._state.branch)
+        self._sessions.send_go(session, go)
+        session.deadline = "lockstep_realtime" if self._releases.factor else "lockstep_fast"
+        allowed_ns: int = getattr(self._deployment.deadlines, f"{session.deadline}_ns")
+        session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * self._deployment.tick_ns))
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
-    def hello(self, hello: ClientHello, payload: bytes, now_ns: int) -> None:
-        """Let a client in, or say why not; before it is known where the run goes on nobody is told how far it is."""
-        core = self._core
-        if core.footing.waits:
+    def on_hello(self, hello: ClientHello, build: Build) -> None:
+        """Admit a client, or refuse it with the reason."""
+        if self._state is None or self._deployment is None:
             return
-        if core.state is not None and core.deployment is not None and core.member.build is not None:
-            session, known = core.sessions.by_name.get(hello.name), core.state.members.get(hello.name)
-            if session is not None and session.is_late(hello):
-                core.repeated += 1
-                return
-            if session is not None and not session.boot and not hello.returns and known is not None and known.active:
-                session.is_missed = not self.absences.is_away(hello.name)
-                self._miss(hello.name, "", LOST_MEANWHILE)
-            core.sessions.hello(hello, core.member.build, core.deployment, core.state, self._said(hello.name))
+        session, known = self._sessions.by_name.get(hello.name), self._state.members.get(hello.name)
+        if session is not None and session.is_late(hello):
+            self.repeated += 1
+            return
+        if session is not None and not session.boot and not hello.returns and known is not None and known.active:
+            session.is_missed = not self.absences.is_away(hello.name)
+            self._miss(hello.name, "", LOST_MEANWHILE)
+        self._sessions.hello(hello, build, self._deployment, self._state, self._said(hello.name))
 
-    def join(self, join: Join, payload: bytes, now_ns: int) -> None:
-        """A client takes part, from a tick that suits it; one that does already is told what it has missed."""
-        core = self._core
+    def on_join(self, join: Join, now_ns: int) -> bool:
+        """Note a client's join, which takes effect at a tick that suits it; a member is sent what it has missed.
+
+        Return whether somebody new takes part.
+        """
         session = self._joining(join)
-        if session is None or core.state is None:
-            return
-        if session.is_gone:  # said before it went
-            core.repeated += 1
-            return
-        if join.period and not may_lockstep(core.state.deployment, join.name):
+        if session is None or self._state is None:
+            return False
+        if session.is_gone:  # sent before it disconnected
+            self.repeated += 1
+            return False
+        if join.period and not may_lockstep(self._state.deployment, join.name):
             raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
         _check_timing(join)
-        core.sessions.catch_up(session, core.waits_for(join.name), now_ns)
+        self._sessions.catch_up(session, self.waits_for(join.name), now_ns)
         self.absences.end(join.name, join.boot)
         session.is_missed = False
         self.tell()
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join):
-            core.repeated += 1
-            return
-        core.sessions.join(join)
-        core.ready_if_complete()
+            self.repeated += 1
+            return False
+        self._sessions.join(join)
+        return True
 
-    def up(self, up: Up, payload: bytes, now_ns: int) -> None:
-        """Packets of a free-running client."""
-        core = self._core
+    def on_up(self, up: Up, payload: bytes, now_ns: int) -> None:
+        """Take packets of a free-running client."""
         session = self._session(up)
-        if session is None or core.state is None:
+        if session is None or self._state is None:
             return
-        if up.branch != core.state.branch or core.sessions.is_in_doubt(session, core.state.deployment):
-            core.repeated += 1
+        if up.branch != self._state.branch or self._sessions.is_in_doubt(session, self._state.deployment):
+            self.repeated += 1
             return
-        if not core.sessions.admits(session, len(up.packets), len(payload)):
-            core.state.refuse_at_door("inbox_full", len(up.packets))
+        if not self._sessions.admits(session, len(up.packets), len(payload)):
+            self._state.refuse_at_door("inbox_full", len(up.packets))
             return
         repeated = session.take(up.packets)
         if repeated:
-            core.state.refuse_at_door("duplicate", repeated)
-            session.heard = 0  # it does not know what is recorded
+            self._state.refuse_at_door("duplicate", repeated)
+            session.heard = 0  # acknowledge again: it does not know what is recorded
 
-    def done(self, done: Done, payload: bytes, now_ns: int) -> None:
-        """The answer to a Go."""
-        core = self._core
+    def on_done(self, done: Done, payload: bytes, now_ns: int) -> None:
+        """Take a lockstep client's answer to a Go."""
         session = self._session(done)
         if session is None:
             return
-        is_of_another = core.state is None or done.branch != core.state.branch
-        is_asked = core.waits_for(done.name) and done.tick == session.go_tick
+        is_of_another = self._state is None or done.branch != self._state.branch
+        is_asked = self.waits_for(done.name) and done.tick == session.go_tick
         if is_of_another or not is_asked or not session.is_present:
-            core.repeated += 1
+            self.repeated += 1
             return
         self.take_done(done.name)
         session.answered()
@@ -183,35 +202,37 @@ class Door:
         session.done = done
 
     def take_done(self, client: str) -> None:
-        """A tick waits for this client no more."""
-        self._core.waited.remove(client)
-        self._core.waits.client = client
+        """End a tick's wait for this client."""
+        self.waited.remove(client)
+        self._wait_times.client = client
 
-    def failure(self, failure: Failure, payload: bytes, now_ns: int) -> None:
-        """A client says that it has failed. Without a player the run cannot go on."""
-        core = self._core
-        session = core.sessions.by_name.get(failure.name)
-        if session is None or core.deployment is None or not session.may_fail(failure.boot):
-            core.repeated += 1
+    def waits_for(self, client: str) -> bool:
+        """Whether a tick waits for this client's Done."""
+        return client in self.waited
+
+    def on_failure(self, failure: Failure, payload: bytes, now_ns: int) -> None:
+        """End the run for a player that reports its own failure: the run cannot go on without it."""
+        session = self._sessions.by_name.get(failure.name)
+        if session is None or self._deployment is None or not session.may_fail(failure.boot):
+            self.repeated += 1
             return
-        if failure.name not in core.deployment.players:
+        if failure.name not in self._deployment.players:
             raise Malformed(f"{failure.name} says that it has failed, it is no player")
-        core.give_up(failure.reason)
+        self._give_up(failure.reason)
 
     def _joining(self, join: Join) -> Session | None:
         """Return the session of a process that joins. One that was welcomed while another one had its name gets it
-        where that has not joined, and is refused where it has."""
-        core = self._core
-        session = core.sessions.by_name.get(join.name)
-        if core.sessions.is_for_another(join):
-            core.repeated += 1
+        if that has not joined, and is refused otherwise."""
+        session = self._sessions.by_name.get(join.name)
+        if self._sessions.is_for_another(join):
+            self.repeated += 1
             return None
         if session is None or session.boot == join.boot or join.boot not in session.claims:
             return self._session(join)
-        assert core.state is not None
-        if not core.sessions.take_over(join, core.state.deployment, core.state, self._said(join.name)):
+        assert self._state is not None
+        if not self._sessions.take_over(join, self._state.deployment, self._state, self._said(join.name)):
             return None
-        known = core.state.members.get(join.name)
+        known = self._state.members.get(join.name)
         if session.returns and session.is_missed and self.absences.is_away(join.name):
             self.absences.deny(join.name)
         elif not session.returns and known is not None and known.active:
@@ -219,24 +240,23 @@ class Door:
         return session
 
     def _session(self, message: Join | Up | Done) -> Session | None:
-        session = self._core.sessions.by_name.get(message.name)
+        session = self._sessions.by_name.get(message.name)
         if session is None or session.boot != message.boot:
-            self._core.repeated += 1
+            self.repeated += 1
             return None
         return session
 
     def _said(self, name: str) -> int | None:
-        """Return the last downlink that was said to a client: not the Go that it has not answered, nor what waits."""
-        core = self._core
-        member = None if core.state is None else core.state.members.get(name)
-        if member is None or core.releases is None:
+        """Return the last downlink sent to a client: neither a Go without a Done nor one that is yet to be released."""
+        member = None if self._state is None else self._state.members.get(name)
+        if member is None or self._releases is None:
             return None
-        waiting = core.releases.first_number(name)
-        return member.downlink - core.waits_for(name) if waiting is None else waiting - 1
+        waiting = self._releases.first_number(name)
+        return member.downlink - self.waits_for(name) if waiting is None else waiting - 1
 
-    def tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
-        """Learn how fast simulated time runs. Deadlines of clients rest while it is paused."""
-        releases, pace = self._core.releases, parse_pace(tempo.pace)
+    def on_tempo(self, tempo: Tempo, payload: bytes, now_ns: int) -> None:
+        """Take the pace of simulated time. Deadlines of clients are suspended while it is paused."""
+        releases, pace = self._releases, parse_pace(tempo.pace)
         if releases is None:
             return
         was_fast = not releases.factor
@@ -246,11 +266,10 @@ class Door:
 
     # --- who is away -------------------------------------------------------------------------------------------------
 
-    def gone(self, name: str, now_ns: int) -> None:
-        """A client's presence has ended: a free-running one leaves the run, for one in lockstep it waits a while."""
-        core = self._core
-        session = core.sessions.by_name.get(name)
-        if session is None or core.state is None or core.deployment is None or core.ended is not None:
+    def on_gone(self, name: str, now_ns: int) -> None:
+        """A client has disconnected: a free-running one leaves the run, for a lockstep one the run waits."""
+        session = self._sessions.by_name.get(name)
+        if session is None or self._state is None:
             return
         session.is_gone = True
         if self._is_waited_for(name):
@@ -261,81 +280,68 @@ class Door:
         self._leave(name)
 
     def _miss(self, name: str, boot: str, reason: str) -> None:
-        """Note that a player's process is away from a run that has begun."""
-        core = self._core
-        if core.deployment is not None and may_restart(core.deployment, name) and core.epoch > 0:
+        """Record that a player's process is away from a run that has begun."""
+        if self._deployment is not None and may_restart(self._deployment, name) and self.has_begun:
             self.absences.begin(name, boot, reason, self._tick)
             self.tell()
 
     def tell(self) -> None:
-        """Tell the supervisor at once of whoever has gone or come, when that is written: a run may end soon."""
+        """Report new absences and returns at once, after their record: a run may end soon."""
         if self.absences.is_new:
             self.absences.is_new = False
-            self._core.actions.append(Journal(encode(self.absences.record())))
-            self._core.say_heartbeat()
+            self._actions.append(Journal(encode(self.absences.record())))
+            self._report()
 
     def _back_ns(self, name: str) -> int:
         """Return for how long the run waits for a client that is away."""
-        core = self._core
-        assert core.deployment is not None
-        is_started_again = may_restart(core.deployment, name) and not self._may_go_on_without(name)
-        return self._start_ns if is_started_again or not core.epoch else core.deployment.deadlines.client_back_ns
+        assert self._deployment is not None
+        is_started_again = may_restart(self._deployment, name) and not self._may_go_on_without(name)
+        return self._start_ns if is_started_again or not self.has_begun else self._deployment.deadlines.client_back_ns
 
     def _may_go_on_without(self, name: str) -> bool:
         """Whether the run goes on while a client is started again: in realtime, once it has begun."""
-        core = self._core
-        assert core.deployment is not None
-        is_realtime = core.releases is not None and core.releases.factor > 0
-        return may_restart(core.deployment, name) and is_realtime and core.epoch > 0
+        assert self._deployment is not None
+        is_realtime = self._releases is not None and self._releases.factor > 0
+        return may_restart(self._deployment, name) and is_realtime and self.has_begun
 
     def _turn_to_pace(self, now_ns: int) -> None:
-        """The run goes by the wall clock now, or does not any more: players that are away have the time of then."""
-        deployment = self._core.deployment
-        for name, session in self._core.sessions.by_name.items():
+        """The pace has turned to or from realtime: give players that are away the deadline of the new pace."""
+        deployment = self._deployment
+        for name, session in self._sessions.by_name.items():
             if session.away_ns >= 0 and deployment is not None and may_restart(deployment, name):
                 session.leave(self._back_ns(name), now_ns)
 
     @property
     def _tick(self) -> int:
         """The tick that is closed next."""
-        return 0 if self._core.state is None else self._core.state.closed + 1
-
-    @property
-    def holds(self) -> bool:
-        """Whether the vHub waits for its supervisor: nothing can go on, and nobody is let in."""
-        return self._core.orphan.is_alone or self._core.footing.waits
+        return 0 if self._state is None else self._state.closed + 1
 
     def rest(self, stood_ns: int, now_ns: int) -> None:
-        """The vHub's own loop stood still for so long: that counts against no client, and not against the supervisor.
+        """The vHub's own loop stood still for so long: that counts against no client.
 
         Where connections may have closed by it, clients have their whole time from now on (`standstill`).
         """
-        core = self._core
-        core.orphan.rest(stood_ns, now_ns)
-        if stood_ns >= TOLD_NS:
-            core.actions.append(Say("warning", told(stood_ns)))
-        core.sessions.rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
+        self._sessions.rest(limits.COUNTER_MAX if stood_ns >= TOLD_NS else stood_ns, now_ns)
         self._looked_ns = now_ns
 
-    def wake(self, now_ns: int) -> None:
-        """Say Go again, lose who has not answered in time, and give up who was away for too long.
+    def wake(self, now_ns: int, *, holds: bool) -> None:
+        """Repeat Go, and end the run or go on without clients whose answer or return is overdue.
 
-        Both clocks rest while the run is paused; they begin anew when the vHub has waited for its supervisor, since
-        what closed that connection may have closed those of clients as well.
+        Both deadlines are suspended while the run is paused. They begin anew while the vHub `holds`, which is when it
+        waits for its supervisor: what closed that connection may have closed those of clients as well.
         """
-        core = self._core
-        if core.state is None:
+        if self._state is None:
             return
-        core.sessions.repeat(core.waited, now_ns)
+        self._sessions.repeat(self.waited, now_ns)
         passed_ns, self._looked_ns = now_ns - self._looked_ns, now_ns
-        if self.holds:
-            core.sessions.rest(limits.COUNTER_MAX, now_ns)
-        elif core.releases is not None and core.releases.paused:
-            core.sessions.rest(passed_ns, now_ns)
-        for late in core.sessions.overdue(now_ns):
-            core.give_up(late.unanswered)
-        for name in core.sessions.late(now_ns):
-            session = core.sessions.by_name[name]
+        if holds:
+            self._sessions.rest(limits.COUNTER_MAX, now_ns)
+        elif self._releases is not None and self._releases.paused:
+            self._sessions.rest(passed_ns, now_ns)
+        for late in self._sessions.overdue(now_ns):
+            self._give_up(late.unanswered)
+        for name in self._sessions.late(now_ns):
+            session = self._sessions.by_name[name]
             if not self._is_waited_for(name):
                 self._leave(name)
                 continue
@@ -343,59 +349,62 @@ class Door:
             if self._may_go_on_without(name):
                 self._go_on_without(name)
             else:
-                core.lose(name, self._why_lost(session))
+                self._give_up(lost(name, self._why_lost(session)))
 
     def _why_lost(self, session: Session) -> str:
         """Return why the run does not wait any longer for a client that is away."""
-        deployment = self._core.deployment
+        deployment = self._deployment
         assert deployment is not None
         if may_restart(deployment, session.name):
             return f"it was not started again within {deployment.deadlines.start_ns / 1e9:g} s (deadlines.start)"
         return session.why_gone if session.boot else "it did not come back to the vHub"
 
     def _go_on_without(self, name: str) -> None:
-        """A player leaves until it is started again: at the tick whose Done it owes, or at the next one."""
-        core = self._core
-        core.sessions.joins.pop(name, None)
-        core.sessions.by_name[name].answered()
-        if core.waits_for(name):
-            core.waited.remove(name)
+        """Have a player leave until its process is restarted: at the tick whose Done it owes, or at the next one."""
+        self._sessions.joins.pop(name, None)
+        self._sessions.by_name[name].answered()
+        if self.waits_for(name):
+            self.waited.remove(name)
             self._owing.append(name)
         else:
             self._leaves.append(name)
 
     def leave_owing(self, state: HubState, closing: Closing) -> None:
-        """Let those go without whose Dones the tick is closed; its record says so, before anything else does."""
+        """Have the clients leave without whose Dones the tick is closed; its record is the first to name them."""
         closing.owing += sorted(self._owing)
         for name in closing.owing:
             state.leave(name)
             self.absences.leave(name, closing.frame.tick)
         self._owing = []
 
-    def say_owed(self, closing: Closing, now_ns: int) -> None:
-        """Behind the record of a tick, say what its Go had to the processes that come for those who left owing."""
+    def send_owed(self, closing: Closing, now_ns: int) -> None:
+        """After the record of a tick, send the packets of its Go to the clients that left without a Done."""
         for name in closing.owing:
-            self._core.sessions.say_owed(name, now_ns)
+            self._sessions.send_owed(name, now_ns)
 
     def _is_waited_for(self, name: str) -> bool:
         """Whether the run waits for a client: it is in lockstep, or the tick that is being closed goes by its Done."""
         known = self._known(name)
         is_here = isinstance(known, Joining) or (known is not None and known.active and name not in self._leaves)
         is_in_lockstep = known is not None and is_here and known.period > 0
-        return self._core.waits_for(name) or name in self._owing or is_in_lockstep
+        return self.waits_for(name) or name in self._owing or is_in_lockstep
 
     @property
     def _start_ns(self) -> int:
         """How long a client has to come whose process is being started."""
-        assert self._core.deployment is not None
-        deadlines = self._core.deployment.deadlines
+        assert self._deployment is not None
+        deadlines = self._deployment.deadlines
         return max(deadlines.client_back_ns, deadlines.start_ns)
 
     def _leave(self, name: str) -> None:
-        core = self._core
-        core.sessions.leave(name)
+        self._sessions.leave(name)
         if self._known(name) is not None:
             self._leaves.append(name)
+
+
+def lost(name: str, why: str) -> str:
+    """Return the reason with which a run ends that has lost what it cannot do without."""
+    return f"lost {name}: {why}"
 
 
 def _is_return(joining: Joining, members: Mapping[str, Member]) -> bool:

@@ -1,6 +1,4 @@
-"""The checksum of what a file has already that a writer goes on with. Neighbours: `mcap_writer` (takes it),
-`capture_file`.
-"""
+"""The checksum of what a file has already that a writer goes on with."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Good and bad times of a link, as functions of simulated time: whoever asks, and however often, sees the same ones.
 
 Lengths are drawn by (key, number of the episode). Times begin in their stationary state at time 0 (exact where lengths
-are exponential). Neighbours: `stages.residual` loses packets in bad times.
+are exponential).
 """
 
 from __future__ import annotations

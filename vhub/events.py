@@ -2,8 +2,7 @@
 
 It is made from the deployment's events and from what was asked for while the run went on, in the order of time; every
 random length is drawn from (seed, number of the event), so that the same time line comes out wherever it is made.
-What lasts ends at the next `heal` at the latest. Neighbours: `stages.policy` (partitions), `stages.delay` (clogs),
-`links` (settings), `chaos` (what an event of chaos becomes).
+What lasts ends at the next `heal` at the latest.
 """
 
 from __future__ import annotations

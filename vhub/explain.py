@@ -2,7 +2,7 @@
 
 The numbers are those of its row; what a row does not have is made again from the deployment that is in the capture,
 the events that were asked for until then, and the packet's draws, which are a function of seed, link and number: so
-they have to agree with the row's. Neighbours: `explain_stages` (tells of each stage), `rows.PacketRow`, `foosim-net`.
+they have to agree with the row's.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""What a captured packet met on its radio's medium and channel, worked out again from its row and its draws.
-
-Neighbours: `explain_stages` (whose part it is), `radio` (the formulas), `stages.medium` and `stages.channel`.
-"""
+"""What a captured packet met on its radio's medium and channel, worked out again from its row and its draws."""
 
 from __future__ import annotations
 

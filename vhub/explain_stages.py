@@ -2,7 +2,6 @@
 
 A row has what a fate came from. What does not need to stand there is worked out again, exactly: draws and what they are
 compared with, airtime, outages, attempts on the medium, which event cut a link.
-Neighbours: `explain` (makes the whole story), `rows.PacketRow`, `stages` (whose order this follows).
 """
 
 from __future__ import annotations

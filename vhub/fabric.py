@@ -15,6 +15,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.draws import Slot, draw_key, draw_words
 from foosim.protocol.frame import Frame
 from foosim.protocol.impairments import Impairments, TableJitter
+from foosim.protocol.link_settings import NO_RADIO, Profile, Profiles, over
 from foosim.protocol.network import Network, event_of
 from foosim.protocol.radios import Radio
 from foosim.protocol.traces import read_opportunities, read_table
@@ -26,7 +27,6 @@ from foosim.vhub.jitter import quantiles_ns
 from foosim.vhub.link_models import LinkModel, make_model
 from foosim.vhub.memory import AirState, LinkState, RadioState
 from foosim.vhub.packet import Flight
-from foosim.vhub.profiles import NO_RADIO, Profile, Profiles, over
 from foosim.vhub.propagation import Propagation
 from foosim.vhub.setup import LinkSetup
 from foosim.vhub.stages import STAGES
@@ -223,7 +223,7 @@ class Fabric:
         self.seed = deployment.seed if self.network.seed is None else self.network.seed
         self.timeline = Timeline(self.network, self.seed, deployment.endpoints())
         self.world = World(deployment, self.network)
-        self.profiles = Profiles(deployment, self.network)
+        self.profiles = Profiles(self.network, deployment.carriers())
         self.states: dict[LinkKey, LinkState] = {}
         """What the links remember that packets were sent on."""
         self.radios: dict[RadioKey, RadioState] = {}
@@ -269,7 +269,7 @@ class Fabric:
         kind = self.profiles.kind(channel)
         link = self._links.get((source, destination, kind))
         if link is None:
-            rule = self.network.rule_for(source, destination, channel)
+            rule = self.profiles.rule_for(source, destination, channel)
             key = source, destination, "" if rule is None else rule.id
             link = self._by_rule.get(key)
             if link is None:

@@ -1,4 +1,4 @@
-"""Times, bit rates and lengths as people read them. Neighbours: `explain`, `supervisor.net_text`."""
+"""Times, bit rates and lengths as people read them."""
 
 from __future__ import annotations
 

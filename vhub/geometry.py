@@ -4,7 +4,7 @@ The things are those of the scene: the scenery, prepared once, and the bodies, p
 when somebody asks for a line in that frame. What is crossed is worked out from the lesser of the two ends, so both
 directions of a pair have the same crossings to the last bit. Boxes around things say in one pass for many lines where
 to look; what is said then comes from one spelling of plain floats, so it does not matter in which company or order a
-line is asked for. Neighbours: `rays` (lines and shapes), `protocol.scene` (what there is), `protocol.radio_materials`.
+line is asked for.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ straight line over any of them hardly differs from the law, however rare what it
 
 The routine uses only + - x / of IEEE doubles (its own exponential and logarithm), so that the table is the same on
 every machine, whatever its mathematical library. Source of the series: Abramowitz and Stegun, Handbook of Mathematical
-Functions, 6.5.29 (incomplete gamma). Neighbours: `numbers` (the functions), `stages.delay` draws from the tables.
+Functions, 6.5.29 (incomplete gamma).
 """
 
 from __future__ import annotations

@@ -3,8 +3,7 @@
 A deployment names a model and its parameters; it never brings code. The code is an entry point of the group
 `foosim.link_models` in a package that is installed where the vHub runs: a class, or a function, that takes the
 parameters and returns an object with the method of `LinkModel`. A model is a function of what it is given: it owns no
-clock, file or generator, so that a run whose vHub was started again has the same fates. Neighbours: `stages.own` asks
-it for each packet, `fabric` makes one for each set of parameters.
+clock, file or generator, so that a run whose vHub was started again has the same fates.
 """
 
 from __future__ import annotations

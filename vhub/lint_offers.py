@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
-from foosim.vhub.profiles import Profile, Profiles
+from foosim.protocol.link_settings import Profile, Profiles
 
 DRIVEN: Final = ("rod", "rover")
 """The models of robots that take commands."""

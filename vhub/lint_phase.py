@@ -1,6 +1,6 @@
 """What sensor and player make of a delay: where both act at fixed moments, the phase between them adds to every packet.
 
-Pure: `lint` asks, and has the delays. Neighbours: `ages` counts in a run what is foretold here.
+Pure: `lint` asks, and has the delays.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from math import gcd
 from typing import Final
 
 from foosim.protocol.deployment import Deployment
+from foosim.protocol.link_settings import Profiles
 from foosim.protocol.radios import Radio
 from foosim.protocol.units import format_ns
-from foosim.vhub.profiles import Profiles
 
 SHARE_LEAST: Final = 0.2
 """Of the mean age that the phase makes, from which on it is told."""
@@ -47,7 +47,7 @@ def _phases(
     has waited for (own - a - sampled) mod g ticks at the least, and for (every - g) / 2 more in the mean: the first is
     a matter of the phase alone.
     """
-    profiles = Profiles(deployment, deployment.network)
+    profiles = Profiles(deployment.network, deployment.carriers())
     tick_ns = deployment.tick_ns
     for name, player in deployment.players.items():
         if not player.lockstep or player.act != "period":

@@ -3,8 +3,7 @@
 A chunk and an attachment have a checksum of their own, metadata the entry `digest`. Behind the attachments stands the
 metadata `foosim.digests`: a digest of each attachment, and the checksum of all bytes before. The end has the checksum
 of everything before it, and one of the summary. What a chunk's head says of times is compared with the chunk's indexes.
-So a file without an end is checked, too, and one of which only a part is read. Neighbours: `mcap_file` and `mcap_scan`
-compare, `mcap_writer` writes.
+So a file without an end is checked, too, and one of which only a part is read.
 """
 
 from __future__ import annotations

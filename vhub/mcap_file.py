@@ -1,9 +1,7 @@
 """The MCAP container: its format, and records read with bounded memory.
 
 The format is https://mcap.dev/spec. A file that ends in the middle of a record is an unfinished one, and everything
-before is read; where a whole chunk follows, the record is a damaged one. Nothing here opens files. Neighbours:
-`mcap_writer`, `mcap_checks` (checksums), `mcap_scan` (to go on with an unfinished file), `capture_parts` (which files
-are read as one), `capture_reader`.
+before is read; where a whole chunk follows, the record is a damaged one. Nothing here opens files.
 """
 
 from __future__ import annotations

@@ -2,8 +2,7 @@
 
 A process that is killed leaves a record that is cut; a machine that loses its power may leave bytes that were never
 written. Everything before is kept, chunk by chunk, each with its checksum; nothing behind is. Who is in a hurry looks
-at the heads of old chunks only: what was synced long ago is there. Neighbours: `mcap_file` (the container),
-`capture_writer` (goes on), `capture_recovery` (completes).
+at the heads of old chunks only: what was synced long ago is there.
 """
 
 from __future__ import annotations

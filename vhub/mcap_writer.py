@@ -2,7 +2,7 @@
 
 The `mcap` library serialises here whatever is rare (schemas, channels, indexes, summary); messages and chunks are
 packed by this module, since the library's `add_message` costs several times what a hub has for a packet. It opens no
-files. Neighbours: `mcap_file` (the format, and reading), `capture_file`.
+files.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""A client that takes part, as the vHub's state knows it: in ticks and numbers, without its session.
-
-Neighbours: `state`, which holds them; `sessions` is about their processes.
-"""
+"""A client that takes part, as the vHub's state has it: ticks and numbers, without its session."""
 
 from __future__ import annotations
 

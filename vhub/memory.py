@@ -1,7 +1,6 @@
 """What the stages remember between packets: plain values, part of the hub's state, and so of its journal.
 
 Of each link, of each sender's radio (or port of a wire), and of each air, the channel that radios share.
-Neighbours: `stages` read and write them, `state` writes them down and takes them up again.
 """
 
 from __future__ import annotations

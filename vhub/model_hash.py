@@ -3,7 +3,7 @@
 Two captures with one hash were judged by the same model. What the formulas give is looked at where their results are
 rounded anyway (0.01 dB, parts per million, ns), so machines whose mathematical libraries differ in the last bit agree.
 The world with its materials is not in it, and a link model of one's own by name and parameters alone: the deployment
-and the versions beside it in the capture have these. Neighbours: `capture_file` writes it, `radio` has the formulas.
+and the versions beside it in the capture have these.
 """
 
 from __future__ import annotations

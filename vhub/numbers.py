@@ -2,7 +2,6 @@
 
 For what is computed once a link or an episode, not once a packet. Sources: Abramowitz and Stegun, Handbook of
 Mathematical Functions, 4.1.27 (logarithm), 4.2.1 (exponential), 6.1.41 (Stirling's series of ln gamma).
-Neighbours: `jitter` (quantiles), `episodes` (lengths of times).
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """A packet on its way through the pipeline, what became of it, and what led there.
 
 A flight is made when a packet is offered to one receiver; stages read it and write its due time, or name the one cause
-of its drop, and what they found on the way: the inputs of its fate. Neighbours: `links` walks the stages, `stages` are
-one file each.
+of its drop, and what they found on the way: the inputs of its fate.
 """
 
 from __future__ import annotations

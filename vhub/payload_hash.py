@@ -2,7 +2,7 @@
 
 With `capture.payloads: hashed` no payload stands in the file: not in rows of packets, nor in deliveries and outboxes,
 which a re-simulation is fed with. A hash tells whether two payloads are equal, and whether one is what somebody thinks
-it is; what can be guessed is not hidden by it. Neighbours: `rows` (the fields), `capture_file` (writes them so).
+it is; what can be guessed is not hidden by it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How a radio's signal gets from one place to another: path loss, walls, shadowing; the noise there, and the ratio.
 
 Levels are rounded to hundredths of a dB, so that verdicts compare integers and the last bit of a mathematical library
-decides nothing. Neighbours: `radio` (the formulas), `world` (places and walls), `budget` (one link), `air` (others).
+decides nothing.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Where the numbers come from that media have beside their settings: what `foosim-net presets` prints below a preset's.
 
 The numbers are those of the modules that hold them, so what is printed is what decides. The marks before the sources
-are those of `protocol.presets`. Neighbours: `radio` (timings, errors, path loss), `stages.medium` (which a radio has).
+are those of `protocol.presets`.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from foosim.protocol.link_settings import preset_radio
 from foosim.protocol.radios import LORA_LONGEST, Radio
 from foosim.vhub.figures import rate_text
-from foosim.vhub.profiles import preset_radio
 from foosim.vhub.propagation import environment_of
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import LRWPAN_OVERHEAD_BYTES, WIFI_ACK_BYTES, WIFI_OVERHEAD_BYTES
@@ -33,7 +33,7 @@ _READ: Final = ("best_effort", "voice")
 _LORAWAN: Final = "signetlabdei/lorawan"
 
 
-def held(preset: str) -> Iterator[Row]:
+def parameters_of(preset: str) -> Iterator[Row]:
     """Yield (name, value, source) of each number that decides on a preset's links and is no setting."""
     settings = preset_radio(preset)
     if not settings.is_on_air:

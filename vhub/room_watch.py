@@ -1,7 +1,6 @@
 """Looks after the room that the vHub has to write: of its capture, and of its journal, without which no run goes on.
 
-It says once what gets little, and when the run has to end: while what is left to be written still fits. Neighbours:
-`main` asks it, `capture_writer` has the state of the capture, `protocol.disk`.
+It says once what gets little, and when the run has to end: while what is left to be written still fits.
 """
 
 from __future__ import annotations

@@ -4,7 +4,6 @@ A row is a JSON object; its JSON Schema is generated from its type. Viewers (Fox
 JSON Schema: objects of numbers, strings, booleans, objects and lists of these; no null, no choice between types, no
 reference, no list in a list. So a row has every field always, and -1 or an empty text where there is nothing to say.
 Fields that come from a clock of the real world have names that start with `wall_`: two runs differ in them.
-Neighbours: `to_rows` (how a closing becomes rows), `capture_reader`, `viewing` (what is looked at).
 """
 
 from __future__ import annotations

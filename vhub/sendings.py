@@ -1,50 +1,46 @@
-"""What clients send at one tick, in the order of sending: first what robots may get by it, the rest when that is said.
+"""The order in which what clients send at one tick is judged: first what goes to robots, the rest once that has left.
 
-Nodes wait for what robots get, nobody for what clients do: the costly verdicts of a broadcast by radio are found while
-nodes compute. That changes no verdict: a packet goes first only by a link that shares nothing with any other
-(`Link.is_apart`), and where a link to a robot does share something all are judged in their order.
-Neighbours: `state` judges, `core` speaks between the two.
+Nodes wait for what robots receive, nobody for what clients do. So the costly verdicts of a broadcast by radio are found
+while nodes compute. No verdict changes by that: a packet is judged first only on a link that shares nothing with any
+other (`Link.is_apart`), and where a link to a robot does share something all packets are judged in their order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from foosim.vhub.packet import Flight
 
-Judge = Callable[[list[Flight], list[Flight]], None]
-"""Judges a packet for all its receivers; what is dropped is appended to the second list."""
 
+class SendOrder:
+    """The packets of one closing, each in its place. A packet is a list of flights, one for each of its receivers."""
 
-class Sendings:
-    """The packets of one closing, each in its place."""
-
-    def __init__(self, judge: Judge) -> None:
+    def __init__(self) -> None:
         self.arrived: list[Flight] = []
         """What has reached robots by this closing."""
-        self._judge = judge
         self._dropped: list[list[Flight]] = [[]]
-        """Of what was judged at once until one has to wait, of that one, of what came behind it, and so on."""
+        """Drops of what was judged before the first packet that waits, of that packet, of what came behind it, etc."""
         self._waiting: list[tuple[int, list[Flight]]] = []
 
-    def send(self, flights: list[Flight], *, now: bool) -> None:
-        """Take the next packet, one flight for each of its receivers; judge it now, or when the rest is judged."""
-        if now:
-            self._judge(flights, self._dropped[-1])
-        else:
-            self._waiting.append((len(self._dropped), flights))
-            self._dropped += [[], []]
+    @property
+    def dropped(self) -> list[Flight]:
+        """Where drops of the next packet go, if it is judged at once."""
+        return self._dropped[-1]
+
+    def defer(self, flights: list[Flight]) -> None:
+        """Have the next packet wait until the rest is judged."""
+        self._waiting.append((len(self._dropped), flights))
+        self._dropped += [[], []]
 
     @property
     def waiting(self) -> Iterator[Flight]:
         """What is not judged yet."""
         return (flight for _, flights in self._waiting for flight in flights)
 
-    def judge_rest(self) -> None:
-        """Judge what has not been judged, in its order."""
+    def take_waiting(self) -> list[tuple[list[Flight], list[Flight]]]:
+        """Take the packets that wait, in the order of sending, each with the list to which its drops go."""
         waiting, self._waiting = self._waiting, []
-        for place, flights in waiting:
-            self._judge(flights, self._dropped[place])
+        return [(flights, self._dropped[place]) for place, flights in waiting]
 
     def fates(self) -> list[Flight]:
         """Return what has its fate by this closing: drops in the order of sending, then what arrived."""

@@ -1,7 +1,4 @@
-"""A network's settings as people read them.
-
-Neighbours: `rehearsal.report` and the console show them; `lint` says what they amount to.
-"""
+"""A network's settings as people read them."""
 
 from __future__ import annotations
 

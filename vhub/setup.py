@@ -1,7 +1,4 @@
-"""What the stages of one link are made from.
-
-Neighbours: `links` makes it, `stages` read it.
-"""
+"""What the stages of one link are made from."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Shapes as rays meet them: a shape at a pose, where a line is inside of it, and which of these places are one.
-
-Neighbours: `rays` (lines and forms), `geometry` (what there is in a world).
-"""
+"""Shapes as rays meet them: a shape at a pose, where a line is inside of it, and which of these places are one."""
 
 from __future__ import annotations
 

@@ -2,7 +2,6 @@
 
 All rows are pure functions of closings, so what the writer missed can be made again from a fold of the journal
 (`records.fold`).
-Neighbours: `rows` (the types), `capture_file` (writes what is made here).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The library that writes such messages reads none, and a few nested messages do not justify a protobuf package: this
 reads the wire format (https://protobuf.dev/programming-guides/encoding) as far as FrameTransforms, Log and SceneUpdate
-need it, and passes by fields that it does not know. Neighbours: `viewing` writes, exports and replays read.
+need it, and passes by fields that it does not know.
 """
 
 from __future__ import annotations

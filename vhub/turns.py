@@ -6,7 +6,6 @@ counter is the first at its end, and who has just won draws anew from the least 
 in a row, and one whose attempts failed waits for long. Turns are found when a packet is sent, from those that are known
 by then; the turns of stations that were to come later are put off by one that comes in between, until they begin. What
 has begun stays.
-Neighbours: `air` (who is on it), `stages.medium` (draws), `radio.contention` (how attempts end).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Poses are every link's in the frame `world`, by the one forward kinematics. The scene hangs its shapes on the links
 (`frame_locked`), so it is said once and when the layout changes. Foxglove, Lichtblick and (but for the scene) rerun
-decode them. Neighbours: `protocol.scene`, `rows` (what is recorded), `capture_writer`.
+decode them.
 """
 
 from __future__ import annotations

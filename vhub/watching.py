@@ -1,8 +1,7 @@
-"""What the vHub keeps for people of links and readings that they look at: the last drops, the last readings.
+"""Keeps the last drops of links and the last readings of channels that a viewer looks at.
 
-Nothing is kept of what nobody looks at, and nothing of it is in the state, the journal or the capture: a run is the
-same whoever looks. Neighbours: `core` closes ticks, `report` sends what is kept, `supervisor.viewing` says what is
-looked at, `supervisor.drops_shown` tells of the drops.
+Nothing is kept of what nobody looks at, and none of it is in the state, the journal or the capture: viewers do not
+change a run.
 """
 
 from __future__ import annotations

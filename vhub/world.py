@@ -1,7 +1,4 @@
-"""Where endpoints are and what stands between them, as of the newest committed frame.
-
-Neighbours: `geometry` (rays), `propagation` asks, `state` turns it to the frame of each closing.
-"""
+"""Where endpoints are and what stands between them, as of the newest committed frame."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from foosim.protocol.messages import Deliveries
 from foosim.vhub import core, records, state
 from foosim.vhub.commits import Commits
 from foosim.vhub.core import HubCore
-from foosim.vhub.door import Door
+from foosim.vhub.door import Clients
 from foosim.vhub.sessions import Sessions
 from foosim.vhub.state import HubState
 
@@ -129,19 +129,19 @@ def _go_once(planting: Planting) -> None:
 def _any_done(planting: Planting) -> None:
     def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
         session = self._session(done)
-        if session is not None and self._core.waits_for(done.name):
+        if session is not None and self.waits_for(done.name):
             self.take_done(done.name)
             session.done = done
 
-    planting.swap(Door, "done", done)
+    planting.swap(Clients, "on_done", done)
 
 
 @register("downlinks are not numbered", "each downlink has the next number", 1)
 def _same_number(planting: Planting) -> None:
-    def say_go(self: Any, session: Any, go: Any) -> None:
+    def send_go(self: Any, session: Any, go: Any) -> None:
         before(self, session, replace(go, number=go.number - go.number % 2))
 
-    before: Any = planting.swap(Sessions, "say_go", say_go)
+    before: Any = planting.swap(Sessions, "send_go", send_go)
 
 
 @register("fold forgets downlinks", "a fold of the journal gives the state again", 1)
@@ -179,9 +179,9 @@ def _left_out(planting: Planting) -> None:
 @register("Dones lose packets", "nothing that a client answered is lost", 1)
 def _cut_dones(planting: Planting) -> None:
     def done(self: Any, done: Any, payload: bytes, now_ns: int) -> None:
-        before(self, replace(done, packets=[]) if self._core.repeated else done, payload, now_ns)
+        before(self, replace(done, packets=[]) if self.repeated else done, payload, now_ns)
 
-    before: Any = planting.swap(Door, "done", done)
+    before: Any = planting.swap(Clients, "on_done", done)
 
 
 @register("who leaves is not written", "leaving is an input of the tick whose Done is owed", 71)
@@ -190,12 +190,12 @@ def _unwritten_leave(planting: Planting) -> None:
         before(self, state, closing)
         closing.owing = []
 
-    before: Any = planting.swap(Door, "leave_owing", leave_owing)
+    before: Any = planting.swap(Clients, "leave_owing", leave_owing)
 
 
 @register("what is owed is not said", "what the Go of who leaves owing had is said behind the record", 127)
 def _unsaid(planting: Planting) -> None:
-    planting.swap(Sessions, "say_owed", lambda self, name, now_ns: None)
+    planting.swap(Sessions, "send_owed", lambda self, name, now_ns: None)
 
 
 @register("commits are kept for ever", "what a process keeps is bounded (vHub)", 1)

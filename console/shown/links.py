@@ -3,7 +3,7 @@ between.
 
 The vHub counts from the start; a window is the difference of two counts, of which the older one is at most so many
 seconds of simulated time old. Pure. Neighbours: `live_source` feeds it, `vhub.world` (antennas and lines of
-sight), `vhub.profiles` (which links go by radio).
+sight), `protocol.link_settings` (which links go by radio).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import Any, Final
 
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
+from foosim.protocol.link_settings import Profiles
 from foosim.protocol.scene import ORIGIN, Scene, Vector
 from foosim.vhub.fabric import name_of
-from foosim.vhub.profiles import Profiles
 from foosim.vhub.world import World
 
 WINDOW_S: Final = 5.0
@@ -110,7 +110,7 @@ class Links:
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
         self._world = World(deployment, deployment.network)
-        self._profiles = Profiles(deployment, deployment.network)
+        self._profiles = Profiles(deployment.network, deployment.carriers())
         self._windows = Windows()
         self._on_air: dict[Key, bool] = {}
         self._ends: dict[str, int | None] = {}
@@ -200,7 +200,7 @@ class Links:
         found = self._on_air.get(key)
         if found is None:
             source, destination, name = key
-            rules = self._deployment.network.rules_for(source, destination)
+            rules = self._profiles.rules_for(source, destination)
             profiles = (self._profiles.of_rule(rule, source, destination) for rule in rules)
             found = any(profile.settings.is_on_air for profile in profiles if name_of(profile) == name)
             self._on_air[key] = found

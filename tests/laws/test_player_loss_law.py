@@ -102,12 +102,12 @@ class LateNews(HubCore):
 
     away, left = b"", -1
 
-    def say_heartbeat(self) -> None:
+    def send_heartbeat(self) -> None:
         assert self.state is not None
-        if self.door.absences.report()["over"]:
+        if self.clients.absences.report()["over"]:
             self.left = self.left if self.left >= 0 else self.state.closed
         else:
-            super().say_heartbeat()
+            super().send_heartbeat()
             self.away = encode(self.heartbeat())
 
     def advance(self, now_ns: int) -> None:

@@ -34,7 +34,7 @@ from foosim.supervisor.plan import make_plan
 from foosim.supervisor.run_folder import RunFolder
 from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.watch import Watch
-from foosim.vhub.door import Door
+from foosim.vhub.core import HubCore
 from foosim.vhub.main import HubOptions, HubProcess
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -238,7 +238,7 @@ def supervisor_of(session: Session, inbox: Inbox, folder: Path) -> object:
 
 SHELLS: Final[dict[str, tuple[Callable[[Session, Inbox, Path], Any], type]]] = {
     "supervisor": (supervisor_of, Watch),
-    "vhub": (lambda session, inbox, _: HubProcess(session, lambda deployment: session, inbox, HubOptions()), Door),
+    "vhub": (lambda session, inbox, _: HubProcess(session, lambda deployment: session, inbox, HubOptions()), HubCore),
     "node": (lambda session, inbox, _: NodeProcess("n1", session, inbox), Orphan),
     "players": (lambda session, inbox, _: PlayerProcess(PLAYERS, session, inbox), ClientCore),
     "client": (lambda session, _, __: Link(ClientCore("ear", "boot", time.monotonic_ns()), session), ClientCore),

@@ -14,6 +14,7 @@ import pytest
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.draws import draw_words
 from foosim.protocol.errors import DeploymentError
+from foosim.protocol.link_settings import Profiles
 from foosim.protocol.messages import Sent
 from foosim.protocol.scene import Vector
 from foosim.rehearsal.rehearse import rehearse
@@ -24,7 +25,6 @@ from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.explain import PacketName, explain_packet
 from foosim.vhub.fabric import Fabric
 from foosim.vhub.link_models import ModelError, Passage, check_link_models, differing_models, model_versions
-from foosim.vhub.profiles import Profiles
 from foosim.vhub.records import Closing
 from foosim.vhub.rows import PACKETS, PacketRow
 from foosim.vhub.settings_text import impairments_text, radio_text
@@ -193,7 +193,8 @@ def test_fates_do_not_know_nodes_or_a_vhub_that_was_killed(tmp_path: Path) -> No
     assert rows_of_run(2, kill=True)[0] == rows
     capture = open_capture(tmp_path / "run.mcap")
     assert capture.about.versions["link model fog"] == "foggy 1.2"
-    assert Profiles(capture.deployment, capture.deployment.network).on_radio, "fates depend on where endpoints are"
+    profiles = Profiles(capture.deployment.network, capture.deployment.carriers())
+    assert profiles.on_radio, "fates depend on where endpoints are"
     found = what_if(capture)
     assert (found.packets, found.changed, found.inputs_changed) == (len(rows), 0, 0)
     assert 100 < found.causes[MODEL] < result["packets"]["offered"] / 2

@@ -42,9 +42,9 @@ class Slow:
             self.ended_ns = self.system.bus.now_ns
             for at_s, do in self.at.items():
                 self.system.later(int(at_s * S), partial(do, self.system))
-        hub.capture = self.capture
-        hub.recording = {"state": "closing", "problem": "", "written": min(passed_ns, self.stalls_ns) // (S // 2)}
-        hub.disk_progress = min(passed_ns, self.syncs_ns) // (S // 2)
+        hub.shell.capture = self.capture
+        hub.shell.recording = {"state": "closing", "problem": "", "written": min(passed_ns, self.stalls_ns) // (S // 2)}
+        hub.shell.disk_progress = min(passed_ns, self.syncs_ns) // (S // 2)
         self.waited |= {hub.waiting_for}
         told = status(self.system.supervisor, 0)
         self.seen.append({"written": told["recording"]["written"], "waits": told["processes"][VHUB]["waiting_for"]})

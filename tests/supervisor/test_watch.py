@@ -25,7 +25,7 @@ from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.status import status
 from foosim.supervisor.watch import Watch, _names
 from foosim.vhub.core import HubCore
-from foosim.vhub.waits import Waits
+from foosim.vhub.waits import WaitTimes
 from tests.turns import BY_PERIOD
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -458,7 +458,7 @@ def test_the_watch_keeps_a_few_ticks_only() -> None:
 
 
 def closed(commit_ms: int, samples_ms: int, done_ms: int, busy_ms: int = 0, least_ms: int = 1) -> str:
-    waits = Waits()
+    waits = WaitTimes()
     waits.node, waits.client = "n2", "player-red"
     waits.begin(commit_ms * MS)
     waits.begin((commit_ms + 1) * MS)

@@ -46,7 +46,7 @@ from foosim.protocol.start import AddedEntity, initial_numbers
 from foosim.vhub import capture_contents, capture_writer
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.keeping import RecordClosing, RecordEpoch
 from foosim.vhub.records import Closing, HubRecord, TickRecord
 from tests.turns import BY_PERIOD
 
@@ -124,9 +124,9 @@ class Driver:
                 self.run.journal.append(action.record)
                 if not self.run.records or isinstance(decode_any(HubRecord, action.record), TickRecord):
                     self.run.records.append(action.record)
-            elif isinstance(action, Keep):
+            elif isinstance(action, RecordClosing):
                 self.run.closings.append(action.closing)
-            elif isinstance(action, KeepEpoch):
+            elif isinstance(action, RecordEpoch):
                 self.run.epochs.append(action.epoch)
             elif isinstance(action, Publish) and action.channel is channels.DELIVERIES:
                 deliveries = decode(Deliveries, action.payload)

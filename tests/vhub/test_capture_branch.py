@@ -13,7 +13,7 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Epoch
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.keeping import Keep
+from foosim.vhub.keeping import RecordClosing
 from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.records import Closing, HubRecord, TickRecord
 from foosim.vhub.resume import Captured, end_of, first_tick_of, recall
@@ -42,7 +42,7 @@ def go_on(path: Path, run: HubRun, records: Sequence[bytes]) -> Captured:
     if past.known is not None:
         writer.keep(Closing(past.known, past.known.digest, [], []))
     for item in past.kept:
-        writer.keep(item.closing if isinstance(item, Keep) else item.epoch)
+        writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
     known = 0 if past.epoch is None else past.epoch.epoch
     for epoch in run.epochs:
         if epoch.epoch > known:

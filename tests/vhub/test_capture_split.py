@@ -24,7 +24,7 @@ from foosim.vhub.capture_reader import open_capture, read_about
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.capture_split import Split
 from foosim.vhub.capture_writer import CaptureWriter
-from foosim.vhub.keeping import Keep
+from foosim.vhub.keeping import RecordClosing
 from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.mcap_writer import McapWriter
@@ -330,7 +330,7 @@ def test_a_vhub_goes_on_with_what_it_left_wherever_its_journal_ends(
         if past.known is not None:
             writer.keep(Closing(past.known, past.known.digest, [], []))
         for item in past.kept:
-            writer.keep(item.closing if isinstance(item, Keep) else item.epoch)
+            writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
         for epoch in hub_run.epochs:
             if past.epoch is None or epoch.epoch > past.epoch.epoch:
                 writer.keep(epoch)

@@ -14,7 +14,7 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.hub_messages import Proceed
 from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Down, Epoch, Failure, Go, Join, Tempo
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep
+from foosim.vhub.keeping import RecordClosing
 from foosim.vhub.records import HubRecord, TickRecord
 from foosim.vhub.resume import recall
 from foosim.vhub.sessions import BOOTS_KEPT
@@ -48,7 +48,7 @@ def test_a_vhub_that_stood_still_is_no_orphan_by_that() -> None:
     hub = Hub().begin()
     orphan_ns = hub.core.deployment.deadlines.orphan_ns  # type: ignore[union-attr]
     hub.core.orphan.hear(False, 0)
-    hub.core.door.rest(2 * orphan_ns, 2 * orphan_ns)
+    hub.core.rest(2 * orphan_ns, 2 * orphan_ns)
     assert not hub.core.orphan.is_over(hub.core.deployment, 3 * orphan_ns - 1)
     assert hub.core.orphan.is_over(hub.core.deployment, 3 * orphan_ns)
 
@@ -63,14 +63,14 @@ def test_a_client_leaves_once_however_often_it_comes_and_goes() -> None:
     hub.core.client_gone("ear", 0)
     for tick in range(1, 5):
         hub.close(tick)
-    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, Keep)]
+    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, RecordClosing)]
     assert [leaves for leaves in left if leaves] == [["ear"]]
     for tick in range(5, 15):
         if hub.state.hears_clients:
             hub.enter("ear", boot=f"at {tick}")
             hub.core.client_gone("ear", 0)
         hub.close(tick)
-    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, Keep)]
+    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, RecordClosing)]
     assert [leaves for leaves in left if leaves] == [["ear"]], "who has left cannot leave"
 
 
@@ -205,7 +205,7 @@ def test_the_account_tells_of_the_process_that_joins(
         if who is not None:
             hello(hub, RED, *who)
     assert join(hub, RED, living[0]) == []
-    report = hub.core.door.absences.report()
+    report = hub.core.clients.absences.report()
     assert (report["away"], len(report["over"])) == ([], entries)
 
 
@@ -216,10 +216,10 @@ def test_what_comes_late_of_a_process_that_has_not_joined_is_no_answer() -> None
     hello(hub, RED, "one", 1)
     hello(hub, RED, "two", 0)
     hub.done(RED, 5, sent(1))
-    assert RED in hub.core.waited
+    assert RED in hub.core.clients.waited
     join(hub, RED, "two")
     hub.done(RED, 5, sent(1), boot="two")
-    assert RED not in hub.core.waited
+    assert RED not in hub.core.clients.waited
 
 
 def test_of_processes_that_come_and_go_under_one_name_the_last_are_kept() -> None:
@@ -250,7 +250,7 @@ def test_what_a_player_that_leaves_owing_was_not_told_is_said_behind_the_record(
     hello(hub, BLUE, "one", 1)
     join(hub, BLUE, "one")
     hub.done(BLUE, 5)
-    assert hub.core.waited == [RED] and not hub.said(channels.DOWN)
+    assert hub.core.clients.waited == [RED] and not hub.said(channels.DOWN)
     hub.now_ns = 30_000 * MS
     hub.core.wake(hub.now_ns)
     hub.core.advance(hub.now_ns)
@@ -283,7 +283,7 @@ def left_owing() -> tuple[Hub, Go]:
     hub.say(channels.CLIENT_HELLO, RED, ClientHello(RED, "two", limits.PROTOCOL_VERSION, "", 0))
     hub.now_ns = 30_000 * MS
     hub.core.wake(hub.now_ns)
-    assert hub.core.waited == [BLUE]
+    assert hub.core.clients.waited == [BLUE]
     return hub, go
 
 

@@ -13,14 +13,14 @@ from foosim.protocol.hub_messages import Proceed, Standing
 from foosim.protocol.messages import Build, ClientHello, Deliveries, Done, Epoch, Want
 from foosim.supervisor.arrivals import Arrivals
 from foosim.vhub.core import HubCore
-from foosim.vhub.keeping import Keep, KeepEpoch
+from foosim.vhub.keeping import RecordClosing, RecordEpoch
 from foosim.vhub.records import HeadRecord, HubRecord
 from foosim.vhub.resume import recall
 from tests.client.test_core import DEPLOYMENT, NAME, TEXT
 from tests.client.test_return import Storm
 
 CLOSED: Final = 7
-Said = list[Action | Keep | KeepEpoch]
+Said = list[Action | RecordClosing | RecordEpoch]
 
 
 class Waiting(Storm):
@@ -50,10 +50,10 @@ class Waiting(Storm):
             self.carry(self.hand)
 
     def waits(self) -> bool:
-        return self.hub.footing.waits
+        return self.hub.handshake.waits
 
     def lost_machine(self) -> bool:
-        return self.hub.footing.lost_machine
+        return self.hub.handshake.lost_machine
 
     def take(self) -> Said:
         taken: Said = [*self.hub.actions]

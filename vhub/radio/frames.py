@@ -1,7 +1,6 @@
 """Payloads as Wi-Fi frames: the modulation that rate control takes, and how long frame and acknowledgement last.
 
-What is asked for each packet is looked up by the payload's size, in bytes. Neighbours: `errors` (what gets through),
-`airtime` (the durations), `contention` (when it is sent).
+What is asked for each packet is looked up by the payload's size, in bytes.
 """
 
 from __future__ import annotations

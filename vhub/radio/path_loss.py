@@ -2,8 +2,7 @@
 
 The curve without line of sight is the floor that multipath sets: without it three concrete walls or one steel box would
 cut a link off that in reality goes round them; with it alone, materials would not matter. Distances are the antennas'
-in three dimensions, at least 1 m; frequencies in Hz; heights in m above the ground. Neighbours: `materials` gives the
-walls' loss, `shadowing` takes the standard deviations and correlation distances.
+in three dimensions, at least 1 m; frequencies in Hz; heights in m above the ground.
 """
 
 from __future__ import annotations

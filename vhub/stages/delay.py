@@ -2,7 +2,7 @@
 
 Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo unless
 they say otherwise. A clog that is asked for, or healed, while packets are on their way moves their due times: as if it
-had been known when they were sent. Neighbours: `jitter` makes the table.
+had been known when they were sent.
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 A wire serialises. On Wi-Fi a station freezes its backoff while those that it hears send, contends with them, and
 repeats what is not acknowledged: others appear as delay to unicasts, and as loss to broadcasts, which are sent once.
 IEEE 802.15.4 looks before it sends. LoRa sends at once. What is out of range is on air all the same.
-Neighbours: `queue` (what waits before), `air` (who is on air), `radio` (the formulas), `channel` (what gets through).
 """
 
 from __future__ import annotations

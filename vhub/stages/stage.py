@@ -1,7 +1,4 @@
-"""What a stage is: one step of the pipeline on one link, with two hooks of which it may leave out either.
-
-Neighbours: the table of all stages (`stages`), `links` (calls the hooks that there are).
-"""
+"""What a stage is: one step of the pipeline on one link, with two hooks of which it may leave out either."""
 
 from __future__ import annotations
 
