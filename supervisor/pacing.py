@@ -88,7 +88,7 @@ class Pacer:
         self.granted = max(self.granted, next_tick) + count if self.paused else next_tick + count
         self.paused = True
 
-    def set_back(self, ticks: int, tick: int, now_ns: int) -> None:
+    def roll_back(self, ticks: int, tick: int, now_ns: int) -> None:
         """The run goes on from an earlier tick, so many before: now, and while paused no further than it was to go."""
         if self.paused:
             self.granted = max(tick, self.granted - ticks)

@@ -1,10 +1,9 @@
-"""Who looks at a run: committed frames for people, as long as somebody has a lease on them.
+"""Viewers of a run: committed frames are published for as long as a viewer has a lease.
 
-`watch` begins or renews a lease of the one who asks, `describe` says what one has to know to read frames. A frame goes
-out on `view` as the bytes that were journalled, at the highest rate that a lease asks for on the wall, one whose edits
-change the layout at once, and what is behind them at the next wake: of a world that is paused the last frame was shown.
-Leases are in no journal: after a loss of the supervisor they are asked for again. Neighbours: `core` commits,
-`requests` has the verbs.
+The verb `watch` begins or renews a lease, `describe` returns what a viewer needs to read frames. A frame is published
+on `view` as the bytes that were journalled, at the highest rate of the leases by wall time; a frame whose edits change
+the layout at once; the last one at the next wake, so that a paused world shows its last frame. Leases are not
+journalled: viewers renew them with a supervisor that was started again.
 """
 
 from __future__ import annotations
@@ -12,20 +11,17 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish
-from foosim.protocol.codec import encode
 from foosim.protocol.edits import Add, Edit, Remove
 from foosim.protocol.errors import Refused, show
 from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Answer, Heartbeat, Request
+from foosim.protocol.names import nearest_name
 from foosim.protocol.view_messages import Watched
-from foosim.supervisor.choices import chosen
-
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.state import RunState
 
 LEASE_NS: Final = 5_000_000_000
 HZ_MAX: Final = 100.0
@@ -51,10 +47,10 @@ class _Lease:
 class Viewing:
     """The leases, and what is published by them."""
 
-    def __init__(self, core: SupervisorCore) -> None:
+    def __init__(self, state: RunState) -> None:
         self.is_shown = False
         """Whether somebody wants frames: all that a commit has to ask while nobody does."""
-        self._core = core
+        self._state = state
         self._leases: dict[str, _Lease] = {}
         """By who asks."""
         self._watched = Watched([], [])
@@ -87,20 +83,20 @@ class Viewing:
 
     def describe(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
         """Say what is run, who owns what, and where the world is: what one has to know to read the frames."""
-        core, run = self._core, self._core.settings
+        state, run = self._state, self._state.settings
         commit = self._last_commit
         has_frame = 0 < len(commit) <= FRAME_BYTES_MAX
         what = {
             "run": run.run,
             "deployment_name": run.deployment_name,
             "deployment": run.deployment_text,
-            "added": [(entity.name, entity.model) for entity in core.added_to(core.frame.layout)],
-            "layout": core.frame.layout.digest.hex(),
-            "pace": str(core.pacer.pace),
-            "owners": core.owners,
-            "epoch": core.epoch,
-            "first_tick": core.first_tick,
-            "tick": core.frame.tick,
+            "added": [(entity.name, entity.model) for entity in state.added(state.frame.layout)],
+            "layout": state.frame.layout.digest.hex(),
+            "pace": str(state.pacer.pace),
+            "owners": state.owners,
+            "epoch": state.epoch,
+            "first_tick": state.first_tick,
+            "tick": state.frame.tick,
             "frame": base64.b64encode(commit).decode() if has_frame else None,
         }
         return self._answer(request, what)
@@ -121,7 +117,7 @@ class Viewing:
             self._show(now_ns)
 
     def _show(self, now_ns: int) -> None:
-        self._core.actions.append(Publish(channels.VIEW, channels.SUPERVISOR, self._unseen))
+        self._state.actions.append(Publish(channels.VIEW, channels.SUPERVISOR, self._unseen))
         self._unseen = b""
         self._due_ns += self._period_ns
         if self._due_ns <= now_ns:  # nothing is made up for
@@ -144,15 +140,15 @@ class Viewing:
 
     def _hub_is_wrong(self) -> bool:
         """Whether the vHub keeps what nobody looks at: it has missed that, or another supervisor told it to."""
-        hub = self._core.roster.by_name.get(channels.VHUB)
+        hub = self._state.roster.by_name.get(channels.VHUB)
         keeps = hub is not None and "watched" in hub.report and hub.heartbeat is not self._told_at
-        return keeps and not self._is_watching and self._core.end is None
+        return keeps and not self._is_watching and self._state.end is None
 
     def _say_watched(self, watched: Watched) -> None:
         self._watched = watched
-        hub = self._core.roster.by_name.get(channels.VHUB)
+        hub = self._state.roster.by_name.get(channels.VHUB)
         self._told_at = None if hub is None else hub.heartbeat
-        self._core.actions.append(Publish(channels.WATCHED, channels.SUPERVISOR, encode(watched)))
+        self._state.publish(channels.WATCHED, channels.SUPERVISOR, watched)
 
     @property
     def _is_watching(self) -> bool:
@@ -160,20 +156,20 @@ class Viewing:
 
     def _link(self, source: str, destination: str) -> None:
         """Raise Refused for a link without ends."""
-        ends = self._core.deployment.endpoints()
+        ends = self._state.deployment.endpoints()
         for name in (source, destination):
             chosen("endpoint", name, ends)
 
     def _reading(self, robot: str, channel: str) -> None:
         """Raise Refused for what no sensor measures."""
-        robots = self._core.deployment.robots
+        robots = self._state.deployment.robots
         sensors = robots[chosen("robot", robot, sorted(robots))].sensors
         chosen(f"sensor of {robot}", channel, sorted(sensors))
 
     @property
     def _last_commit(self) -> bytes:
         """The last commit as it was published; empty before the first."""
-        return self._core.commits.get(self._core.frame.tick, b"")
+        return self._state.commits.get(self._state.frame.tick, b"")
 
     def _set_rate(self) -> None:
         """Show frames as often as the most eager lease wants, and as their size allows."""
@@ -185,7 +181,7 @@ class Viewing:
             self._unseen = b""
 
     def _answer(self, request: Request, result: dict[str, Any]) -> Answer:
-        return Answer(request.sender, request.id, True, self._core.frame.tick, "", encode_json(result))
+        return Answer(request.sender, request.id, True, self._state.frame.tick, "", encode_json(result))
 
 
 def _rate(value: object) -> float:
@@ -222,3 +218,12 @@ def _pairs(what: str, value: object, check: Callable[[str, str], None]) -> list[
         check(*pair)
         found.append((pair[0], pair[1]))
     return found
+
+
+def chosen(what: str, name: str, choices: Sequence[str]) -> str:
+    """Return the name; raises Refused, with the choices, when it is none of them."""
+    if name in choices:
+        return name
+    nearest = nearest_name(name, choices)
+    hint = f", nearest is {nearest}" if nearest else ""
+    raise Refused(f"no {what} {show(name)}; there are {', '.join(choices) or 'none'}{hint}")

@@ -2,7 +2,7 @@
 
 It is told in every heartbeat, with a number each, since heartbeats may be lost, and is in the journal before that:
 a vHub that is started again tells it once more. Neighbours: `door` notes it, `report` tells it, `records` has it,
-`supervisor.departures` takes it.
+`supervisor.vhub_loss` takes it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What the vHub's loop runs once its run has ended, until the capture is closed: it shows that it lives, and how far it
 is, and takes nothing more.
 
-Neighbours: `core` has decided all that there was, `capture_writer` closes, `supervisor.closing` waits.
+Neighbours: `core` has decided all that there was, `capture_writer` closes, `supervisor.progress` waits.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Its journal may have lost its end with the machine. So it tells the supervisor how far it has come, and closes nothing,
 takes no commit and lets nobody in until it hears that it may proceed. Where others had come further, the run goes on as
 a branch: what was said before is named anew, so that nothing of what is void can be taken for it.
-Neighbours: `core` goes on, `resume` reads the journal, `supervisor.branches` decides.
+Neighbours: `core` goes on, `resume` reads the journal, `supervisor.failover` decides.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Whom the closing of a tick waited for, and for how long: what makes a late tick's culprit known.
 
 A closing waits for the nodes' samples once its commit is there, and for the clients' Dones once their Go is said. Time
-in which the hub itself was busy counts for nobody else. Neighbours: `core` closes ticks, `supervisor.watch` is told.
+in which the hub itself was busy counts for nobody else. Neighbours: `core` closes ticks, `supervisor.progress` is told.
 """
 
 from __future__ import annotations

@@ -113,7 +113,11 @@ def test_a_run_is_the_same_whoever_looks() -> None:
     alone, looked_at = unseen(), seen()
     assert looked_at.system.people.viewed and looked_at.watched["readings"]
     one, other = alone.system, looked_at.system
-    assert one.supervisor.chain == other.supervisor.chain and one.hub.state is not None and other.hub.state is not None
+    assert (
+        one.supervisor.state.chain == other.supervisor.state.chain
+        and one.hub.state is not None
+        and other.hub.state is not None
+    )
     assert one.hub.state.snapshot() == other.hub.state.snapshot()
     rows = [[packet_row(flight) for closing in run.closings for flight in closing.fates] for run in (alone, looked_at)]
     assert len(rows[0]) > 300 and rows[0] == rows[1]
@@ -148,7 +152,7 @@ def test_the_readings_of_a_watched_sensor_are_told_with_their_ticks() -> None:
 
 
 def evidence(run: Run, frames: Mapping[int, Frame] | None = None) -> Reported:
-    deployment = run.system.supervisor.deployment
+    deployment = run.system.supervisor.state.deployment
     return Reported(deployment, run.watched, lambda tick: None if frames is None else frames.get(tick))
 
 
@@ -158,7 +162,7 @@ class Everything:
     versions: Final[Mapping[str, str]] = {}
 
     def __init__(self, run: Run) -> None:
-        self.deployment: Deployment = run.system.supervisor.deployment
+        self.deployment: Deployment = run.system.supervisor.state.deployment
         self._closings = run.closings
 
     def asked(self, until: int) -> Iterable[tuple[int, str]]:
@@ -246,7 +250,7 @@ def test_what_cannot_be_looked_at_is_refused(arguments: dict[str, Any], text: st
 
 def test_so_much_is_looked_at_together_and_no_more() -> None:
     run = Run(ticks=30)
-    ends = run.system.supervisor.deployment.endpoints()
+    ends = run.system.supervisor.state.deployment.endpoints()
     pairs = [(a, b) for a in ends for b in ends]
     answers: list[str] = []
     asked = (("one", pairs[:40]), ("other", pairs[20:60]), ("third", pairs[60:90]))
@@ -280,7 +284,7 @@ def test_a_report_of_what_is_looked_at_has_a_size() -> None:
 
 def test_a_page_is_told_of_drops_with_their_steps_and_of_each_reading_once() -> None:
     run = seen()
-    console = Shown(run.system.supervisor.deployment)
+    console = Shown(run.system.supervisor.state.deployment)
     reports = [report["watched"] for report in run.reports if "watched" in report]
     messages = [console.drops(report, [LINK]) for report in reports]
     (last,) = next(told for told in reversed(messages) if told)

@@ -1,19 +1,17 @@
-"""Balancing: robots move, one at a time, from the busiest node to the idlest.
+"""Load balancing: robots move, one at a time, from the busiest node to the idlest.
 
-A node's load is the share of its time in which its loop does not sleep, as its heartbeats tell. A move is an epoch as
-any other: the world does not notice. A robot's cost is taken to be an equal share of its node's load; it moves only
-when that makes the two nodes more alike, and then the loads settle before the next one. Neighbours: `core` asks at its
-wakes, `recovery` gives robots back to nodes that return.
+A node's load is the share of its time in which its loop does not sleep, as its heartbeats report. A move is an epoch
+like any other and does not change the world. The cost of a robot is estimated as an equal share of its node's load; it
+moves only when that makes the two loads more equal, and then the loads settle before the next move.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-if TYPE_CHECKING:
-    from foosim.supervisor.core import SupervisorCore
+from foosim.supervisor.state import RunState
 
 EVERY_NS: Final = 1_000_000_000
 """How often loads are looked at: a heartbeat tells the load of the last second."""
@@ -36,6 +34,11 @@ class Shift:
     target: str
     source_load: float
     target_load: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.robot} moves from {self.source} ({self.source_load:.0%}) to {self.target} ({self.target_load:.0%})"
+        )
 
 
 class Balancer:
@@ -74,17 +77,11 @@ class Balancer:
         self._means = {}
         return Shift(robot, source, target, means[source], means[target])
 
-    def wake(self, core: SupervisorCore, now_ns: int) -> None:
-        """Look at the nodes of a running world, and move what should."""
-        if not core.is_open or core.end is not None or core.pacer.paused:
-            return
-        known = core.roster.by_name
-        beats = {name: known[name].heartbeat for name in core.members if name in known}
+    def wake(self, state: RunState, now_ns: int) -> Shift | None:
+        """Return what should move now in a running world, by the loads that its members reported last."""
+        if not state.is_open or state.end is not None or state.pacer.paused:
+            return None
+        known = state.roster.by_name
+        beats = {name: known[name].heartbeat for name in state.members if name in known}
         loads = {name: beat.busy for name, beat in beats.items() if beat is not None}
-        shift = self.look(loads, core.owners, now_ns) if len(loads) == len(core.members) else None
-        if shift is None:
-            return
-        core.account.moves += 1
-        core.open_epoch({**core.owners, shift.robot: shift.target}, now_ns)
-        source, target = f"{shift.source} ({shift.source_load:.0%})", f"{shift.target} ({shift.target_load:.0%})"
-        core.say("info", f"{shift.robot} moves from {source} to {target} at tick {core.frame.tick}")
+        return self.look(loads, state.owners, now_ns) if len(loads) == len(state.members) else None
