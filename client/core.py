@@ -23,16 +23,17 @@ from foosim.client.packets import Outgoing, check_packet, check_subscription, sp
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
-from foosim.protocol.client_messages import ClientRefusal, Failure
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.messages import (
     ClientHello,
+    ClientRefusal,
     ClientWelcome,
     Done,
     Down,
+    Failure,
     Go,
     Heard,
     Join,

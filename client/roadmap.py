@@ -1,4 +1,4 @@
-"""Where a rover may drive, from the deployment's hall and scenery: spots on a grid, and the straight ways between them.
+"""Where a rover may drive, by the deployment's hall and scenery: spots on a grid and straight ways between them.
 
 Neighbours: `patrol` drives along it, `protocol.obstacles` says what stands in the way.
 """

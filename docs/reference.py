@@ -1,4 +1,4 @@
-"""Writes the generated parts of the docs: `python docs/reference.py`.
+"""Writes the generated parts of the docs, and the schema of deployments: `python docs/reference.py`.
 
 A generated part stands between the comments `<!-- generated: NAME -->` and `<!-- end -->` of a page in this folder. It
 says what the code says: the deployment's schema, the commands' options, the table of channels, the rows of a capture.
@@ -20,7 +20,7 @@ from foosim.console.main import app as console_app
 from foosim.node.main import app as node_app
 from foosim.protocol import limits, units
 from foosim.protocol.channels import CHANNELS
-from foosim.protocol.deployment import deployment_schema
+from foosim.protocol.deployment import deployment_schema, deployment_schema_text
 from foosim.protocol.probe import app as probe_app
 from foosim.rehearsal.rehearse_command import app as rehearse_app
 from foosim.rehearsal.replay_command import app as replay_app
@@ -126,7 +126,10 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("node.main", "CONNECT_S"): ("nodes", "the same"),
     ("client.main", "CONNECT_S"): ("players", "a vHub to connect to; then they fail"),
     ("client.client", "CONNECT_S"): ("`connect` in a program", "the same, unless it says another time"),
-    ("protocol.admission", "ADMISSION_NS"): ("every process", "with certificates, to be let in; then the log says so"),
+    ("protocol.admission", "ADMISSION_NS"): (
+        "every process",
+        "with certificates, to be let in; then the log says so",
+    ),
 }
 """The same of what no deployment sets: constants, whose names end with their units."""
 _PART = re.compile(r"<!-- generated: (?P<name>\w+) -->\n(?P<text>.*?)<!-- end -->\n", re.DOTALL)
@@ -320,3 +323,4 @@ def regenerated(page: str) -> str:
 if __name__ == "__main__":
     for path in sorted(DOCS.glob("*.md")):
         path.write_text(regenerated(path.read_text()))
+    (DOCS.parent / "deploy" / "deployment.schema.json").write_text(deployment_schema_text())

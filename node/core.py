@@ -20,7 +20,6 @@ from foosim.node.inputs import Inputs, check_near
 from foosim.node.step import Stepper, Work, moved_counters
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
-from foosim.protocol.asset_messages import Piece
 from foosim.protocol.assign import Assignment, Share, reach_of
 from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
 from foosim.protocol.channels import Channel
@@ -40,6 +39,7 @@ from foosim.protocol.messages import (
     Heartbeat,
     Order,
     Part,
+    Piece,
     Prepare,
     Recall,
     Samples,

@@ -12,13 +12,10 @@ from enum import Enum
 from typing import Any, Final, get_args
 
 from foosim.protocol import (
-    asset_messages,
-    client_messages,
     hub_messages,
     limits,
     messages,
     replay_messages,
-    view_messages,
 )
 from foosim.protocol.codec import decode
 from foosim.protocol.errors import Malformed
@@ -99,9 +96,9 @@ HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", 
 RECALL: Final = _simulation("recall", messages.Recall, "supervisor", "node, vhub", "an unknown heartbeat", named=False)
 BUILD: Final = _simulation("build", messages.Build, "supervisor", "the named one", "an answer")
 FETCH: Final = _simulation(
-    "fetch", asset_messages.Fetch, "node, vhub, operator, viewer", "supervisor", "a piece of a file"
+    "fetch", messages.Fetch, "node, vhub, operator, viewer", "supervisor", "a piece of a file"
 )
-PIECE: Final = _simulation("piece", asset_messages.Piece, "supervisor", "the named one", "an answer")
+PIECE: Final = _simulation("piece", messages.Piece, "supervisor", "the named one", "an answer")
 REFUSAL: Final = _simulation("refusal", messages.Refusal, "supervisor", "the named one", "an answer")
 READY: Final = _simulation(
     "ready", messages.Ready, "node, vhub", "supervisor", "5 Hz until the epoch", bytes_max=_SMALL
@@ -121,7 +118,7 @@ WANT: Final = _simulation(
 HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
 TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a change, and an answer", named=False)
 WATCHED: Final = _simulation(
-    "watched", view_messages.Watched, "supervisor", "vhub", "what people look at changes, and an answer", named=False
+    "watched", messages.Watched, "supervisor", "vhub", "what people look at changes, and an answer", named=False
 )
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
@@ -136,8 +133,8 @@ VIEW: Final = _simulation(
 
 CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
-CLIENT_REFUSAL: Final = _radio("refusal", client_messages.ClientRefusal, "vhub", "the named one", "an answer")
-_SAID: Final = messages.Join | messages.Up | messages.Done | client_messages.Failure
+CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
+_SAID: Final = messages.Join | messages.Up | messages.Done | messages.Failure
 UP: Final = _radio("up", _SAID, "client", "vhub", "the client's rate")
 DOWN: Final = _radio("down", messages.Go | messages.Down | messages.Heard, "vhub", "the named one", "the client's rate")
 

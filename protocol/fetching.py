@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from foosim.protocol import limits
-from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.mesh import digest_of
+from foosim.protocol.messages import Fetch, Piece
 
 
 class Fetching:

@@ -12,7 +12,6 @@ from typing import Final, Literal
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
-from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import load_deployment
@@ -20,7 +19,7 @@ from foosim.protocol.errors import DeploymentError, Malformed
 from foosim.protocol.fetching import Fetching
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.mesh import AssetError
-from foosim.protocol.messages import Build, Epoch, Heartbeat, Hello, Ready, Recall, Refusal
+from foosim.protocol.messages import Build, Epoch, Fetch, Heartbeat, Hello, Piece, Ready, Recall, Refusal
 
 AGAIN_NS: Final = 200_000_000
 

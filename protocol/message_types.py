@@ -1,7 +1,6 @@
 """What messages are made of: the types of their fields, bounded, and the two kinds of struct.
 
-Decoding validates by these: negative counters, oversized texts, lists and bytes are refused. Neighbours: `messages`,
-`asset_messages`.
+Decoding validates by these: negative counters, oversized texts, lists and bytes are refused.
 """
 
 from __future__ import annotations

@@ -262,6 +262,41 @@ class Answer(Message, frozen=True):
     result: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
 
 
+# --- simulation plane: files that a deployment refers to --------------------------------------------------------------
+
+
+class Fetch(Message, frozen=True):
+    """A process that builds the world asks for the file with this digest, from the byte at `offset` on."""
+
+    name: Name
+    boot: Name
+    digest: Digest
+    offset: Counter
+
+
+class Piece(Message, frozen=True):
+    """The bytes at `offset` of the file of `size` bytes with this digest."""
+
+    name: Name
+    boot: Name
+    digest: Digest
+    offset: Counter
+    size: Annotated[int, Meta(ge=0, le=limits.ASSET_BYTES_MAX)]
+    content: Annotated[bytes, Meta(max_length=limits.ASSET_PIECE_BYTES)]
+
+
+# --- simulation plane: what people look at ----------------------------------------------------------------------------
+
+Pairs = Annotated[list[tuple[Name, Name]], Meta(max_length=limits.WATCHED_MAX)]
+
+
+class Watched(Message, frozen=True):
+    """The links (source, destination) and readings (robot, channel) that somebody looks at; all others nobody does."""
+
+    links: Pairs
+    readings: Pairs
+
+
 # --- radio plane -----------------------------------------------------------------------------------------------------
 
 
@@ -395,3 +430,20 @@ class Heard(Message, frozen=True):
 
     acknowledged: Counter
     branch: Counter = 0
+
+
+class ClientRefusal(Message, frozen=True, tag="clientrefusal"):
+    """The vHub will not have this client, and why. `joins`: it answers a Join of one that was welcomed, not a hello."""
+
+    name: Name
+    boot: Name
+    reason: Text
+    joins: bool = False
+
+
+class Failure(Message, frozen=True):
+    """A player's own code has failed: its process ends, and no other one would do better. `reason` is a sentence."""
+
+    name: Name
+    boot: Name
+    reason: Text

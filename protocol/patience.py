@@ -1,4 +1,4 @@
-"""How long a core waits before it asks again for what it lacks: max(20 ms, 2 T) without progress, then doubling to 1 s.
+"""How long a core waits before it asks again for what it lacks: max(20 ms, 2 T), then doubled up to 1 s.
 
 Neighbours: the cores of node, vHub and supervisor, which say `Want` when patience is over.
 """

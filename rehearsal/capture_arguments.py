@@ -11,7 +11,7 @@ import typer
 
 from foosim.protocol.errors import Refused, read_at
 from foosim.protocol.units import parse_ns
-from foosim.vhub.rows import CaptureError
+from foosim.vhub.mcap_checks import CaptureError
 
 
 class BadCapture(Refused):

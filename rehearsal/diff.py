@@ -21,8 +21,9 @@ import numpy as np
 from foosim.protocol.errors import BadValue, show
 from foosim.protocol.names import nearest_name
 from foosim.vhub.capture_reader import DECODERS, About, Scan, deployment_of
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import ROW_TYPES, TICK, CaptureError, FrameRow, Row
+from foosim.vhub.rows import ROW_TYPES, TICK, FrameRow, Row
 from foosim.vhub.transforms import read_poses
 from foosim.vhub.viewing import LOG, POSES, VIEW_TYPES
 

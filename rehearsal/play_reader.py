@@ -21,7 +21,7 @@ from foosim.rehearsal.play_entries import Entries, Entry, Selection
 from foosim.rehearsal.playing import Reading, Span
 from foosim.vhub.capture_reader import About, Scan
 from foosim.vhub.capture_standing import Standing
-from foosim.vhub.rows import CaptureError
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.viewing import SCENE
 
 AHEAD_BYTES: Final = 64 * 1024 * 1024

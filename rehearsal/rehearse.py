@@ -28,8 +28,8 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub.capture_contents import ending_metadata, origin_metadata
 from foosim.vhub.capture_parts import first_there
 from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import CaptureError
 
 
 @dataclass(slots=True)

@@ -26,8 +26,8 @@ from foosim.vhub.capture_damage import Damage, damage_of
 from foosim.vhub.capture_info import CaptureInfo, capture_info
 from foosim.vhub.capture_parts import FAILED_RUN, NEXT
 from foosim.vhub.capture_recovery import recover_capture
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.payload_hash import HASHED
-from foosim.vhub.rows import CaptureError
 
 app = new_app()
 

@@ -33,8 +33,9 @@ from foosim.vhub.capture_reader import (
 )
 from foosim.vhub.events import Timeline
 from foosim.vhub.lint import delay_of, residual_of
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.profiles import Profiles
-from foosim.vhub.rows import AGES, PACKETS, TICK, CaptureError, PacketRow
+from foosim.vhub.rows import AGES, PACKETS, TICK, PacketRow
 from foosim.vhub.settings_text import (
     event_text,
     impairments_text,

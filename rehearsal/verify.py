@@ -26,8 +26,8 @@ from foosim.vhub.capture_reader import (
     open_capture,
     read_about,
 )
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.payload_hash import check_payloads
-from foosim.vhub.rows import CaptureError
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,10 +24,11 @@ from foosim.protocol.messages import Sent
 from foosim.rehearsal.age_tallies import AgeAtUse, AgeTallies
 from foosim.rehearsal.whatif_reading import Frames, Offers, caveats, frames_for, world_of
 from foosim.vhub.capture_reader import CaptureData
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.memory import Joining
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.profiles import Profiles
-from foosim.vhub.rows import CaptureError, ClientRow, PacketRow, edit_of
+from foosim.vhub.rows import ClientRow, PacketRow, edit_of
 from foosim.vhub.state import HubState
 from foosim.vhub.to_rows import packet_row
 

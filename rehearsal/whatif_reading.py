@@ -22,19 +22,9 @@ from foosim.rehearsal.replica import Replica
 from foosim.rehearsal.verify import start_of
 from foosim.vhub.capture_contents import CUT_REASON, CUT_TICK
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, CaptureData, FrameReader, Scan, TickMark, captured_tick
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.payload_hash import check_payloads
-from foosim.vhub.rows import (
-    AGES,
-    CLIENTS,
-    PACKETS,
-    TICK,
-    AgeRow,
-    CaptureError,
-    ClientRow,
-    EditRow,
-    PacketRow,
-    TickRow,
-)
+from foosim.vhub.rows import AGES, CLIENTS, PACKETS, TICK, AgeRow, ClientRow, EditRow, PacketRow, TickRow
 from foosim.vhub.state import OUTBOX_SHIFT
 
 Frames = Literal["first", "captured", "computed"]

@@ -17,7 +17,6 @@ from types import TracebackType
 from typing import Any, Final, Literal, Self, TypeVar
 
 from foosim.protocol import channels
-from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.certificates import Credentials, operator_credentials, viewer_credentials
 from foosim.protocol.channels import Channel, Plane
 from foosim.protocol.codec import decode, encode
@@ -29,7 +28,7 @@ from foosim.protocol.inbox import Inbox
 from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.loop import Wire
 from foosim.protocol.message_types import Vector
-from foosim.protocol.messages import Answer, Inquiry, Request
+from foosim.protocol.messages import Answer, Fetch, Inquiry, Request
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.protocol.units import parse_pace

@@ -14,7 +14,6 @@ from mypy_extensions import mypyc_attr
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish
-from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.barrier import BadParts, Barrier, Slots, basis_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.closed import closed
@@ -28,6 +27,7 @@ from foosim.protocol.messages import (
     Deliveries,
     End,
     Farewell,
+    Fetch,
     Heartbeat,
     Hello,
     Inquiry,

@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foosim.protocol import channels
-from foosim.protocol.asset_messages import Fetch
 from foosim.protocol.fetching import piece_of
 from foosim.protocol.json_text import decode_json
-from foosim.protocol.messages import Build, Farewell, Heartbeat, Hello, Ready, Recall
+from foosim.protocol.messages import Build, Farewell, Fetch, Heartbeat, Hello, Ready, Recall
 from foosim.supervisor.roster import IN_FLIGHT_NS, Process, refuse
 from foosim.supervisor.state import RunState
 

@@ -19,7 +19,8 @@ from foosim.supervisor.run_folder import RunFolder, open_run, run_exists
 from foosim.supervisor.status import NO_PACKETS, NOT_RECORDED, UNFINISHED
 from foosim.vhub.capture_parts import first_there, has_end, parts_at
 from foosim.vhub.capture_reader import Scan
-from foosim.vhub.rows import EPOCHS, PACKETS, TICK, CaptureError
+from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.rows import EPOCHS, PACKETS, TICK
 from foosim.vhub.viewing import LOG
 
 _UNKNOWN: Final[Mapping[str, Any]] = {

@@ -19,8 +19,8 @@ from foosim.supervisor.run_folder import RunFolder
 from foosim.supervisor.run_options import RunOptions
 from foosim.vhub.branching import branch_command
 from foosim.vhub.capture_parts import files_from, first_there, has_end, head_of, parts_at
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.records import HeadRecord, HubRecord
-from foosim.vhub.rows import CaptureError
 
 
 def check_resumable(folder: RunFolder, options: RunOptions, capture: Path | None, *, has_hub_here: bool) -> None:

@@ -18,9 +18,8 @@ from foosim.protocol.actions import Publish
 from foosim.protocol.edits import Add, Edit, Remove
 from foosim.protocol.errors import Refused, show
 from foosim.protocol.json_text import encode_json
-from foosim.protocol.messages import Answer, Heartbeat, Request
+from foosim.protocol.messages import Answer, Heartbeat, Request, Watched
 from foosim.protocol.names import nearest_name
-from foosim.protocol.view_messages import Watched
 from foosim.supervisor.state import RunState
 
 LEASE_NS: Final = 5_000_000_000

@@ -19,7 +19,6 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PYPROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LINES_OF_A_FUNCTION_MAX = 70
-LINES_OF_A_FILE_MAX = 500
 
 # Which packages a package may import, besides itself.
 MAY_IMPORT: dict[str, set[str]] = {
@@ -63,6 +62,7 @@ SHELLS = {
     "node/main.py",
     "protocol/assets.py",
     "protocol/certificate_files.py",
+    "protocol/certificate_folder.py",
     "protocol/certificates.py",
     "protocol/command.py",
     "protocol/deployment_file.py",
@@ -124,9 +124,11 @@ SHELLS = {
     "supervisor/plan.py",
     "supervisor/resumable.py",
     "supervisor/run_folder.py",
+    "supervisor/run_options.py",
     "supervisor/signals.py",
     "supervisor/up.py",
     "vhub/branching.py",
+    "vhub/capture_contents.py",
     "vhub/capture_cut.py",
     "vhub/capture_damage.py",
     "vhub/capture_file.py",
@@ -259,12 +261,9 @@ def test_no_running_random_generator() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_functions_and_files_are_short() -> None:
+def test_functions_are_short() -> None:
     long = []
     for path in ALL_FILES:
-        lines = len(path.read_text().splitlines())
-        if lines > LINES_OF_A_FILE_MAX:
-            long.append(f"{name_of(path)}: {lines} lines")
         for node in nodes_of(path):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 assert node.end_lineno is not None

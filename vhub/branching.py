@@ -20,7 +20,8 @@ from foosim.protocol.robot_packets import Outbox
 from foosim.protocol.start import AddedEntity, Start, start_with
 from foosim.protocol.units import format_ns, parse_ns
 from foosim.vhub.capture_reader import FRAME_MARKS, Scan, chain_at_start, deployment_of, layout_of
-from foosim.vhub.rows import FRAME, LAYOUT, TICK, CaptureError, FrameRow, LayoutRow, TickRow
+from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.rows import FRAME, LAYOUT, TICK, FrameRow, LayoutRow, TickRow
 
 
 class BadBranch(Refused):

@@ -17,7 +17,8 @@ from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.layout import Layout
 from foosim.protocol.names import nearest_name
 from foosim.protocol.scene import Body
-from foosim.vhub.rows import CaptureError, FrameRow, PacketRow
+from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.rows import FrameRow, PacketRow
 
 Integers: TypeAlias = NDArray[np.int64]
 Numbers: TypeAlias = NDArray[np.float64]

@@ -23,8 +23,9 @@ from foosim.vhub.capture_parts import (
     PART,
     parts_at,
 )
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_writer import McapWriter
-from foosim.vhub.rows import ROW_TYPES, CaptureError, row_schema
+from foosim.vhub.rows import ROW_TYPES, row_schema
 from foosim.vhub.viewing import VIEW_TYPES
 
 DEPLOYMENT: Final = "deployment.yaml"

@@ -31,10 +31,10 @@ from foosim.vhub.capture_contents import (
 from foosim.vhub.capture_parts import END_METADATA, METADATA, Joined
 from foosim.vhub.capture_reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
 from foosim.vhub.in_force import InForce
-from foosim.vhub.mcap_checks import CHECKS
+from foosim.vhub.mcap_checks import CHECKS, CaptureError
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.mcap_writer import McapWriter
-from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK, CaptureError
+from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK
 
 _BEFORE_TICK: Final = frozenset({EPOCHS, LAYOUT, CLIENTS, RECOVERIES})
 """Rows of a closing that stand before its row of /tick."""

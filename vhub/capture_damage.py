@@ -25,7 +25,7 @@ from mcap.opcode import Opcode
 from foosim.protocol.units import format_ns
 from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import TICK_MARKS, deployment_of, read_about
-from foosim.vhub.mcap_checks import CHECKS, Described, Span, compare, read_attachment, read_metadata
+from foosim.vhub.mcap_checks import CHECKS, CaptureError, Described, Span, compare, read_attachment, read_metadata
 from foosim.vhub.mcap_file import (
     CHUNK_BYTES_MAX,
     CHUNK_FIELDS,
@@ -39,7 +39,7 @@ from foosim.vhub.mcap_file import (
     next_chunk,
     unpack_chunk,
 )
-from foosim.vhub.rows import TICK, CaptureError
+from foosim.vhub.rows import TICK
 
 _DAMAGED: Final = (EndOfFile, struct.error, ValueError, zstandard.ZstdError, msgspec.DecodeError, CaptureError)
 _CRC: Final = struct.Struct("<I")

@@ -45,14 +45,14 @@ from foosim.vhub.capture_split import Split
 from foosim.vhub.earlier_crc import EarlierCrc
 from foosim.vhub.in_force import HOLDING
 from foosim.vhub.link_models import model_versions
-from foosim.vhub.mcap_checks import CHECKS
+from foosim.vhub.mcap_checks import CHECKS, CaptureError
 from foosim.vhub.mcap_file import Book, Message
 from foosim.vhub.mcap_scan import Scanned, read_messages
 from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.model_hash import MODEL_HASH, model_hash
 from foosim.vhub.payload_hash import hashed_row, keeps_hashes
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE, CaptureError, Row
+from foosim.vhub.rows import FORMAT, FRAME, LAYOUT, PACKETS, PROFILE, Row
 from foosim.vhub.to_rows import add_packets, epoch_entry, frame_row, plan_of, world_rows
 from foosim.vhub.viewing import LOG, POSES, SCENE, View
 

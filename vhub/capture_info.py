@@ -17,8 +17,9 @@ from foosim.protocol import message_types
 from foosim.protocol.frame import CHAIN_START, chain_next
 from foosim.vhub.capture_parts import files_from
 from foosim.vhub.capture_reader import DECODERS, TICK_MARKS, Scan, TickMark, chain_at_start, deployment_of
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, CaptureError, Fate
+from foosim.vhub.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, Fate
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,11 @@ from pathlib import Path
 from foosim.protocol.errors import Malformed
 from foosim.protocol.json_text import decode_json
 from foosim.vhub.capture_parts import END_METADATA, METADATA, NEXT
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_scan import NOTHING, UNSYNCED_BYTES, Scanned, Void, scan
 from foosim.vhub.packet import IN_FLIGHT
 from foosim.vhub.resume import Captured
-from foosim.vhub.rows import EPOCHS, FRAME, PACKETS, TICK, CaptureError
+from foosim.vhub.rows import EPOCHS, FRAME, PACKETS, TICK
 
 
 @dataclass(slots=True)

@@ -22,9 +22,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from foosim.vhub.mcap_checks import CHECKS, compare, read_metadata
+from foosim.vhub.mcap_checks import CHECKS, CaptureError, compare, read_metadata
 from foosim.vhub.mcap_file import MAGIC, RECORD, Content, McapFile, Message, chunk_records
-from foosim.vhub.rows import CaptureError
 
 FOOTER: Final = struct.Struct("<BQQQI8s")
 """The last record of an MCAP file, and the magic bytes behind it."""

@@ -47,7 +47,7 @@ from foosim.vhub.capture_parts import (
     files_from,
     has_end,
 )
-from foosim.vhub.mcap_checks import CHECKS
+from foosim.vhub.mcap_checks import CHECKS, CaptureError
 from foosim.vhub.mcap_file import Message
 from foosim.vhub.rows import (
     CLIENTS,
@@ -60,7 +60,6 @@ from foosim.vhub.rows import (
     RECOVERIES,
     ROW_TYPES,
     TICK,
-    CaptureError,
     ClientRow,
     DigestHex,
     EditRow,

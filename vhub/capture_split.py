@@ -14,8 +14,8 @@ from foosim.protocol.units import format_ns
 from foosim.vhub.capture_contents import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
 from foosim.vhub.capture_parts import AFTER, LAST, ORIGIN_TICK, PART, head_of, number_of, part_path, parts_at
 from foosim.vhub.in_force import InForce
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.records import Closing
-from foosim.vhub.rows import CaptureError
 
 
 @dataclass(frozen=True, slots=True)

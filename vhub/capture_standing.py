@@ -10,9 +10,9 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 from foosim.vhub.capture_parts import files_from
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import Book, Message
 from foosim.vhub.mcap_scan import read_messages, scan
-from foosim.vhub.rows import CaptureError
 
 
 class Standing:

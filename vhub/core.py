@@ -15,9 +15,7 @@ from typing import Any
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish, Say
-from foosim.protocol.asset_messages import Piece
 from foosim.protocol.channels import Channel
-from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
@@ -36,20 +34,22 @@ from foosim.protocol.messages import (
     Down,
     End,
     Epoch,
+    Failure,
     Farewell,
     Heartbeat,
     Join,
+    Piece,
     Recall,
     Samples,
     Tempo,
     Up,
     Want,
+    Watched,
 )
 from foosim.protocol.orphan import Orphan
 from foosim.protocol.patience import Patience
 from foosim.protocol.refusals import Refusals
 from foosim.protocol.start import first_chain
-from foosim.protocol.view_messages import Watched
 from foosim.vhub.commits import Commits
 from foosim.vhub.door import Door
 from foosim.vhub.footing import Footing

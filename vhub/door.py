@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Final
 
 from foosim.protocol import limits
 from foosim.protocol.actions import Journal, Say
-from foosim.protocol.client_messages import Failure
 from foosim.protocol.codec import encode
 from foosim.protocol.errors import Malformed
-from foosim.protocol.messages import ClientHello, Done, Go, Join, Tempo, Up
+from foosim.protocol.messages import ClientHello, Done, Failure, Go, Join, Tempo, Up
 from foosim.protocol.standstill import TOLD_NS, told
 from foosim.protocol.units import parse_pace
 from foosim.vhub.absences import Absences

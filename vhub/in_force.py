@@ -11,8 +11,9 @@ from typing import Final
 
 import msgspec
 
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import CLIENTS, EPOCHS, LAYOUT, CaptureError, ClientRow
+from foosim.vhub.rows import CLIENTS, EPOCHS, LAYOUT, ClientRow
 from foosim.vhub.viewing import SCENE
 
 _ONE: Final = (EPOCHS, LAYOUT, SCENE)

@@ -20,6 +20,8 @@ from zlib import crc32
 from mcap import records
 from mcap.data_stream import ReadDataStream
 
+from foosim.protocol.errors import Refused
+
 CHECKS: Final = "foosim.digests"
 """Name of the metadata with the digests of the attachments."""
 BEFORE: Final = "before_crc32"
@@ -32,6 +34,10 @@ _INDEX: Final = struct.Struct("<HI")
 _CRC: Final = struct.Struct("<I")
 _POLYNOMIAL: Final = 0xEDB88320
 """Of CRC-32, its bits reversed."""
+
+
+class CaptureError(Refused):
+    """A capture cannot be written or read: the file, the place in it, and what is wrong."""
 
 
 def digest_of(data: bytes) -> str:

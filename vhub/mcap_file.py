@@ -25,8 +25,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from foosim.vhub.mcap_checks import CHECKS, Described, Span, compare, read_attachment, read_metadata
-from foosim.vhub.rows import CaptureError
+from foosim.vhub.mcap_checks import CHECKS, CaptureError, Described, Span, compare, read_attachment, read_metadata
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 MESSAGE: Final = int(Opcode.MESSAGE)

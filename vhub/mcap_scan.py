@@ -23,7 +23,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from foosim.vhub.mcap_checks import CHECKS, Described, read_attachment, read_metadata
+from foosim.vhub.mcap_checks import CHECKS, CaptureError, Described, read_attachment, read_metadata
 from foosim.vhub.mcap_file import (
     CHUNK_BYTES_MAX,
     CHUNK_FIELDS,
@@ -40,7 +40,6 @@ from foosim.vhub.mcap_file import (
     next_chunk,
     unpack_chunk,
 )
-from foosim.vhub.rows import CaptureError
 
 NOTHING: Final = memoryview(b"")
 UNSYNCED_BYTES: Final = 8 * 1024 * 1024

@@ -13,7 +13,8 @@ from typing import Final
 from msgspec.structs import replace
 
 from foosim.protocol.deployment import Deployment
-from foosim.vhub.rows import CaptureError, FrameRow, PacketRow, Row, TickRow
+from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.rows import FrameRow, PacketRow, Row, TickRow
 
 HASH_BYTES: Final = 16
 HASHED: Final = "hashed"

@@ -17,9 +17,9 @@ from msgspec import Meta
 
 from foosim.protocol import limits
 from foosim.protocol.edits import Add, Disrupt, Edit, Freeze, Push, Remove, Thaw
-from foosim.protocol.errors import Refused
 from foosim.protocol.message_types import Counter
 from foosim.protocol.robot_packets import Delivered
+from foosim.vhub.mcap_checks import CaptureError
 
 FORMAT: Final = 2
 """Version of the rows and of the capture's metadata; a reader refuses another one."""
@@ -33,10 +33,6 @@ ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
 WordHex = Annotated[str, Meta(extra_json_schema={"type": "string", "pattern": "^([0-9a-f]{16})?$"})]
 """Checked by `capture_columns.word_of` and not with its row: that would take a reader as long as the row's decoding."""
 Fate = Literal["delivered", "dropped", "in_flight"]
-
-
-class CaptureError(Refused):
-    """A capture cannot be written or read: the file, the place in it, and what is wrong."""
 
 
 class Row(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):

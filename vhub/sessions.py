@@ -17,13 +17,13 @@ from typing import Final, NamedTuple, TypeVar
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish
-from foosim.protocol.client_messages import ClientRefusal
 from foosim.protocol.closed import CLOSED, closed
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.messages import (
     Build,
     ClientHello,
+    ClientRefusal,
     ClientWelcome,
     Done,
     Down,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from foosim.protocol.scene import Quaternion, Vector
-from foosim.vhub.rows import CaptureError
+from foosim.vhub.mcap_checks import CaptureError
 
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _TRANSFORMS: Final = 1

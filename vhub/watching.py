@@ -15,8 +15,8 @@ from typing import Any, Final
 import msgspec
 
 from foosim.protocol.json_text import encode_json
+from foosim.protocol.messages import Watched
 from foosim.protocol.robot_packets import RobotPacket
-from foosim.protocol.view_messages import Watched
 from foosim.vhub.packet import IN_FLIGHT, Flight
 from foosim.vhub.state import HubState
 from foosim.vhub.to_rows import packet_row

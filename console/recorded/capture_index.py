@@ -26,6 +26,7 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
 from foosim.vhub.capture_parts import files_from
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import (
     CHUNK_BYTES_MAX,
     CHUNK_FIELDS,
@@ -37,7 +38,6 @@ from foosim.vhub.mcap_file import (
     chunk_records,
     unpack_chunk,
 )
-from foosim.vhub.rows import CaptureError
 
 CACHE_BYTES: Final = 64 * 1024 * 1024
 """Of unpacked chunks that are kept; the one that is read last always is."""

@@ -31,7 +31,8 @@ from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wa
 from foosim.protocol.errors import Refused
 from foosim.protocol.frame import Frame
 from foosim.vhub.capture_reader import CapturedTick
-from foosim.vhub.rows import CLIENTS, PACKETS, CaptureError
+from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.rows import CLIENTS, PACKETS
 
 T = TypeVar("T")
 Recompute = Callable[[Frame, Iterable[CapturedTick]], Frame | None]

@@ -13,7 +13,7 @@ from typing import Any, Final
 from foosim.console.recorded.deck import Deck
 from foosim.console.shown.compare import Comparison, Where
 from foosim.console.shown.source import Feed
-from foosim.vhub.rows import CaptureError
+from foosim.vhub.mcap_checks import CaptureError
 
 TOLD_S: Final = 0.25
 POINTS_AT_ONCE: Final = 20

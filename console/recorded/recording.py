@@ -32,8 +32,9 @@ from foosim.vhub.capture_reader import (
     layout_of,
     read_about,
 )
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import Message
-from foosim.vhub.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, CaptureError, EpochRow, FrameRow, RecoveryRow
+from foosim.vhub.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
 from foosim.vhub.transforms import read_poses
 from foosim.vhub.viewing import POSES
 

@@ -1,4 +1,4 @@
-"""The rule of a link as people read it: whose packets it is for, what it says, over which radio, what that amounts to.
+"""The rule of a link in words: whose packets it is for, what it says, over which radio, what that amounts to.
 
 Neighbours: `vhub.settings_text` (settings in words), `vhub.lint` (what they amount to).
 """

@@ -16,7 +16,6 @@ from foosim.client.packets import Outgoing
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Publish, Say
 from foosim.protocol.channels import CLIENT_READS, Plane
-from foosim.protocol.client_messages import ClientRefusal
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import UnknownName
@@ -24,6 +23,7 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import (
     Build,
+    ClientRefusal,
     ClientWelcome,
     Commit,
     Deliveries,

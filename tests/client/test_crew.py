@@ -18,16 +18,17 @@ from foosim.client.errors import PlayerError
 from foosim.client.player import Commands, Samples
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish, Say
-from foosim.protocol.client_messages import ClientRefusal, Failure
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.deployment_file import apply_sets
 from foosim.protocol.messages import (
     ClientHello,
+    ClientRefusal,
     ClientWelcome,
     Done,
     Down,
+    Failure,
     Go,
     Join,
     Subscription,

@@ -9,8 +9,8 @@ import pytest
 from foosim.client.core import ClientCore
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
-from foosim.protocol.client_messages import ClientRefusal
 from foosim.protocol.codec import encode
+from foosim.protocol.messages import ClientRefusal
 from tests.client.test_core import Air, published
 from tests.client.test_return import Storm
 

@@ -15,7 +15,8 @@ from foosim.protocol.frame import Frame
 from foosim.rehearsal.between import Between
 from foosim.vhub.capture_parts import files_from, part_path
 from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import FRAME, ROW_TYPES, CaptureError
+from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.rows import FRAME, ROW_TYPES
 from foosim.vhub.viewing import POSES
 from tests.replay.conftest import TICKS, damaged, messages_of, rewritten
 

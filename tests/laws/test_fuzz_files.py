@@ -31,8 +31,8 @@ from foosim.supervisor.run_folder import RunFolder, RunInfo
 from foosim.vhub.capture_damage import damage_of
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.records import fold
-from foosim.vhub.rows import CaptureError
 
 if TYPE_CHECKING:
     from tests.laws.conftest import Disturbed, Fuzz, Running

@@ -19,7 +19,6 @@ from msgspec.structs import replace
 
 from foosim.client.core import ClientCore
 from foosim.protocol import channels, limits
-from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.edits import Edit, Push
@@ -35,6 +34,7 @@ from foosim.protocol.messages import (
     Done,
     Epoch,
     Farewell,
+    Fetch,
     Go,
     Heartbeat,
     Hello,
@@ -42,6 +42,7 @@ from foosim.protocol.messages import (
     Join,
     Order,
     Part,
+    Piece,
     Prepare,
     Ready,
     Recall,
@@ -52,11 +53,11 @@ from foosim.protocol.messages import (
     Tempo,
     Up,
     Want,
+    Watched,
 )
 from foosim.protocol.robot_packets import Delivered, RobotPacket
 from foosim.protocol.start import AddedEntity
 from foosim.protocol.units import Pace
-from foosim.protocol.view_messages import Watched
 from foosim.rehearsal.rehearse import with_nodes
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.settings import RunSettings

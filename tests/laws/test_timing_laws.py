@@ -19,10 +19,11 @@ from foosim.protocol.deployment_file import apply_sets
 from foosim.protocol.edits import Disrupt
 from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import Deliveries, Go
-from foosim.rehearsal import hub_journal, swarm
+from foosim.rehearsal import hub_journal
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.faults import TICKS as SWARM_TICKS
 from foosim.rehearsal.rehearse import Rehearsed, rehearse
+from foosim.rehearsal.swarm import fly as fly_seed
 from foosim.rehearsal.system import Settings, System
 from foosim.rehearsal.verify import verify_capture
 from foosim.rehearsal.whatif import what_if
@@ -227,5 +228,5 @@ def test_a_capture_of_them_is_verified_judged_again_and_recovered(tmp_path: Path
 def test_the_laws_hold_for_them_under_random_faults() -> None:
     for seed, network in ((3003, "as deployed"), (3007, "no delay"), (3011, "as deployed")):  # one world
         text = apply_sets(TABLE.read_text(), TABLE.name, [*TALKERS, *NETWORKS[network]])
-        flown = swarm.fly(text, TABLE.name, seed)
+        flown = fly_seed(text, TABLE.name, seed)
         assert flown.broken == "" and flown.ticks == SWARM_TICKS, f"seed {seed}: {flown.faults}"

@@ -22,7 +22,7 @@ from foosim.protocol.yaml_tree import locate_in, plain, read_tree
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
-REGENERATE = "python -c \"from foosim.protocol.deployment import deployment_schema_text as t; print(t(), end='')\""
+REGENERATE = "python docs/reference.py"
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,6 @@ from msgspec.structs import replace
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish
-from foosim.protocol.asset_messages import Fetch, Piece
 from foosim.protocol.assets import pin_assets
 from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
@@ -19,7 +18,7 @@ from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.errors import Malformed
 from foosim.protocol.fetching import Fetching, piece_of
 from foosim.protocol.member import AGAIN_NS, Member
-from foosim.protocol.messages import Build, Heartbeat
+from foosim.protocol.messages import Build, Fetch, Heartbeat, Piece
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SHARD: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"

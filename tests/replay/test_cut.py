@@ -16,7 +16,8 @@ from foosim.vhub.branching import read_branch
 from foosim.vhub.capture_cut import cut_capture
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, TICK, CaptureError
+from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, TICK
 from foosim.vhub.viewing import POSES, SCENE
 from tests.replay.conftest import ADDED_AT, TICK_NS, contents_of, damaged, messages_of, replay
 

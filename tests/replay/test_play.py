@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -311,9 +312,8 @@ def test_with_certificates_operators_listen_and_nobody_else(tmp_path: Path, monk
             hear_replay(play.address, pki=alone)
         with pytest.raises(BadValue, match="needs certificates"):
             hear_replay(play.address)
-        monkeypatch.setattr(
-            "foosim.client.replay.operator_credentials", lambda where: load_credentials(where, "client.player-red")
-        )
+        player = partial(load_credentials, identity="client.player-red")
+        monkeypatch.setattr("foosim.client.replay.operator_credentials", player)
         with pytest.raises(ReplayGone, match="no answer to status"):
             hear_replay(play.address, pki=alone, answer_s=0.5)
         assert play.stage.text.getvalue().count("\n") < 10

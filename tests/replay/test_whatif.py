@@ -18,7 +18,8 @@ from foosim.rehearsal.whatif import WhatIf, _age_ms, what_if
 from foosim.rehearsal.whatif_picture import picture
 from foosim.rehearsal.whatif_reading import Offers
 from foosim.vhub.capture_reader import open_capture
-from foosim.vhub.rows import PACKETS, CaptureError, PacketRow
+from foosim.vhub.mcap_checks import CaptureError
+from foosim.vhub.rows import PACKETS, PacketRow
 from tests.replay.conftest import TABLE, TICKS, Done, capture_to, disturb, messages_of, replay, rewritten, with_row
 from tests.turns import BY_PERIOD
 

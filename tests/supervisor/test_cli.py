@@ -84,8 +84,8 @@ def test_a_valid_file_whose_players_cannot_be_found_is_refused_but_for_those_on_
     whose = [line.split(": ")[1] for line in done.err.splitlines()]
     assert whose == ["players.player-red.class", "players.player-blue.class"]
     lines = text.splitlines()
-    number = next(at for at, line in enumerate(lines, 1) if "client.players:Team" in line)
-    place = f"{path}:{number}:{lines[number - 1].index('foosim.client') + 1}: "
+    number = next(at for at, line in enumerate(lines, 1) if "foosim.client.players:Team" in line)
+    place = f"{path}:{number}:{lines[number - 1].index('foosim.') + 1}: "
     missing = "there is no module own_team (is the folder that it is in on PYTHONPATH?), 'own_team:Team'"
     assert done.err.splitlines()[0] == f"{place}players.player-red.class: {missing}"
     away = path.read_text().replace("class: own_team:Team", "class: own_team:Team\n    host: arm")

@@ -103,7 +103,7 @@ class Left:
         core = run.system.hub
         core.capture_file = str(capture)
         with Journal(self.folder.journals, VHUB) as journal:
-            journal.append(JournalAction(core.state.checkpoint()).record)
+            journal.append(JournalAction(core.head()).record)
 
     def journal(self, stem: str) -> Path:
         return journal_files(self.folder.journals, stem)[-1]

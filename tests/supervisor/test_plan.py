@@ -9,9 +9,10 @@ import pytest
 from foosim.protocol.addresses import Address, Insecure
 from foosim.protocol.errors import BadValue
 from foosim.supervisor import cli
-from foosim.supervisor.plan import Plan, make_plan
+from foosim.supervisor.plan import make_plan
 from foosim.supervisor.run_folder import RunFolder
 from foosim.supervisor.run_options import RunOptions
+from foosim.supervisor.settings import RunSettings
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 EVERYTHING = RunOptions(TABLE, "2x", "1.5 s", 7, ("engine=pure", "table.ball.mass=27 g"), "0.0.0.0:7447", insecure=True)
@@ -50,15 +51,15 @@ def test_the_supervisors_process_makes_the_same_plan(
     monkeypatch.setattr(sys, "argv", ["foosim-supervisor", "run", *options.arguments(), "--run", "mine"])
     served: list[Any] = []
 
-    def serve(plan: Plan, folder: RunFolder, progress: Path | None = None) -> int:
-        served.extend((plan, folder.name))
+    def serve(settings: RunSettings, address: Address, pki: Path | None, folder: RunFolder, *others: Any) -> int:
+        served.extend((settings, address, pki, folder.name))
         return 0
 
     monkeypatch.setattr(cli, "serve", serve)
     with pytest.raises(SystemExit) as ended:
         cli.main()
     assert ended.value.code == 0
-    plan, name = served
-    assert name == "mine"
-    for field in ("text", "deployment", "pace", "ticks", "address"):
-        assert getattr(plan, field) == getattr(make_plan(options), field)
+    settings, address, pki, name = served
+    plan = make_plan(options)
+    assert name == "mine" and settings == plan.settings("mine") and address == plan.address
+    assert pki == (None if plan.options.pki is None else plan.options.pki.absolute())

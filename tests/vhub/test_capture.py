@@ -23,8 +23,9 @@ from foosim.protocol.kinematics import forward_kinematics
 from foosim.protocol.scenes import build_scene
 from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import CaptureData, open_capture
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.model_hash import model_hash
-from foosim.vhub.rows import ROW_TYPES, CaptureError, EpochRow, OwnerRow, row_schema
+from foosim.vhub.rows import ROW_TYPES, EpochRow, OwnerRow, row_schema
 from foosim.vhub.viewing import VIEW_TYPES
 from tests.vhub.conftest import RECOVERED, noise
 

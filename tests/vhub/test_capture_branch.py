@@ -14,9 +14,9 @@ from foosim.protocol.messages import Epoch
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.keeping import Keep
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.records import Closing, HubRecord, TickRecord
 from foosim.vhub.resume import Captured, end_of, first_tick_of, recall
-from foosim.vhub.rows import CaptureError
 from tests.vhub.conftest import EPOCH_AT, NAME
 from tests.vhub.test_capture_recovery import LAST, cut, first_chunk, read_by_others, rows
 

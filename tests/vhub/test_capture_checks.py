@@ -16,9 +16,8 @@ from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_parts import end_of, head_of
 from foosim.vhub.capture_reader import open_capture, read_about
 from foosim.vhub.capture_recovery import recover_capture
-from foosim.vhub.mcap_checks import combined_crc
+from foosim.vhub.mcap_checks import CaptureError, combined_crc
 from foosim.vhub.mcap_file import McapFile, Message
-from foosim.vhub.rows import CaptureError
 
 FLIPS = 400
 

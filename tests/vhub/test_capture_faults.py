@@ -21,9 +21,9 @@ from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.disk_progress import DiskProgress
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import CHUNK_BYTES_MAX
 from foosim.vhub.mcap_writer import McapWriter
-from foosim.vhub.rows import CaptureError
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun

@@ -19,9 +19,9 @@ from foosim.vhub.capture_info import capture_info
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import UNCLEAN, Recovered, recover_capture
 from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import MAGIC, McapFile, Message
 from foosim.vhub.mcap_scan import UNSYNCED_BYTES
-from foosim.vhub.rows import CaptureError
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun

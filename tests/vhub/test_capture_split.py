@@ -25,11 +25,12 @@ from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.capture_split import Split
 from foosim.vhub.capture_writer import CaptureWriter
 from foosim.vhub.keeping import Keep
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import McapFile, Message
 from foosim.vhub.mcap_writer import McapWriter
 from foosim.vhub.records import Closing
 from foosim.vhub.resume import end_of, first_tick_of, recall
-from foosim.vhub.rows import PROFILE, CaptureError
+from foosim.vhub.rows import PROFILE
 from tests.vhub.conftest import ADDED_AT, LOG_LINES, NAME, REMOVED_AT
 from tests.vhub.test_capture_branch import journal_until
 from tests.vhub.test_capture_recovery import LAST, read_by_others, rows

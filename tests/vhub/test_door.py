@@ -9,11 +9,10 @@ import pytest
 
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish
-from foosim.protocol.client_messages import ClientRefusal, Failure
 from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.hub_messages import Proceed
-from foosim.protocol.messages import ClientHello, ClientWelcome, Down, Epoch, Go, Join, Tempo
+from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Down, Epoch, Failure, Go, Join, Tempo
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import Keep
 from foosim.vhub.records import HubRecord, TickRecord

@@ -15,8 +15,8 @@ from foosim.protocol.journal import Journal
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.capture_recovery import recover_capture
 from foosim.vhub.capture_writer import CaptureWriter
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.mcap_file import McapFile, Message
-from foosim.vhub.rows import CaptureError
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun

@@ -15,6 +15,7 @@ from foosim.protocol.draws import Slot, chance_threshold, draw_key, draw_words
 from foosim.protocol.edits import Add, Edit, Push, Remove
 from foosim.protocol.frame import Frame
 from foosim.vhub.capture_columns import word_of
+from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.rows import (
     AGES,
     CLIENTS,
@@ -25,7 +26,6 @@ from foosim.vhub.rows import (
     RECOVERIES,
     ROW_TYPES,
     TICK,
-    CaptureError,
     ClientRow,
     EditRow,
     FrameRow,

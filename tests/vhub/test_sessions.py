@@ -12,12 +12,12 @@ import pytest
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Publish, Say
 from foosim.protocol.channels import Channel
-from foosim.protocol.client_messages import ClientRefusal
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.messages import (
     Build,
     ClientHello,
+    ClientRefusal,
     ClientWelcome,
     Commit,
     Deliveries,

@@ -20,10 +20,9 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.edits import Disrupt
 from foosim.protocol.frame import Frame
 from foosim.protocol.json_text import decode_json, encode_json
-from foosim.protocol.messages import Heartbeat
+from foosim.protocol.messages import Heartbeat, Watched
 from foosim.protocol.robot_packets import RobotPacket
 from foosim.protocol.units import Pace
-from foosim.protocol.view_messages import Watched
 from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.drops_shown import Reported, explain_drops
