@@ -91,17 +91,17 @@ class SupervisorCore:
         self._patience = Patience(now_ns)
         self._refused = self._diverged = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
-            Hello: self.handshake.hello,
-            Fetch: self.handshake.fetch,
+            Hello: self.handshake.on_hello,
+            Fetch: self.handshake.on_fetch,
             Ready: self._on_ready,
             Standing: self._on_standing,
             Heartbeat: self._on_heartbeat,
             Part: self._on_part,
             Deliveries: self._on_deliveries,
             Want: self._on_want,
-            Request: self.requests.take,
-            Inquiry: self.requests.inquire,
-            Farewell: self.handshake.farewell,
+            Request: self.requests.on_request,
+            Inquiry: self.requests.on_inquiry,
+            Farewell: self.handshake.on_farewell,
         }
         if history is not None and history.epoch is not None:
             self.failover.begin(history, now_ns)
@@ -435,7 +435,7 @@ class SupervisorCore:
 
     def _on_ready(self, ready: Ready, payload: bytes, now_ns: int) -> None:
         """A layout is built: the run may begin, a node may join, a change of the world may be ordered."""
-        state, process = self.state, self.handshake.ready(ready, now_ns)
+        state, process = self.state, self.handshake.on_ready(ready, now_ns)
         if process is None:
             return
         is_hub, is_present = process.name == channels.VHUB, ready.layout == state.frame.layout.digest
@@ -458,7 +458,7 @@ class SupervisorCore:
 
     def _on_heartbeat(self, heartbeat: Heartbeat, payload: bytes, now_ns: int) -> None:
         """A process lives: a lost one may be back; send it again what it has missed."""
-        state, process = self.state, self.handshake.heartbeat(heartbeat, now_ns)
+        state, process = self.state, self.handshake.on_heartbeat(heartbeat, now_ns)
         if process is None:
             return
         is_hub = process.name == channels.VHUB
@@ -467,7 +467,7 @@ class SupervisorCore:
         if not heartbeat.report:
             self.progress.on_heartbeat(heartbeat)
             return
-        self.handshake.report(process, heartbeat)
+        self.handshake.keep_report(process, heartbeat)
         self.player_losses.on_report(process)
         if process.lost and is_hub:
             self.vhub_loss.on_heartbeat(process, now_ns)

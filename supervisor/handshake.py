@@ -23,7 +23,7 @@ class Handshake:
         self._state = state
         self._process_gone = process_gone
 
-    def hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
+    def on_hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
         """Answer a process that asks to take part with what to build, or with a refusal."""
         state = self._state
         if state.roster.has_silent_namesake(hello, now_ns):
@@ -45,11 +45,11 @@ class Handshake:
         build = Build(hello.name, hello.boot, state.boot, run.run, *deployment, pace, added, run.origin)
         state.publish(channels.BUILD, hello.name, build)
 
-    def fetch(self, fetch: Fetch, payload: bytes, now_ns: int) -> None:
+    def on_fetch(self, fetch: Fetch, payload: bytes, now_ns: int) -> None:
         """Answer with the requested piece of a file that the deployment refers to."""
         self._state.publish(channels.PIECE, fetch.name, piece_of(self._state.deployment, fetch))
 
-    def ready(self, ready: Ready, now_ns: int) -> Process | None:
+    def on_ready(self, ready: Ready, now_ns: int) -> Process | None:
         """Note a layout that a process has built; return the process when the run goes on with it."""
         state = self._state
         process = state.roster.by_name.get(ready.name)
@@ -68,7 +68,7 @@ class Handshake:
             return None
         return process
 
-    def heartbeat(self, heartbeat: Heartbeat, now_ns: int) -> Process | None:
+    def on_heartbeat(self, heartbeat: Heartbeat, now_ns: int) -> Process | None:
         """Note that a process lives, and what it reports; recall one that takes part and has not said hello to this
         supervisor. Return the process."""
         state = self._state
@@ -84,13 +84,13 @@ class Handshake:
             process.in_doubt, process.gone_ns = False, 0
         return process
 
-    def report(self, process: Process, heartbeat: Heartbeat) -> None:
+    def keep_report(self, process: Process, heartbeat: Heartbeat) -> None:
         """Keep a heartbeat with a report."""
         process.heartbeat = heartbeat
         report = decode_json(heartbeat.report)
         self._state.roster.hear(process, report if isinstance(report, dict) else {})
 
-    def farewell(self, farewell: Farewell, payload: bytes, now_ns: int) -> None:
+    def on_farewell(self, farewell: Farewell, payload: bytes, now_ns: int) -> None:
         """The vHub's last message: its capture is closed."""
         process = self._state.roster.by_name.get(farewell.name)
         if process is not None:

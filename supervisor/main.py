@@ -138,7 +138,7 @@ class SupervisorProcess:
         return FAILED if told["failed"] else DONE
 
     def stop(self) -> None:
-        """Have the run end in order, as the command `down` does; a signal handler may call this."""
+        """End the run in order, as the command `down` does; a signal handler may call this."""
         self._is_told_to_end = True
         self._inbox.wake()
 
@@ -168,11 +168,11 @@ class SupervisorProcess:
             self._on_unwritten(error)
 
     def _on_unwritten(self, error: JournalError) -> None:
-        """The journal has failed: the run ends. What is committed by then is said, so that the capture has it."""
+        """The journal has failed: the run ends. Frames committed by then are published, so the capture has them."""
         self.core.fail(f"lost the journal: {error}")
 
     def _note_radio(self) -> None:
-        """Write into the run file where clients find the vHub, when it tells."""
+        """Write the address of the vHub for clients into the run file, once the vHub reports it."""
         hub = self.core.state.roster.by_name.get(VHUB)
         address = "" if hub is None else hub.report.get("radio_address", "")
         if isinstance(address, str) and address not in ("", self._info.radio):

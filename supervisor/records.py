@@ -128,9 +128,9 @@ class RunRecord(msgspec.Struct, frozen=True, array_like=True, tag="run", forbid_
 
 
 class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbid_unknown_fields=True):
-    """What people have set, as it is now; `granted` is the tick up to which `step` allows, `returns` says which node
-    gets a robot back that was adopted, `starts` how often somebody asked for a node to be started, `disruptions` how
-    often for something to happen to the network."""
+    """What operators have set. `granted` is the tick up to which `step` allows, `returns` has the node that gets an
+    adopted robot back, `starts` how often the start of a node was requested, `disruptions` how often an event of the
+    network was."""
 
     pace: str
     paused: bool
@@ -143,7 +143,7 @@ class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbi
 
 
 class Asked(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What somebody asked for to change something, and what came of it: the tick and text of the answer."""
+    """A request that changes something, with the tick and text of its answer."""
 
     tick: int
     verb: str
@@ -157,14 +157,14 @@ ASKED_TEXT_MAX: Final = 200
 
 
 def asked(verb: str, answer: Answer) -> Asked:
-    """Return what is kept for people of a request."""
+    """Return what is kept of a request, for people."""
     return Asked(answer.tick, verb, answer.text[:ASKED_TEXT_MAX], answer.sender, answer.accepted)
 
 
 class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request", forbid_unknown_fields=True):
-    """A request whose tick is chosen: what it adds to that tick's order, its answer, and what it changes beside.
+    """A request whose tick is chosen: the edits for the order of that tick, its answer, and its other effects.
 
-    `owners` is who owns what by it, from the epoch on that follows.
+    `owners` are those of the epoch that follows.
     """
 
     tick: int
@@ -234,7 +234,7 @@ Record = RunRecord | Checkpoint | Change
 
 @dataclass(slots=True)
 class History:
-    """What a fold of the supervisor's journal gives."""
+    """The result of folding the supervisor's journal."""
 
     run: RunRecord
     frame: Frame
@@ -260,7 +260,7 @@ class History:
     branch: tuple[int, int] = (0, 0)
     edit_log: EditLog = field(default_factory=EditLog)
     asked: list[Asked] = field(default_factory=list)
-    """What was asked for last."""
+    """The last requests that change something."""
 
 
 Solved = tuple[list[str], str]

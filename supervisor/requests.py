@@ -36,7 +36,7 @@ READS: Final = ("status", "describe", "watch")
 TEXT_MAX = 4000
 """Characters of a refusal."""
 NUMBER_MAX = 1e100
-"""More than anybody means, less than what overflows when squared."""
+"""Larger than any useful value, and its square does not overflow."""
 
 
 @dataclass
@@ -88,8 +88,8 @@ class Requests:
             "down": self._down,
         }
 
-    def take(self, request: Request, payload: bytes, now_ns: int) -> None:
-        """Take one request: answer it now, or when all nodes are ready for what it asks."""
+    def on_request(self, request: Request, payload: bytes, now_ns: int) -> None:
+        """Answer a request now, or when all nodes are ready for it."""
         key = request.sender, request.id
         answer = self._state.answers.get(key)
         if answer is None:
@@ -97,17 +97,17 @@ class Requests:
                 return
             answer = self._decide(request, now_ns)
         if answer is not None:
-            self._say(answer)
+            self._reply(answer)
 
-    def inquire(self, inquiry: Inquiry, payload: bytes, now_ns: int) -> None:
-        """Answer who may only look."""
+    def on_inquiry(self, inquiry: Inquiry, payload: bytes, now_ns: int) -> None:
+        """Answer a viewer, who may only read."""
         if inquiry.verb in READS:
             answer = self._decide(inquiry, now_ns)
             assert answer is not None, inquiry.verb
         else:
             why = f"{show(inquiry.verb)} is for operators: who only looks may ask for {', '.join(READS)}"
             answer = Answer(inquiry.sender, inquiry.id, False, self._state.frame.tick, why, b"{}")
-        self._say(answer)
+        self._reply(answer)
 
     def _decide(self, request: Request, now_ns: int) -> Answer | None:
         try:
@@ -127,7 +127,7 @@ class Requests:
         except Refused as refused:
             return self._refuse(request, str(refused))
 
-    def _say(self, answer: Answer) -> None:
+    def _reply(self, answer: Answer) -> None:
         self._state.publish(channels.ANSWER, answer.sender, answer)
 
     def _refuse(self, request: Request, why: str) -> Answer:
@@ -145,10 +145,10 @@ class Requests:
         return answer
 
     def end(self) -> None:
-        """The run has ended: refuse what still waits for engines."""
+        """The run has ended: refuse the changes that still wait for engines."""
         pending, self._pending = self._pending, []
         for waiting in pending:
-            self._say(self._refuse(waiting.request, "the run has ended"))
+            self._reply(self._refuse(waiting.request, "the run has ended"))
 
     def _accept(
         self,
@@ -159,7 +159,7 @@ class Requests:
         owners: dict[str, str] | None = None,
         effective: int | None = None,
     ) -> Answer:
-        """Journal a request whose tick is chosen, with all that it does, and keep its answer.
+        """Journal a request whose tick is chosen, with its whole effect, and keep its answer.
 
         `effective` is the tick that the answer names, where that is not the one whose order has the edits.
         """
@@ -243,7 +243,7 @@ class Requests:
         self._wait_for_engines(request, Remove(name))
 
     def _wait_for_engines(self, request: Request, edit: Add | Remove) -> None:
-        """Have the engines built; the first change that waits goes first, since each builds on the one before."""
+        """Have the engines built, for one change after the other, since each builds on the one before."""
         if len(self._pending) >= PENDING_MAX:
             raise Refused(f"{PENDING_MAX} additions and removals wait for engines already")
         self._pending.append(_Waiting(request, edit, layout_after(self._state.next_layout(), [edit])))
@@ -251,12 +251,12 @@ class Requests:
             self.prepare()
 
     def prepare(self) -> None:
-        """Say (again) which layout the first change that waits needs."""
+        """Publish (again) the layout of the first change that waits."""
         if self._pending:
             self._state.prepare(self._pending[0].layout)
 
     def layout_ready(self, now_ns: int) -> None:
-        """Order the change whose layout every node has built."""
+        """Order each change whose layout every node has built."""
         while self._pending:
             waiting = self._pending[0]
             if self._state.unready_nodes(waiting.layout.digest):
@@ -264,7 +264,8 @@ class Requests:
             self._pending.pop(0)
             tick = self._state.released
             verb = "added" if isinstance(waiting.edit, Add) else "removed"
-            self._say(self._accept(waiting.request, tick, f"{waiting.edit.name} {verb} at tick {tick}", [waiting.edit]))
+            text = f"{waiting.edit.name} {verb} at tick {tick}"
+            self._reply(self._accept(waiting.request, tick, text, [waiting.edit]))
             if self._pending:
                 following = self._pending[0]
                 following.layout = layout_after(self._state.next_layout(), [following.edit])
@@ -290,7 +291,7 @@ class Requests:
         return tick
 
     def _network(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """What the order of a tick says of the network holds for the frame behind it, and for what is sent from it."""
+        """An event in the order of a tick holds from the next frame on, and for packets that are sent from it."""
         tick = self._tick_for_edit()
         state, effective, deployment = self._state, tick + 1, self._state.deployment
         text = event_text(deployment, arguments.get("event"), effective * deployment.tick_ns)
@@ -342,7 +343,7 @@ class Requests:
         return self._accept(request, state.frame.tick, text)
 
     def _down(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """End the run; by a loss that only its launcher knows of, `lost`, at once."""
+        """End the run in order; at once, as failed, with `lost`: a loss that only the launcher knows of."""
         lost = arguments.get("lost")
         if isinstance(lost, str) and lost:
             self._finish(f"lost {lost}")

@@ -25,7 +25,7 @@ from foosim.supervisor.state import RunState
 LEASE_NS: Final = 5_000_000_000
 HZ_MAX: Final = 100.0
 BYTES_PER_S_MAX: Final = 5_000_000
-"""Of frames: a large world is shown less often."""
+"""Of frames: those of a large world are published less often."""
 FRAME_BYTES_MAX: Final = 384 * 1024
 """A larger commit is not in the answer to `describe`, and comes with the lease."""
 _NS_PER_S: Final = 1_000_000_000
@@ -35,7 +35,7 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class _Lease:
-    """What somebody wants to see: frames per second, links and readings; and until when."""
+    """The frames per second, links and readings that one viewer wants, and until when."""
 
     hz: float
     links: list[Pair]
@@ -44,16 +44,16 @@ class _Lease:
 
 
 class Viewing:
-    """The leases, and what is published by them."""
+    """The leases, and the frames that are published for them."""
 
     def __init__(self, state: RunState) -> None:
         self.is_shown = False
-        """Whether somebody wants frames: all that a commit has to ask while nobody does."""
+        """Whether a viewer wants frames: the only question of a commit while none does."""
         self._state = state
         self._leases: dict[str, _Lease] = {}
         """By who asks."""
         self._watched = Watched([], [])
-        """What the vHub was told last."""
+        """As the vHub was told last."""
         self._told_at: Heartbeat | None = None
         """Its last heartbeat before that."""
         self._period_ns = self._due_ns = 0
@@ -61,7 +61,7 @@ class Viewing:
         """The last commit, while it has not been shown."""
 
     def watch(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Begin or renew a lease; the answer has the rate that it gets and for how long. Raises Refused."""
+        """Begin or renew a lease; the answer has its rate and duration. Raises Refused."""
         hz = _rate(arguments.get("hz"))
         links = _pairs("links", arguments.get("links"), self._link)
         readings = _pairs("readings", arguments.get("readings"), self._reading)
@@ -81,7 +81,7 @@ class Viewing:
         return self._answer(request, {"hz": got, "lease_s": LEASE_NS / _NS_PER_S})
 
     def describe(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Say what is run, who owns what, and where the world is: what one has to know to read the frames."""
+        """Answer with deployment, owners and the present layout: what a viewer needs to read the frames."""
         state, run = self._state, self._state.settings
         commit = self._last_commit
         has_frame = 0 < len(commit) <= FRAME_BYTES_MAX
@@ -101,13 +101,13 @@ class Viewing:
         return self._answer(request, what)
 
     def committed(self, payload: bytes, edits: Sequence[Edit], now_ns: int) -> None:
-        """Show a commit when it is due, or when another layout begins with it."""
+        """Publish a commit when it is due, or when a new layout begins with it."""
         self._unseen = payload
         if now_ns >= self._due_ns or any(isinstance(edit, Add | Remove) for edit in edits):
             self._show(now_ns)
 
     def wake(self, now_ns: int) -> None:
-        """End leases that were not renewed; show what was committed last, if nothing came behind it."""
+        """End leases that were not renewed; publish the last commit if it has not been."""
         if self._leases:
             self._end_leases(now_ns)
         if self._hub_is_wrong():
@@ -133,12 +133,12 @@ class Viewing:
                 self._say_watched(watched)
 
     def hub_ready(self) -> None:
-        """Tell a vHub that was started again what is looked at."""
+        """Tell a vHub that was started again which links and readings to report."""
         if self._is_watching:
             self._say_watched(self._watched)
 
     def _hub_is_wrong(self) -> bool:
-        """Whether the vHub keeps what nobody looks at: it has missed that, or another supervisor told it to."""
+        """Whether the vHub reports what no viewer wants: it has missed that, or an earlier supervisor told it to."""
         hub = self._state.roster.by_name.get(channels.VHUB)
         keeps = hub is not None and "watched" in hub.report and hub.heartbeat is not self._told_at
         return keeps and not self._is_watching and self._state.end is None
@@ -154,13 +154,13 @@ class Viewing:
         return bool(self._watched.links or self._watched.readings)
 
     def _link(self, source: str, destination: str) -> None:
-        """Raise Refused for a link without ends."""
+        """Raise Refused for a link whose ends are no endpoints."""
         ends = self._state.deployment.endpoints()
         for name in (source, destination):
             chosen("endpoint", name, ends)
 
     def _reading(self, robot: str, channel: str) -> None:
-        """Raise Refused for what no sensor measures."""
+        """Raise Refused for a channel that is no sensor of the robot."""
         robots = self._state.deployment.robots
         sensors = robots[chosen("robot", robot, sorted(robots))].sensors
         chosen(f"sensor of {robot}", channel, sorted(sensors))
@@ -171,7 +171,7 @@ class Viewing:
         return self._state.commits.get(self._state.frame.tick, b"")
 
     def _set_rate(self) -> None:
-        """Show frames as often as the most eager lease wants, and as their size allows."""
+        """Publish frames at the highest rate of the leases that their size allows."""
         hz = max((lease.hz for lease in self._leases.values()), default=0.0)
         self.is_shown = hz > 0.0
         if self.is_shown:
@@ -184,7 +184,7 @@ class Viewing:
 
 
 def _rate(value: object) -> float:
-    """Return frames per second as they are asked for; 0 is none."""
+    """Return the requested frames per second; 0 is none."""
     if value is None:
         return 0.0
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= HZ_MAX:
@@ -193,7 +193,7 @@ def _rate(value: object) -> float:
 
 
 def _watched_by(leases: Iterable[_Lease]) -> Watched:
-    """Return what some leases want to see together. Raises Refused when it is too much."""
+    """Return the links and readings of some leases together. Raises Refused when these are too many."""
     links: set[Pair] = set()
     readings: set[Pair] = set()
     for lease in leases:
@@ -206,7 +206,7 @@ def _watched_by(leases: Iterable[_Lease]) -> Watched:
 
 
 def _pairs(what: str, value: object, check: Callable[[str, str], None]) -> list[Pair]:
-    """Return pairs of names as they are asked for. Raises Refused, as `check` does."""
+    """Return requested pairs of names. Raises Refused, as `check` does."""
     pairs = [] if value is None else value
     if not isinstance(pairs, list) or len(pairs) > limits.WATCHED_MAX:
         raise Refused(f"{what}: a list of at most {limits.WATCHED_MAX} pairs of names is needed")

@@ -128,11 +128,11 @@ def _unwritten_refusal(planting: Planting) -> None:
 
 @register("requests are done each time they come", "the same id gets the same answer", 1)
 def _each_time(planting: Planting) -> None:
-    def take(self: Any, request: Any, payload: bytes, now_ns: int) -> None:
+    def on_request(self: Any, request: Any, payload: bytes, now_ns: int) -> None:
         self._state.answers.pop((request.sender, request.id), None)
         before(self, request, payload, now_ns)
 
-    before: Any = planting.swap(Requests, "take", take)
+    before: Any = planting.swap(Requests, "on_request", on_request)
 
 
 @register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 5)
@@ -220,11 +220,11 @@ def _never_lost(planting: Planting) -> None:
 
 @register("a stopped node comes back", "who was stopped is not let in until it is started", 21)
 def _unstopped(planting: Planting) -> None:
-    def hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
+    def on_hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
         self._state.roster.stopped.discard(hello.name)
         before(self, hello, payload, now_ns)
 
-    before: Any = planting.swap(Handshake, "hello", hello)
+    before: Any = planting.swap(Handshake, "on_hello", on_hello)
 
 
 @register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 22)
