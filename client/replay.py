@@ -37,6 +37,7 @@ from foosim.protocol.json_text import decode_json, encode_json
 from foosim.protocol.messages import Answer, Request
 from foosim.protocol.names import nearest_name
 from foosim.protocol.replay_messages import (
+    CLOCK,
     STREAMS,
     Played,
     PlayedLine,
@@ -161,6 +162,8 @@ class Replay:
         self._old_names: Mapping[str, str] = {}
         self._old_channels: Mapping[str, str] = {}
         self._streams = frozenset(streams)
+        self._over: set[str] = set()
+        """The streams of which all was heard."""
         if set(streams) == set(STREAMS):
             session.subscribe(PLAYED.key_for_all, PLAYED.key, self._inbox)
         else:
@@ -218,7 +221,7 @@ class Replay:
         for key, name, payload in self._inbox.take(timeout_s):
             try:
                 if key == PLAYED.key:
-                    self._hear(channels.read(PLAYED, name, payload))
+                    self._hear(name, channels.read(PLAYED, name, payload))
                 elif key == channels.REPLAY_ANSWER.key:
                     answer: Answer = channels.read(channels.REPLAY_ANSWER, name, payload)
                     self._answers[answer.id] = answer
@@ -227,7 +230,7 @@ class Replay:
             except Malformed:
                 self.malformed += 1
 
-    def _hear(self, message: Played) -> None:
+    def _hear(self, stream: str, message: Played) -> None:
         if isinstance(message, PlayedPacket):
             self._heard.append(self._packet(message))
         elif isinstance(message, PlayedPoses):
@@ -243,9 +246,12 @@ class Replay:
                 raise Malformed("a row that is no object")
             self._heard.append(ReplayedRow(message.time_ns, f"/{message.topic}", row))
         else:
-            self.clock = ReplayTime(message.time_ns, message.rate, message.state, message.jumps)
-            self._heard.append(self.clock)
-            self.ended |= message.state == "ended"
+            if stream == CLOCK:
+                self.clock = ReplayTime(message.time_ns, message.rate, message.state, message.jumps)
+                self._heard.append(self.clock)
+            if message.state == "ended":
+                self._over.add(stream)
+                self.ended = self._over >= self._streams
 
     def _packet(self, message: PlayedPacket) -> ReplayedPacket:
         stamps = message.sequence, message.copy, message.sent_ns, message.due_ns

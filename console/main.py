@@ -1,29 +1,39 @@
 """The command `foosim-console`: a page in the browser to see and touch a run that is live.
 
-Neighbours: `live` (the run as a source), `serving` (serves it), `supervisor.up` (starts this with `--console`).
+Neighbours: `live` (the run as a source), `second` (what follows it), `serving` (serves both), `supervisor.up` (starts
+this with `--console`).
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from foosim.console.live.live_source import LiveSource
+from foosim.console.live.presence import how_ended
+from foosim.console.recorded.leading import Leader
+from foosim.console.recorded.second import OffsetOption, SecondOption, compared_text, open_follower, read_offset
 from foosim.console.server.serving import ServeOptions, serve_sources
+from foosim.console.shown.source import Source
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.command import VersionOption, new_app, run_app
+from foosim.protocol.deployment_file import load_deployment
+from foosim.protocol.errors import BadValue
 from foosim.protocol.process import die_with_parent
 from foosim.supervisor.control import Control, connect
-from foosim.supervisor.run_folder import find_run
+from foosim.supervisor.run_folder import find_run, open_run
+from foosim.vhub.mcap_checks import CaptureError
 
 app = new_app()
 
 
 @app.command(no_args_is_help=False)
-def foosim_console(
+def foosim_console(  # noqa: PLR0913, PLR0917  # a command's options
     run: Annotated[
         str | None, typer.Argument(metavar="[RUN]", help="The run to look at; by default the newest live one.")
     ] = None,
@@ -34,16 +44,20 @@ def foosim_console(
     key: Annotated[Path | None, typer.Option(help="The key of that certificate, PEM.")] = None,
     view_only: Annotated[bool, typer.Option("--view-only", help="Let nobody operate the run.")] = False,
     open_browser: Annotated[bool, typer.Option("--open", help="Show the page in the browser of this machine.")] = False,
+    second: SecondOption = None,
+    offset: OffsetOption = None,
     announce: Annotated[Path | None, typer.Option(hidden=True)] = None,
     version: VersionOption = False,
 ) -> None:
     """Serve a page that shows a live run, and lets operators do what foosim-supervisor's commands do.
 
     Prints an address for who operates and one for who only looks; the token in it is the permission. While no browser
-    is open it asks the run for nothing. Ctrl-C ends it; the run goes on. Exit codes: 0 ended, 1 no run is live or
-    nobody can listen, 2 bad input, 3 refused.
+    is open it asks the run for its status once a second. With --second a recording follows the run on its clock, beside
+    it or as a ghost in it, and the distance between the two is plotted, entity by entity. Ctrl-C ends it; the run goes
+    on. Exit codes: 0 ended, 1 no run is live or nobody can listen, 2 bad input, 3 refused.
     """
     die_with_parent()
+    offset_ns = read_offset(second, offset)
     name = find_run(run).name
 
     def viewing(give_up: Callable[[], bool]) -> Control:
@@ -53,8 +67,31 @@ def foosim_console(
         return connect(name, "operator", give_up)
 
     options = ServeOptions(listen, certificate, key, view_only, open_browser, announce)
-    operate = None if view_only else operating
-    serve_sources(lambda: ([LiveSource(name, viewing, operate)], ()), options, lambda text: print(text, flush=True))
+    ended = partial(how_ended, open_run(name))
+    live = LiveSource(name, viewing, None if view_only else operating, ended)
+    sources = [live] if second is None else _followed(live, name, second, offset_ns)
+    serve_sources(lambda: (sources, ()), options, _say)
+
+
+def _followed(live: LiveSource, name: str, second: Path, offset_ns: int) -> list[Source]:
+    """Return a run and the recording that follows it. Raises BadValue, BadPoses, and what asking the run raises."""
+    with connect(name, "viewer") as control:
+        what = control.describe()
+        deployment = load_deployment(what["deployment"], what["deployment_name"])
+        if deployment.files():
+            deployment = deployment.with_assets(control.files(deployment))
+    leader = Leader(live, deployment.tick_ns, time.monotonic_ns)
+    added = [(added, model) for added, model in what["added"]]
+    try:
+        follower, both = open_follower(second, leader, deployment, offset_ns, added=added)
+    except CaptureError as error:
+        raise BadValue(f"--second: {error}") from None
+    _say(compared_text(second, both))
+    return [leader, follower]
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
 
 
 def main() -> None:

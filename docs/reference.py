@@ -118,6 +118,7 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("supervisor.up", "END_S"): ("`up`", "a supervisor that was told to end and does not answer; then all are ended"),
     ("supervisor.up", "LEAVE_S"): ("`up`", "the others to end once the supervisor has; then they are ended"),
     ("supervisor.up", "AWAY_S"): ("`up`", "the same on other machines"),
+    ("supervisor.console_child", "LEAVE_S"): ("`up`", "the console to tell its pages that the run has ended"),
     ("supervisor.children", "GRACE_S"): ("`up`, `foosim-guard`", "a process that was told to end; then it is killed"),
     ("supervisor.guard", "TAKE_OVER_S"): ("`foosim-guard`", "the guard of the process before to end"),
     ("supervisor.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),

@@ -78,7 +78,8 @@ class PlayedRow(Message, frozen=True):
 class ReplayClock(Message, frozen=True):
     """Where a replay is. `jumps` counts seeks and rounds of a loop: with it time goes on from elsewhere.
 
-    `state` is `playing`, `paused`, `waiting` (for its beginning) or `ended`; `rate` is as people write it.
+    `state` is `playing`, `paused`, `waiting` (for its beginning) or `ended`, which is the last message of each stream;
+    `rate` is as people write it.
     """
 
     time_ns: Counter

@@ -121,6 +121,12 @@ def parse_ns(text: object) -> int:
     return int(value)
 
 
+def parse_offset_ns(text: str) -> int:
+    """A time in integer nanoseconds that may be negative (`-1s`); raises BadValue."""
+    sign = -1 if text.startswith("-") else 1
+    return sign * parse_ns(text.removeprefix("-"))
+
+
 def format_ns(time_ns: int) -> str:
     """A time in the largest unit that keeps it a whole number: `2 ms`, `500 us`, `20 s`."""
     for unit, size in (("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1_000)):

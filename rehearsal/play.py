@@ -26,7 +26,7 @@ from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.exposure import Exposure
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.loop import Wire
-from foosim.protocol.replay_messages import CLOCK
+from foosim.protocol.replay_messages import CLOCK, STREAMS
 from foosim.protocol.session import Session
 from foosim.protocol.session_settings import Security
 from foosim.protocol.units import Pace
@@ -220,7 +220,9 @@ class _Play:
         reached_ns = playback.time_ns(now_ns)
         stopped = not playback.ended
         playback.ended = True
-        self._put(CLOCK, encode(playback.clock(now_ns)))
+        end = encode(playback.clock(now_ns))
+        for stream in STREAMS:  # each has an order of its own: its listeners know by this that nothing more comes
+            self._put(stream, end)
         self._lines.end()
         found = playback.statistics()
         return PlayResult(

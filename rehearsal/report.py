@@ -15,6 +15,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from foosim.console.shown.asked import edit_text, moves
+from foosim.console.shown.timeline import WorldEvents
 from foosim.protocol.frame import Frame, chain_next
 from foosim.protocol.network import event_of
 from foosim.protocol.radios import Radio
@@ -165,11 +166,13 @@ class RuleReport:
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """An event of the network or of the world, and whether it was asked for while the run went on."""
+    """An event of the network or of the world, and whether it was asked for while the run went on; `kind` is that of
+    what the world's rules did (`console.shown.timeline`)."""
 
     at_ns: int
     text: str
     is_asked: bool
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +277,7 @@ class _Gathered:
         self._senders: dict[tuple[str, str], SenderTally] = {}
         self._rules: dict[tuple[str, str], RuleTally] = {}
         self._settings: dict[tuple[str, str], Radio] = {}
-        self._map = MapMaker(deployment, self._tick_ns)
+        self._map, self._rules_did = MapMaker(deployment, self._tick_ns), WorldEvents(deployment)
         self.ages = AgeTallies(self._tick_ns)
 
     # --- rows --------------------------------------------------------------------------------------------------------
@@ -333,6 +336,8 @@ class _Gathered:
 
     def take_frame(self, frame: Frame) -> None:
         self._map.take_frame(frame)
+        did = self._rules_did.take(frame)
+        self._happenings += [Happening(mark.tick * self._tick_ns, mark.text, False, mark.kind) for mark in did]
 
     # --- the result --------------------------------------------------------------------------------------------------
 

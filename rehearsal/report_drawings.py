@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from foosim.console.shown.timeline import MARKS_MAX
 from foosim.rehearsal.report import Band, BinReport, ChannelReport, LinkReport, Report
 from foosim.rehearsal.report_map import Map, Outline, Place
 
@@ -75,7 +76,11 @@ def _events(found: Report) -> Drawing:
             lanes.append({"name": kind, "colour": colour, "entries": entries})
     asked = [(event.at_ns, event.text) for event in found.happenings if event.is_asked]
     lost = [(mark.at_ns, mark.text) for mark in found.marks]
-    for name, mark, moments in (("asked for", "request", asked), ("recovery", "recovery", lost)):
+    named = [("asked for", "request", asked), ("recovery", "recovery", lost)]
+    for kind in sorted({event.kind for event in found.happenings if event.kind}):
+        did = [(event.at_ns, event.text) for event in found.happenings if event.kind == kind]
+        named.append((kind, kind, did[:MARKS_MAX]))
+    for name, mark, moments in named:
         if moments:
             entries = [{"from": at_ns / 1e9, "text": f"{at_ns / 1e9:.9g} s: {text}"} for at_ns, text in moments]
             lanes.append({"name": name, "mark": mark, "entries": entries})

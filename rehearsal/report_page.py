@@ -135,7 +135,8 @@ def _events(found: Report) -> Iterator[str]:
     if found.bands_left:
         yield _note(f"The first {len(found.bands)} times are drawn, {found.bands_left} more are not.")
     happened = [
-        (event.at_ns, event.text, "asked for" if event.is_asked else "deployment") for event in found.happenings
+        (event.at_ns, event.text, "rules" if event.kind else "asked for" if event.is_asked else "deployment")
+        for event in found.happenings
     ]
     happened += [(mark.at_ns, mark.text, "recovery") for mark in found.marks]
     happened.sort()

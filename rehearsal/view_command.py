@@ -5,6 +5,7 @@ Neighbours: `console.recorded` (the sources), `console.server.serving`, `between
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -12,22 +13,28 @@ import typer
 
 from foosim.client.replay import hear_replay
 from foosim.console.recorded.capture_source import FileSource
+from foosim.console.recorded.leading import Leader
 from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.replay_source import PlayedSource
+from foosim.console.recorded.second import (
+    OffsetOption,
+    SecondOption,
+    compared_text,
+    is_table,
+    open_follower,
+    read_offset,
+)
 from foosim.console.server.serving import ServeOptions, serve_sources
 from foosim.console.shown.source import Source
 from foosim.protocol.addresses import LOOPBACK
 from foosim.protocol.command import PkiOption
-from foosim.protocol.errors import BadValue, read_at
-from foosim.protocol.units import parse_ns
+from foosim.protocol.errors import BadValue, Refused
 from foosim.rehearsal.between import Between
 from foosim.rehearsal.capture_arguments import reading
 from foosim.vhub.capture_reader import read_about
 
 ADDRESSES: Final = ("tcp/", "tls/")
 """How the address of a replay begins."""
-TABLE: Final = ".csv"
-"""How the name of a table of poses ends; all else is a capture."""
 
 
 def view(  # a command's options
@@ -39,13 +46,8 @@ def view(  # a command's options
             show_default=False,
         ),
     ],
-    second: Annotated[
-        Path | None,
-        typer.Option(metavar="CAPTURE|CSV", help="Another one on the same clock, beside it or as a ghost in it."),
-    ] = None,
-    offset: Annotated[
-        str | None, typer.Option(help="The time of --second at which the first one has time 0, e.g. 2.5s or -1s.")
-    ] = None,
+    second: SecondOption = None,
+    offset: OffsetOption = None,
     listen: Annotated[str, typer.Option(help="HOST[:PORT] to serve the page at.")] = LOOPBACK,
     certificate: Annotated[
         Path | None, typer.Option(help="A PEM certificate for HTTPS, which another address than loopback takes.")
@@ -62,9 +64,7 @@ def view(  # a command's options
     captures, a run and its what-if, a simulation and recorded poses. Ctrl-C ends it. Exit codes: 0 ended, 1 nobody can
     listen, 2 bad input, 3 refused.
     """
-    if offset is not None and second is None:
-        raise BadValue("--offset needs --second")
-    offset_ns = 0 if offset is None else read_at("--offset", _signed_ns, offset)
+    offset_ns = read_offset(second, offset)
     with reading():
         sources = open_sources(file, second, offset_ns, pki)
     options = ServeOptions(listen, certificate, key, open=open_browser)
@@ -77,23 +77,34 @@ def open_sources(file: Path, second: Path | None = None, offset_ns: int = 0, pki
     Raises CaptureError, BadPoses, BadValue, and what `hear_replay` raises.
     """
     if str(file).startswith(ADDRESSES):
-        if second is not None:
-            raise BadValue("--second goes with a file: a replay has its own clock", str(second))
-        return [PlayedSource(lambda streams: hear_replay(str(file), streams, pki=pki))]
-    if _is_table(file):
+        played = PlayedSource(lambda streams: hear_replay(str(file), streams, pki=pki))
+        return [played] if second is None else _followed(played, second, offset_ns)
+    if is_table(file):
         table = PosesSource(file)
         if second is None:
             return [table]
-        if not _is_table(second):
+        if not is_table(second):
             raise BadValue("a table of poses comes second: give the capture first", str(second))
-        return [table, PosesSource(second, table.deck, offset_ns, compare=lambda: table.where)]
+        return [table, PosesSource(second, table.clock, offset_ns, compare=lambda: table.where)]
     first = _capture(file)
     if second is None:
         return [first]
-    if _is_table(second):
+    if is_table(second):
         deployment = first.recording.deployment
-        return [first, PosesSource(second, first.deck, offset_ns, deployment, first.opened(links=True))]
-    return [first, FileSource(second, first.deck, offset_ns, _between(second), first.opened())]
+        return [first, PosesSource(second, first.clock, offset_ns, deployment, first.opened(links=True))]
+    return [first, FileSource(second, first.clock, offset_ns, _between(second), first.opened())]
+
+
+def _followed(played: PlayedSource, second: Path, offset_ns: int) -> list[Source]:
+    """Return a replay and what follows it. Its connection is closed where that cannot be."""
+    leader = Leader(played, played.tick_ns, time.monotonic_ns)
+    try:
+        other, both = open_follower(second, leader, played.deployment, offset_ns, _between)
+    except Refused:
+        played.close()
+        raise
+    print(compared_text(second, both), flush=True)
+    return [leader, other]
 
 
 def _capture(file: Path) -> FileSource:
@@ -102,13 +113,3 @@ def _capture(file: Path) -> FileSource:
 
 def _between(file: Path) -> Between:
     return Between(read_about(file))
-
-
-def _is_table(file: Path) -> bool:
-    return file.suffix.lower() == TABLE
-
-
-def _signed_ns(text: str) -> int:
-    """Return a time in ns, which may be negative."""
-    sign = -1 if text.startswith("-") else 1
-    return sign * parse_ns(text.removeprefix("-"))

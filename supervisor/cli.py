@@ -24,7 +24,7 @@ from foosim.protocol.process import has_launcher
 from foosim.protocol.units import parse_pace
 from foosim.protocol.usage import BadUsage
 from foosim.supervisor import control
-from foosim.supervisor.console_child import Page
+from foosim.supervisor.console_child import Page, page_of
 from foosim.supervisor.detach import detach
 from foosim.supervisor.display import Display, render_text
 from foosim.supervisor.install import install, is_root_there, write_units
@@ -71,6 +71,14 @@ From = Annotated[
     typer.Option("--from", metavar="CAPTURE@TIME", help="Begin with a captured frame, e.g. run.mcap@12.5s."),
 ]
 OptionalFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
+ConsoleOption = Annotated[
+    bool, typer.Option("--console", help="Serve a page that shows the run; its address is printed.")
+]
+Second = Annotated[
+    Path | None,
+    typer.Option(metavar="CAPTURE|CSV", help="What the console shows beside the run, on its clock."),
+]
+Offset = Annotated[str | None, typer.Option(help="The time of --second at which the run has time 0, e.g. 2.5s or -1s.")]
 Balance = Annotated[bool, typer.Option("--balance", help="Move robots from busy nodes to idle ones.")]
 RunName = Annotated[str | None, typer.Option("--run", help="A name for the run; by default WORLD-TIME.")]
 
@@ -104,10 +112,10 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     balance: Balance = False,
     detached: Annotated[bool, typer.Option("--detach", help="Run in the background; down ends it.")] = False,
     resumed: Annotated[str | None, typer.Option("--resume", help="Go on with this run, whose launcher died.")] = None,
-    console: Annotated[
-        bool, typer.Option("--console", help="Serve a page that shows the run; its address is printed.")
-    ] = False,
+    console: ConsoleOption = False,
     open_browser: Annotated[bool, typer.Option("--open", help="--console, and show it in the browser.")] = False,
+    second: Second = None,
+    offset: Offset = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON in the last line.")] = False,
 ) -> None:
     """Run all that a deployment declares, here and on its hosts, until Ctrl-C or --for.
@@ -125,10 +133,8 @@ def up(  # noqa: PLR0913, PLR0917  # a command's options
     """
     display = Display(sys.stderr if json else sys.stdout)
     begun: Up | Outcome | None = None
-    page: Page = "open" if open_browser else "console" if console else ""
     try:
-        if page and detached:
-            raise BadValue("--console and --detach exclude each other; foosim-console shows a run in the background")
+        page = page_of(console, open_browser, second, offset, detached)
         if resumed is not None:
             own = {"FILE": file, "--pace": pace, "--for": duration, "--seed": seed, "--set": sets, "--engine": engine}
             own |= {"--listen": listen, "--insecure": insecure, "--from": branch, "--balance": balance, "--run": run}
@@ -171,7 +177,7 @@ def _begin(
     run: str | None,
     detached: bool,
     display: Display,
-    console: Page,
+    console: Page | None,
 ) -> Up | Outcome:
     """Return a run of a deployment to be run, or leave it running; without a `capture` it is where captures go by
     default, where any is wanted (`captures`)."""
@@ -187,7 +193,7 @@ def _begin(
     return Up(plan, path, display, run, console=console)
 
 
-def _go_on(folder: RunFolder, display: Display, console: Page) -> Up | Outcome:
+def _go_on(folder: RunFolder, display: Display, console: Page | None) -> Up | Outcome:
     """Return a run that is to go on; of one that has ended return how."""
     if folder.result() is not None:
         recover_leftovers(display.say)
@@ -330,6 +336,12 @@ def move(
 ) -> None:
     """Have another node own a robot; the world does not notice."""
     _show(control.move(robot, node, run), json)
+
+
+@app.command()
+def balance(run: Run = None, json: Json = False) -> None:
+    """Move robots from busy nodes to idle ones, once; the answer says which, and by which loads."""
+    _show(control.balance(run), json)
 
 
 Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]

@@ -7,25 +7,65 @@ the run's folder, where only the owner can read them. Neighbours: `up`, `console
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Literal
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
 
 import msgspec
 
-from foosim.protocol.errors import Failed
+from foosim.protocol.errors import BadValue, Failed, read_at
+from foosim.protocol.units import parse_offset_ns
 from foosim.supervisor.launcher import Launcher
 from foosim.supervisor.run_folder import UNREADABLE, RunFolder
 
 CONSOLE: Final = "console"
-Page = Literal["", "console", "open"]
-"""Whether a page is to show the run, and the browser of this machine the page."""
 ADDRESSES: Final = "console.json"
 """In the run's folder: the addresses of the page, and the line that says them."""
+LEAVE_S: Final = 3.0
+"""How long a console has to tell pages how the run has ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A page that is to show the run."""
+
+    open: bool = False
+    """Have the browser of this machine show it."""
+    second: Path | None = None
+    """The recording that follows the run."""
+    offset: str | None = None
+    """The recording's time at which the run has time 0."""
+
+    def options(self) -> list[str]:
+        """Return the options of the command that serves it."""
+        options = ["--open"] if self.open else []
+        if self.second is not None:
+            options += ["--second", str(self.second.absolute())]
+        return options if self.offset is None else [*options, f"--offset={self.offset}"]
+
+
+def page_of(console: bool, opens: bool, second: Path | None, offset: str | None, detached: bool) -> Page | None:
+    """Return the page that the options of `up` are for, None without one. Raises BadValue where they do not fit."""
+    if not (console or opens):
+        for option, value in (("--second", second), ("--offset", offset)):
+            if value is not None:
+                raise BadValue(f"{option} goes with --console", str(value))
+        return None
+    if detached:
+        raise BadValue("--console and --detach exclude each other; foosim-console shows a run in the background")
+    if offset is not None:
+        if second is None:
+            raise BadValue("--offset needs --second", offset)
+        read_at("--offset", parse_offset_ns, offset)
+    if second is not None and not second.is_file():
+        raise BadValue("--second: no such file", str(second))
+    return Page(opens, second, offset)
 
 
 class ConsoleChild:
     """The console of one run."""
 
-    def __init__(self, folder: RunFolder, say: Callable[[str], None], page: Page) -> None:
+    def __init__(self, folder: RunFolder, say: Callable[[str], None], page: Page | None) -> None:
         self._folder, self._say, self._page = folder, say, page
         self._launcher = Launcher(folder.name)
         self._has_addresses = self._has_ended = False
@@ -33,7 +73,7 @@ class ConsoleChild:
 
     def start(self) -> None:
         """Start it, if there is to be one: the run can be found by now."""
-        if not self._page:
+        if self._page is None:
             return
         path = self._folder.path / ADDRESSES
         path.unlink(missing_ok=True)
@@ -42,7 +82,7 @@ class ConsoleChild:
             self._folder.name,
             "--announce",
             str(path),
-            *(["--open"] if self._page == "open" else []),
+            *self._page.options(),
         ]
         try:
             self._launcher.start(CONSOLE, command, self._folder.log(CONSOLE))
@@ -65,9 +105,12 @@ class ConsoleChild:
                 f"its log is {child.log}"
             )
 
-    def end(self) -> None:
-        """End it, at once."""
-        self._launcher.kill()
+    def __enter__(self) -> ConsoleChild:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """End it, once it has told its pages how the run has ended."""
+        self._launcher.stop(LEAVE_S)
         self._launcher.close()
         (self._folder.path / ADDRESSES).unlink(missing_ok=True)
 

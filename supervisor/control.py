@@ -261,6 +261,11 @@ def move(robot: str, node: str, run: str | None = None) -> Answer:
     return _ask(run, "move", robot=robot, node=node)
 
 
+def balance(run: str | None = None) -> Answer:
+    """Move robots from busy nodes to idle ones, once, as `up --balance` does again and again."""
+    return _ask(run, "balance")
+
+
 def stop(node: str, run: str | None = None) -> Answer:
     """Have a node end; its robots move to the others first."""
     return _ask(run, "stop", node=node)

@@ -245,9 +245,10 @@ class SupervisorCore:
             state.frame.tick, state.epoch, state.account.moves, state.account.handovers, *refusals
         )
 
-    def status(self) -> dict[str, Any]:
+    def status(self, now_ns: int) -> dict[str, Any]:
         """Return the state of the run for people and scripts."""
-        return status(self.state, self.progress, self.refusals.by_sender())
+        vhub_lost = self.vhub_loss.as_json(now_ns) if self.state.roster.is_hub_away else None
+        return status(self.state, self.progress, vhub_lost, self.refusals.by_sender())
 
     def result(self) -> dict[str, Any]:
         """Return the result of the run, or of the run so far."""

@@ -80,8 +80,8 @@ class Handshake:
             state.repeated += 1
             return None
         process.heard_ns = now_ns
-        if process.in_doubt and now_ns > process.gone_ns + IN_FLIGHT_NS:
-            process.in_doubt, process.gone_ns = False, 0
+        if not process.lost and now_ns > process.gone_ns + IN_FLIGHT_NS:
+            process.in_doubt, process.gone_ns = False, 0  # messages from before have come by then
         return process
 
     def keep_report(self, process: Process, heartbeat: Heartbeat) -> None:

@@ -2,12 +2,13 @@
 
 A node's load is the share of its time in which its loop does not sleep, as its heartbeats report. A move is an epoch
 like any other and does not change the world. The cost of a robot is estimated as an equal share of its node's load; it
-moves only when that makes the two loads more equal, and then the loads settle before the next move.
+moves only when that makes the two loads more equal, and then the loads settle before the next move. A request of an
+operator makes all such moves at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -41,6 +42,47 @@ class Shift:
         )
 
 
+def best_shift(
+    loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str], stay: Collection[str]
+) -> Shift | None:
+    """Return the robot that should move now, if any, but none of those that `stay`: from the busiest to the idlest
+    node, preferably one whose home that is."""
+    source = max(sorted(loads), key=lambda name: loads[name])
+    target = min(sorted(loads), key=lambda name: loads[name])
+    mine = sorted(robot for robot, owner in owners.items() if owner == source)
+    difference = loads[source] - loads[target]
+    if len(mine) < 2 or difference <= max(WORTH, loads[source] / len(mine)):
+        return None
+    free = [robot for robot in mine if robot not in stay]
+    if not free:
+        return None
+    robot = min(free, key=lambda name: (homes.get(name) != target, name))
+    return Shift(robot, source, target, loads[source], loads[target])
+
+
+def shifts_at_once(loads: Mapping[str, float], owners: Mapping[str, str], homes: Mapping[str, str]) -> list[Shift]:
+    """Return all moves that make loads more equal if each robot takes its share of the load with it; no node both
+    gives and takes. The loads in a shift are the measured ones."""
+    expected, placed = dict(loads), dict(owners)
+    shifts: list[Shift] = []
+    while (shift := best_shift(expected, placed, homes, {known.robot for known in shifts})) is not None:
+        if any(shift.source == known.target or shift.target == known.source for known in shifts):
+            break
+        share = shift.source_load / sum(owner == shift.source for owner in placed.values())
+        expected[shift.source] -= share
+        expected[shift.target] += share
+        placed[shift.robot] = shift.target
+        shifts.append(Shift(shift.robot, shift.source, shift.target, loads[shift.source], loads[shift.target]))
+    return shifts
+
+
+def loads_of(state: RunState) -> dict[str, float]:
+    """Return the load of each member that has reported one."""
+    known = state.roster.by_name
+    beats = {name: known[name].heartbeat for name in state.members if name in known}
+    return {name: beat.busy for name, beat in beats.items() if beat is not None}
+
+
 class Balancer:
     """Decides when which robot moves. Loads are shares of a core, from 0 to 1."""
 
@@ -61,27 +103,18 @@ class Balancer:
             name: load if name not in before else SMOOTHING * load + (1 - SMOOTHING) * before[name]
             for name, load in loads.items()
         }
-        means = self._means
-        source = max(sorted(means), key=lambda name: means[name])
-        target = min(sorted(means), key=lambda name: means[name])
-        mine = sorted(robot for robot, owner in owners.items() if owner == source)
-        difference = means[source] - means[target]
-        if len(mine) < 2 or difference <= max(WORTH, means[source] / len(mine)):
+        stay = {robot for robot, moved_ns in self._moved_ns.items() if now_ns < moved_ns + STAY_NS}
+        shift = best_shift(self._means, owners, self._homes, stay)
+        if shift is None:
             return None
-        free = [robot for robot in mine if now_ns >= self._moved_ns.get(robot, now_ns - STAY_NS) + STAY_NS]
-        if not free:
-            return None
-        robot = min(free, key=lambda name: (self._homes.get(name) != target, name))
-        self._moved_ns[robot] = now_ns
+        self._moved_ns[shift.robot] = now_ns
         self._next_ns = now_ns + SETTLE_NS
         self._means = {}
-        return Shift(robot, source, target, means[source], means[target])
+        return shift
 
     def wake(self, state: RunState, now_ns: int) -> Shift | None:
         """Return what should move now in a running world, by the loads that its members reported last."""
         if not state.is_open or state.end is not None or state.pacer.paused:
             return None
-        known = state.roster.by_name
-        beats = {name: known[name].heartbeat for name in state.members if name in known}
-        loads = {name: beat.busy for name, beat in beats.items() if beat is not None}
+        loads = loads_of(state)
         return self.look(loads, state.owners, now_ns) if len(loads) == len(state.members) else None

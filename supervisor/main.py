@@ -37,6 +37,7 @@ from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import History, fold
 from foosim.supervisor.run_folder import RESULT_FILE, RunFolder, RunInfo
 from foosim.supervisor.settings import RunSettings
+from foosim.vhub.capture_parts import is_complete
 
 LOOK_NS: Final = 1_000_000_000
 """How often the free space of the journal's disk is looked at."""
@@ -133,9 +134,16 @@ class SupervisorProcess:
         self._loop.perform()
         if self.core.state.abandoned:
             return REFUSED
+        if self.core.state.cut_off and self._has_capture():
+            self.core.state.cut_off = ""
         told = self.core.result()
         self._folder.write_result(told)
         return FAILED if told["failed"] else DONE
+
+    def _has_capture(self) -> bool:
+        """Whether the capture's file says that it is closed. One on another machine is not seen from here."""
+        launch = self._folder.launch()
+        return launch is not None and bool(launch.capture) and is_complete(Path(launch.capture))
 
     def stop(self) -> None:
         """End the run in order, as the command `down` does; a signal handler may call this."""

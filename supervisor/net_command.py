@@ -30,8 +30,7 @@ from foosim.protocol.process import Stop
 from foosim.protocol.settings import nested
 from foosim.protocol.traces import check_files, network_files
 from foosim.supervisor import control
-from foosim.supervisor.links_shown import links_shown, use_text
-from foosim.supervisor.net_text import RANGE_NOTE, link_line, link_table, meaning_tables
+from foosim.supervisor.net_text import RANGE_NOTE, link_line, link_table, links_shown, meaning_tables, use_text
 from foosim.vhub.capture_reader import open_capture
 from foosim.vhub.explain import explain_packet, parse_packet
 from foosim.vhub.link_models import check_link_models

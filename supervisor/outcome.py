@@ -8,7 +8,6 @@ status that it was shown, why the run ended, and what is in the capture's file. 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +16,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.supervisor.display import recording_text
 from foosim.supervisor.run_folder import RunFolder, open_run, run_exists
 from foosim.supervisor.status import NO_PACKETS, NOT_RECORDED, UNFINISHED
-from foosim.vhub.capture_parts import first_there, has_end, parts_at
+from foosim.vhub.capture_parts import first_there, has_end, is_complete, parts_at
 from foosim.vhub.capture_reader import Scan
 from foosim.vhub.mcap_checks import CaptureError
 from foosim.vhub.rows import EPOCHS, PACKETS, TICK
@@ -92,9 +91,7 @@ def capture_lines(capture: Path | None, result: dict[str, Any] | None, journals:
         return []
     wrong = "" if result is None else recording_text(result)
     count = f", {len(files)} files" if len(files) > 1 else ""
-    there, is_finished = [*files.values()], False
-    with suppress(CaptureError):
-        is_finished = has_end(there[-1])
+    there, is_finished = [*files.values()], capture is not None and is_complete(capture)
     lines = [f"capture {there[0]}{count}" if is_finished else f"capture {there[0]}{count} (unfinished)"]
     if not is_finished and result is not None and journals is not None:
         lines.append(f"complete it with: foosim-replay recover {there[0]} --journals {journals}")

@@ -15,7 +15,7 @@ from foosim.protocol import limits
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.messages import CAPTURE, DONE_OF, JOIN_OF, SAMPLES_OF, Heartbeat
 from foosim.protocol.standstill import TOLD_NS, told
-from foosim.supervisor.roster import IN_FLIGHT_NS, Process
+from foosim.supervisor.roster import Process
 from foosim.supervisor.state import RunState
 
 DOUBT_NS: Final = 1_000_000_000
@@ -231,7 +231,9 @@ class ClosingMonitor:
     """Waits until the vHub of a run that has ended has closed the capture, for as long as it makes progress.
 
     The account of the capture in its heartbeats shows progress. A vHub without any for `deadlines.close`, or that ends
-    meanwhile, leaves a capture that is cut off: an error, though the run itself may have been in order.
+    meanwhile, leaves a capture that is cut off: an error, though the run itself may have been in order. A vHub has
+    ended when its connection has closed and nothing was heard of it for `deadlines.heartbeat` since. The shell reads
+    the file before it reports that: a capture that has its end was closed, whatever was heard of its vHub.
     """
 
     def __init__(self, state: RunState) -> None:
@@ -256,7 +258,8 @@ class ClosingMonitor:
         account = hub.report.get("recording"), hub.report.get("disk_progress")
         if account != self._account:
             self._account, self._progress_ns = account, now_ns
-        if hub.gone_ns and now_ns > hub.gone_ns + IN_FLIGHT_NS and not hub.in_doubt:
+        silent_ns = now_ns - max(hub.gone_ns, hub.heard_ns)
+        if hub.gone_ns and silent_ns > deadlines.heartbeat_ns and not hub.in_doubt:
             self._cut_off(hub, "its vHub ended before it was closed")
             return True
         if now_ns > max(self._progress_ns, self._ended_ns) + deadlines.close_ns:

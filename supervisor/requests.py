@@ -1,5 +1,5 @@
-"""Requests of operators: pause, resume, step, rate, add, remove, move, push, network, stop and start (a node), down;
-and of viewers: status, describe, watch.
+"""Requests of operators: pause, resume, step, rate, add, remove, move, balance, push, network, stop and start (a
+node), down; and of viewers: status, describe, watch.
 
 A request has an id; the same id gets the same answer. Each takes effect at a tick that the answer names: push at the
 first tick not yet released, network with what is sent at the next one, add and remove at the first not yet released
@@ -24,6 +24,7 @@ from foosim.protocol.names import NAME_RULE, is_name
 from foosim.protocol.network import EVENTS_MAX, event_of
 from foosim.protocol.network_request import event_text, told
 from foosim.protocol.units import parse_pace
+from foosim.supervisor.load_balancing import WORTH, loads_of, shifts_at_once
 from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.records import RequestRecord, asked
 from foosim.supervisor.state import RunState
@@ -56,13 +57,13 @@ class Requests:
         state: RunState,
         viewing: Viewing,
         node_loss: NodeLoss,
-        status: Callable[[], dict[str, Any]],
+        status: Callable[[int], dict[str, Any]],
         open_epoch: Callable[[dict[str, str], int], None],
         stop: Callable[[], int],
         finish: Callable[[str], None],
     ) -> None:
-        """`status` returns that of the run, `open_epoch` opens one for owners and the time, `stop` ends the run in
-        order and returns at which tick, `finish` ends it at once as failed."""
+        """`status` returns that of the run at a time, `open_epoch` opens one for owners and the time, `stop` ends the
+        run in order and returns at which tick, `finish` ends it at once as failed."""
         self._state = state
         self._node_loss = node_loss
         self._status_of_run = status
@@ -81,6 +82,7 @@ class Requests:
             "add": self._add,
             "remove": self._remove,
             "move": self._move,
+            "balance": self._balance,
             "push": self._push,
             "network": self._network,
             "stop": self._stop_node,
@@ -179,7 +181,7 @@ class Requests:
     # --- pace --------------------------------------------------------------------------------------------------------
 
     def _status(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        result = encode_json(self._status_of_run())
+        result = encode_json(self._status_of_run(now_ns))
         return Answer(request.sender, request.id, True, self._state.frame.tick, "", result)
 
     def _pause(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
@@ -314,6 +316,32 @@ class Requests:
         self._node_loss.moved(robot)
         answer = self._accept(request, tick, f"{robot} moved to {node} at tick {tick}", owners=owners)
         state.account.moves += 1
+        self._open_epoch(owners, now_ns)
+        return answer
+
+    def _balance(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
+        """Move all robots at once whose move makes the loads of the nodes more equal; the answer says which and why."""
+        state, loads = self._state, loads_of(self._state)
+        tick = state.frame.tick
+        silent = [node for node in state.members if node not in loads]
+        if silent or len(loads) < 2:
+            why = f"no load is known of {', '.join(silent)}" if silent else "one node takes part: nothing can move"
+            raise Refused(why)
+        shifts = shifts_at_once(loads, state.owners, state.deployment.owners())
+        told = ", ".join(f"{node} {load:.0%}" for node, load in loads.items())
+        if not shifts:
+            least = f"no move would win more than a robot's share, or {WORTH:.0%}"
+            return self._accept(request, tick, f"nothing moves at tick {tick}: loads are {told}; {least}")
+        owners = dict(state.owners)
+        moved: dict[tuple[str, str], list[str]] = {}
+        for shift in shifts:
+            owners[shift.robot] = shift.target
+            self._node_loss.moved(shift.robot)
+            moved.setdefault((shift.source, shift.target), []).append(shift.robot)
+        ways = "; ".join(f"{', '.join(robots)} from {source} to {node}" for (source, node), robots in moved.items())
+        text = f"moved at tick {tick}, for loads were {told}: {ways}"
+        answer = self._accept(request, tick, text[:TEXT_MAX], owners=owners)
+        state.account.moves += len(shifts)
         self._open_epoch(owners, now_ns)
         return answer
 

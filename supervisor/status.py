@@ -79,8 +79,13 @@ def result(state: RunState) -> dict[str, Any]:
     }
 
 
-def status(state: RunState, progress: ProgressMonitor, refused: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the result so far and what only a running system has; `refused` is what the supervisor has refused."""
+def status(
+    state: RunState, progress: ProgressMonitor, vhub_lost: dict[str, Any] | None, refused: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the result so far and what only a running system has.
+
+    `vhub_lost` is the present loss of the vHub, `refused` what the supervisor has refused, by sender.
+    """
     report = state.roster.hub_account
     pacer = state.pacer
     waiting_for = ", ".join(progress.waiting_for())
@@ -98,6 +103,7 @@ def status(state: RunState, progress: ProgressMonitor, refused: Mapping[str, Any
         "processes": _processes(state, waiting_for, refused),
         "starts": dict(state.roster.starts),
         "vhub_away": state.roster.is_hub_away,
+        "vhub_lost": vhub_lost,
         "links": report.get("links", []),
         "links_in_all": report.get("links_in_all", 0),
         "disruptions": {

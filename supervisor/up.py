@@ -75,11 +75,11 @@ class Up:
         display: Display,
         run: str | None = None,
         resumed: RunFolder | None = None,
-        console: Page = "",
+        console: Page | None = None,
     ) -> None:
         """`capture` is where it is captured; None captures nothing. `run` names it, `resumed` is one to go on with.
 
-        `console` says whether one is started beside the run.
+        `console` is the page that is served beside the run.
         """
         self.plan = plan
         self.capture = capture
@@ -120,7 +120,7 @@ class Up:
 
     def run(self) -> Outcome:
         """Start everything, show it until it is over, and return how it ended. Raises Killed."""
-        with counted_signals(self._count), self.display:
+        with counted_signals(self._count), self.display, self._console:  # whose pages learn how it ended
             try:
                 if self._start():
                     self._watch()
@@ -129,11 +129,10 @@ class Up:
                 leave_s = AWAY_S if self._launcher.remotes else LEAVE_S
                 self._launcher.wait(leave_s if self.folder.result() is not None else END_S)
             finally:
-                self._console.end()
                 self._launcher.stop()
                 self._launcher.close()
             self._bring_home()
-        return self._outcome()
+            return self._outcome()
 
     @property
     def _can_resume(self) -> bool:

@@ -8,6 +8,7 @@ stalled. The vHub itself deals with lost players and reports them in its heartbe
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 from foosim.protocol import channels
 from foosim.supervisor.progress import ProgressMonitor
@@ -40,14 +41,18 @@ class VhubLoss:
             state.roster.lose(process)
         if state.is_vhub_away:
             return
+        self._since_ns, self._reason, self._lost_at = now_ns, reason, (state.epoch, state.frame.tick)
         if not state.is_open:  # the run waits for it as for any process that has not come yet
             state.log("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
             return
         heartbeat = None if process is None else process.heartbeat
         self._tick = heartbeat.tick if heartbeat is not None and "overdue" in reason else -1
-        state.is_vhub_away, self._since_ns, self._gap_ns = True, now_ns, 0
-        self._reason, self._lost_at = reason, (state.epoch, state.frame.tick)
+        state.is_vhub_away, self._gap_ns = True, 0
         state.log("warning", f"lost the vHub: {reason}; the run waits for it at tick {state.frame.tick}")
+
+    def as_json(self, now_ns: int) -> dict[str, Any]:
+        """Return why the vHub was lost last, at which tick, and how many seconds of wall time ago."""
+        return {"reason": self._reason, "tick": self._lost_at[1], "for_s": round((now_ns - self._since_ns) / 1e9, 1)}
 
     def on_heartbeat(self, process: Process, now_ns: int) -> None:
         """A lost vHub sends a heartbeat: it is back, unless that was sent before its loss, or its tick stands still."""

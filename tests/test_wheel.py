@@ -58,6 +58,27 @@ class Installed:
         return self.environment / "bin"
 
 
+def test_what_make_compiled_copies_has_nothing_of_npm(tmp_path: Path) -> None:
+    """An editor wants the packages of npm beside the page's sources; what else git ignores is not shipped either."""
+    for package in PACKAGES:
+        (tmp_path / package).mkdir()
+    page = tmp_path / "console" / "page"
+    for file in (page / "src" / "main.js", page / "node_modules" / "three" / "three.js"):
+        file.parent.mkdir(parents=True)
+        file.write_text("")
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "tools").mkdir()
+    script = shutil.copy(ROOT / "tools" / "compiled.sh", tmp_path / "tools")
+    python = tmp_path / ".venv" / "bin" / "python"
+    python.parent.mkdir(parents=True)
+    python.write_text('#!/bin/sh\n[ "$2" = venv ] && mkdir .venv-compiled\n')  # it fails to build
+    python.chmod(0o755)
+    assert subprocess.run(["sh", script], cwd=tmp_path, capture_output=True, check=False).returncode == 1
+    copied = tmp_path / ".venv-compiled" / "source" / "console" / "page"
+    assert (copied / "src" / "main.js").is_file() and not (copied / "node_modules").exists()
+
+
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
     folder = tmp_path_factory.mktemp("wheel")

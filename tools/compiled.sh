@@ -21,10 +21,11 @@ fi
 echo "Compiling the hot path into .venv-compiled; this takes two minutes of processor time or some, once for each change."
 rm -rf .venv-compiled
 "$python" -m venv --without-pip .venv-compiled
-# In a copy: what an earlier build left would be shipped, and nothing is left in this folder.
+# In a copy: what an earlier build left would be shipped, and nothing is left in this folder. Not the packages of npm that
+# an editor needs beside the page's sources: they are many, and nothing of them is shipped.
 mkdir .venv-compiled/source
 # shellcheck disable=SC2086
-cp -R $folders $files .venv-compiled/source
+tar -cf - --exclude=node_modules --exclude=__pycache__ $folders $files | tar -xf - -C .venv-compiled/source
 # How far it is goes to the terminal, all else to the log.
 (
     cd .venv-compiled/source

@@ -164,6 +164,15 @@ def has_end(last: Path) -> bool:
     return end is not None and NEXT not in end
 
 
+def is_complete(first: Path) -> bool:
+    """Whether there is a capture that begins at `first`, and it has its end; not where that cannot be read."""
+    files = parts_at(first)
+    try:
+        return bool(files) and has_end(files[max(files)])
+    except CaptureError:
+        return False
+
+
 def _end_in(stream: BinaryIO, summary: bytes, size: int) -> dict[str, str]:
     for opcode, start, stop in chunk_records(summary):
         if opcode != Opcode.METADATA_INDEX:

@@ -5,6 +5,7 @@ Neighbours: `core` sends it, `supervisor.status` shows it.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -53,10 +54,11 @@ class LinksTold:
         self._lines = msgspec.Raw(b"[]")
         self._heartbeats = 0
 
-    def lines(self, state: HubState, *, anew: bool) -> msgspec.Raw:
-        """Return the lines as JSON for one more heartbeat, made anew when it is their turn."""
+    def lines(self, state: HubState, watched: Collection[tuple[str, str]], *, anew: bool) -> msgspec.Raw:
+        """Return the lines as JSON for one more heartbeat, made anew when it is their turn: of the links with the most
+        traffic, and of those that somebody watches."""
         if anew or self._heartbeats % LINKS_TOLD_EVERY == 0:
-            self._lines = msgspec.Raw(encode_json(_links(state)))
+            self._lines = msgspec.Raw(encode_json(_links(state, watched)))
         self._heartbeats += 1
         return self._lines
 
@@ -66,11 +68,11 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
 
     Only the last report has everything as it is at this moment.
 
-    `links` are those with the most traffic: [from, to, offered, delivered, dropped, mean delay in ns, rule, how long
-    its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any. Ages at use are [channel,
-    uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts messages by channel and sender,
-    `refusals` packets by reason; `lateness_ms` is how late packets left in realtime, null if none did. What somebody
-    looks at is under `watched` (`Watching.report`).
+    `links` are those with the most traffic, and those that are watched: [from, to, offered, delivered, dropped, mean
+    delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
+    Ages at use are [channel, uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts
+    messages by channel and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime,
+    null if none did. What somebody looks at is under `watched` (`Watching.report`).
     """
     state, refused = core.state, core.refusals.by_sender()
     if state is None:
@@ -88,7 +90,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
             },
             "refused": refused,
             "refusals": state.refusals,
-            "links": core.links_told.lines(state, anew=is_last),
+            "links": core.links_told.lines(state, core.watching.links, anew=is_last),
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
             **core.watching.report(state),
@@ -102,7 +104,7 @@ def report(core: HubCore, *, is_last: bool = False) -> bytes:
     )
 
 
-def _links(state: HubState) -> list[list[Any]]:
+def _links(state: HubState, watched: Collection[tuple[str, str]]) -> list[list[Any]]:
     """Return the links that are told, by name."""
     fabric, now_ns = state.fabric, state.closed * state.tick_ns
     ages: dict[LinkKey, list[tuple[str, int, int, int]]] = {}
@@ -111,12 +113,13 @@ def _links(state: HubState) -> list[list[Any]]:
             key = age.source, name, name_of(fabric.profiles.find(age.source, name, age.channel))
             p50, p99 = (quantile(age.counts, share) * state.tick_ns for share in (0.5, 0.99))
             ages.setdefault(key, []).append((age.channel, sum(age.counts.values()), p50, p99))
-    busiest = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))[:LINKS_TOLD_MAX]
+    order = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))
+    told = order[:LINKS_TOLD_MAX] + [item for item in order[LINKS_TOLD_MAX:] if item[0][:2] in watched]
     return [
         [
             *key[:2],
             *(its.offered, its.delivered, its.dropped, its.delay_ns // its.delivered if its.delivered else 0),
             *(key[2], fabric.queue_ns(key, now_ns), dict(sorted(its.causes.items())), ages.get(key, [])),
         ]
-        for key, its in sorted(busiest, key=lambda item: item[0])
+        for key, its in sorted(told, key=lambda item: item[0])
     ]

@@ -1,7 +1,7 @@
 """What becomes of what arrives from a running system: frames as moments, statuses as messages, requests as marks.
 
 Pure. Neighbours: `live_source` (moves the bytes),
-`drawing` (one layout), `links`, `status_marks`.
+`drawing` (one layout), `links`, `status_marks`, `history`.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
+from foosim.console.live.history import History
 from foosim.console.live.status_marks import StatusMarks
 from foosim.console.live.watched import Watched
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Links
-from foosim.console.shown.source import About, Moment, Wanted
+from foosim.console.shown.source import About, Curve, Moment, Wanted
 from foosim.console.shown.timeline import NETWORK, Mark, WorldEvents
 from foosim.protocol.codec import decode
 from foosim.protocol.deployment import Deployment
@@ -57,12 +58,17 @@ class Following:
         self._frame: Frame | None = None
         """The newest one that was shown."""
         self._is_paused = self._has_changed = False
+        self._history, self._wanted = History(about.tick_ns), Wanted()
         self._marks = StatusMarks()
         self._events: WorldEvents | None = None
         self._planned: list[Event] = []
         """Events of the deployment's network that are not marked yet, the last one first."""
         self._watched: Watched | None = None
         self._statuses = 0
+        self._disturbers: dict[int, str] = {}
+        """Who asked for an event of the network, by the tick from which it holds."""
+        self.stopped_by = ""
+        """Who asked for the end of the run; empty while nobody did."""
         self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
         """Who has asked: by the request's sender, tick and verb."""
 
@@ -103,6 +109,8 @@ class Following:
             self._frame = None
             if before is None or before.drawing.deployment is not deployment:
                 self._events, self._watched = WorldEvents(deployment), Watched(deployment)
+                self._history = History(deployment.tick_ns)
+                self._history.listen(self._wanted)
                 self._planned = sorted(deployment.network.events, key=lambda event: event.at_ns, reverse=True)
             world.links.turn_to(world.drawing.scene)
         return is_new
@@ -143,6 +151,7 @@ class Following:
         """Return what there is to see in a frame that was read just now."""
         jump = self._frame is None or frame.tick < self._frame.tick
         self._frame = frame
+        self._history.keep_frame(frame)
         if self._watched is not None:
             self._watched.keep(frame)
         return world.drawing.moment(frame, jump=jump, paused=self._is_paused)
@@ -152,6 +161,15 @@ class Following:
         if self._world is None or self._frame is None:
             return None
         return self._world.drawing.overlay(self._frame, wanted)
+
+    def listen(self, wanted: Wanted) -> None:
+        """Take note of what is looked at from here on: all else is not heard."""
+        self._wanted = wanted
+        self._history.listen(wanted)
+
+    def points(self, curve: Curve) -> Callable[[], list[tuple[float, float]]]:
+        """Return what makes the points that are kept of a curve, in any thread."""
+        return list if self._world is None else self._history.reader(curve, self._world.drawing.layout)
 
     # --- statuses ----------------------------------------------------------------------------------------------------
 
@@ -168,6 +186,8 @@ class Following:
     def asked(self, sender: str, tick: int, verb: str, who: str) -> None:
         """Remember which browser has asked for something."""
         self._askers[sender, tick, verb] = who
+        if verb == "down":
+            self.stopped_by = who
         if len(self._askers) > ASKERS_KEPT:
             self._askers.popitem(last=False)
 
@@ -178,6 +198,8 @@ class Following:
             for asked in status["requests"]
         ]
         status = {**status, "requests": requests}
+        self._disturbers = {asked["tick"]: asked["who"] for asked in requests if asked["verb"] == "network"}
+        self.stopped_by = next((asked["who"] for asked in requests if asked["verb"] == "down"), self.stopped_by)
         was_paused, self._is_paused = self._is_paused, status["state"] == "paused"
         self._has_changed = was_paused != self._is_paused
         messages: list[dict[str, Any]] = [{"type": "status", "status": status}]
@@ -196,6 +218,8 @@ class Following:
         self._statuses += 1
         if self._watched is not None:
             messages += self._watched.readings(status["watched"])
+        for message in messages:
+            self._history.keep(message)
         return messages
 
     def explained(self, status: Mapping[str, Any], wanted: Wanted) -> list[dict[str, Any]]:
@@ -204,7 +228,8 @@ class Following:
         watched = self._watched
         if watched is None:
             return []
-        return watched.drops(report, [link for link in wanted.links if f"{link[0]}>{link[1]}" in drops])
+        links = [link for link in wanted.links if f"{link[0]}>{link[1]}" in drops]
+        return watched.drops(report, links, status["ticks"] * status["tick_ns"], self._disturbers)
 
     def standing_moment(self) -> Moment | None:
         """Return the last moment again where the run has just paused or gone on, which pages show."""

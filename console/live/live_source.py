@@ -1,9 +1,10 @@
 """A running system as a source: frames of the simulation plane's `view`, statuses, and requests of an operator.
 
-Looking on costs the run what its leases say: they are renewed only while a browser looks. A supervisor that dies is
-looked for again under the run's name, and what was seen stays in sight meanwhile. Asking waits in threads, one
-connection each, so that nobody waits for another's answer. Neighbours: `following` (what becomes of what arrives),
-`supervisor.control`.
+Looking on costs the run what its leases say: they are renewed only while a browser looks; while none does, a status is
+asked for each second. A supervisor that dies is looked for again under the run's name, and what was seen stays in sight
+meanwhile; of a run that has ended pages are told how. Asking waits in threads, one connection each, so that nobody
+waits for another's answer.
+Neighbours: `following` (what becomes of what arrives), `presence`, `supervisor.control`.
 """
 
 from __future__ import annotations
@@ -18,21 +19,28 @@ from functools import partial
 from typing import Any, Final, TypeVar
 
 from foosim.console.live.following import Following, World
+from foosim.console.live.presence import HERE, away
+from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
 from foosim.protocol.errors import BadValue, Refused
 from foosim.protocol.inbox import Inbox, Item
 from foosim.supervisor.control import Control, NoAnswer, RequestRefused
 
 VERBS: Final = (
-    *("pause", "resume", "step", "rate", "add", "remove", "move", "push", "network", "stop", "start", "down"),
+    *("pause", "resume", "step", "rate", "add", "remove", "move", "balance", "push", "network"),
+    *("stop", "start", "down"),
 )
 POLL_S: Final = 0.25
 """How often the status is asked for while a browser looks."""
+UNSEEN_S: Final = 1.0
+"""How often it is while none does: a page that is opened later scrolls back."""
 RENEW_S: Final = 1.5
 QUESTION_S: Final = 3.0
 """How long a status is waited for; a supervisor that does not answer is looked for again."""
 AGAIN_S: Final = 0.5
 """How often it is."""
+ENDED_S: Final = 5.0
+"""How often a run that has ended is looked for."""
 FRAMES_MAX: Final = 8
 """That may wait to be received."""
 HZ_MAX: Final = 100.0
@@ -44,14 +52,20 @@ OVERLAY_S: Final = 0.1
 T = TypeVar("T")
 Connect = Callable[[Callable[[], bool]], Control]
 """Makes a connection; gives up when the function says so."""
+HowEnded = Callable[[str], Mapping[str, Any] | None]
+"""Returns the message that says how the run has ended, given who stopped it if that is known; None while it has not."""
 
 
 class LiveSource:
     """One run."""
 
-    def __init__(self, name: str, view: Connect, operate: Connect | None) -> None:
+    def __init__(
+        self, name: str, view: Connect, operate: Connect | None, how_ended: HowEnded = lambda stopped_by: None
+    ) -> None:
         """`name` is the run's; `operate` None lets nobody ask for anything."""
         self._name, self._connect_view, self._connect_operator = name, view, operate
+        self._how_ended = how_ended
+        self._has_ended = False
         self._verbs = () if operate is None else VERBS
         self.about = About("live", name, "", 1_000_000, self._verbs)
         self._following = Following(self.about)
@@ -67,6 +81,7 @@ class LiveSource:
 
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
+        self._following.listen(wanted)
         self._changed.set()
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
@@ -98,8 +113,8 @@ class LiveSource:
         return Answered(answer.text, answer.tick), answer.sender
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
-        """Nothing is kept of a run but what its capture has: a page keeps what it has plotted."""
-        return "", "", []
+        points = await asyncio.to_thread(self._following.points(curve))
+        return *name_and_unit(curve), points
 
     # --- looking on --------------------------------------------------------------------------------------------------
 
@@ -112,26 +127,46 @@ class LiveSource:
                 except Refused as refused:
                     if trouble != str(refused):
                         trouble = str(refused)
-                        feed.tell(_note("warning", f"{self._name} is not there: {refused}; it is looked for"))
-                    await asyncio.sleep(AGAIN_S)
+                        await self._say_away(feed, f"{self._name} is not there: {refused}; it is looked for")
+                    await asyncio.sleep(ENDED_S if self._has_ended else AGAIN_S)
                     continue
                 if trouble:
-                    trouble = ""
+                    trouble, self._has_ended = "", False
+                    feed.tell(HERE)
                     feed.tell(_note("info", f"connected to {self._name} again"))
                 try:
                     await self._follow(control, feed)
                 except Refused as refused:
                     trouble = str(refused)
-                    feed.tell(_note("warning", f"lost {self._name}: {refused}; it is looked for"))
+                    await self._say_away(feed, f"lost {self._name}: {refused}; it is looked for")
                     self._forget_idle()
                     await asyncio.sleep(AGAIN_S)
+                except asyncio.CancelledError:
+                    self._closing.set()  # before the last question is waited for
+                    raise
                 finally:
                     await self._in_thread(control.close)
         finally:
             self._closing.set()
+            await self._say_ended(feed)  # `up` ends its console when the run has ended
             self._forget_idle()
             self._viewing.shutdown(wait=False)
             self._asking.shutdown(wait=False)
+
+    async def _say_away(self, feed: Feed, text: str) -> None:
+        """Say that the run is not there, or that it has ended, once."""
+        if not await self._say_ended(feed):
+            feed.tell(away(text))
+            feed.tell(_note("warning", text))
+
+    async def _say_ended(self, feed: Feed) -> bool:
+        """Say that the run has ended, if it has; return whether that is said."""
+        if not self._has_ended:
+            message = await self._in_thread(lambda: self._how_ended(self._following.stopped_by))
+            if message is not None:
+                self._has_ended = True
+                feed.tell(message)
+        return self._has_ended
 
     def _forget_idle(self) -> None:
         """Close connections of operators that wait: the supervisor that they lead to may be gone."""
@@ -175,14 +210,11 @@ class LiveSource:
         while True:
             self._changed.clear()
             wanted = self._wanted
-            if wanted.readers == 0:
-                await self._changed.wait()
-                continue
             if following.is_stale and time.monotonic() >= described_s + POLL_S:
                 await self._describe(control, feed)
                 described_s = time.monotonic()
             now_s = time.monotonic()
-            if wanted != lease or now_s >= renewed_s + RENEW_S:
+            if wanted.readers and (wanted != lease or now_s >= renewed_s + RENEW_S):
                 await self._renew(control, feed, following.watch_arguments(wanted, HZ_MAX), wanted != lease)
                 lease, renewed_s = wanted, now_s
             status = await self._in_thread(lambda: control.status(QUESTION_S, self._closing.is_set))
@@ -195,7 +227,7 @@ class LiveSource:
             if moment is not None:
                 feed.show(moment)
             with suppress(TimeoutError):
-                async with asyncio.timeout(POLL_S):
+                async with asyncio.timeout(POLL_S if wanted.readers else UNSEEN_S):
                     await self._changed.wait()
 
     async def _renew(self, control: Control, feed: Feed, wanted: dict[str, Any], is_new: bool) -> None:

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from foosim.console.shown.rule_text import rule_text
+from foosim.console.shown.rule_text import RuleTexts
 from foosim.console.shown.source import Link
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Refused
@@ -23,7 +23,6 @@ from foosim.vhub.rows import PacketRow
 FRAMES_KEPT: Final = 64
 """Frames that were shown, for what stood between the ends of a packet that was dropped."""
 FRAMES_APART_TICKS: Final = 20
-RULES_KEPT: Final = 256
 
 
 class Watched:
@@ -34,7 +33,9 @@ class Watched:
         self._frames: deque[Frame] = deque(maxlen=FRAMES_KEPT)
         self._told: dict[Link, Any] = {}
         """The drops of each link as they were explained last."""
-        self._rules: dict[Link, str] = {}
+        self._rules = RuleTexts(deployment)
+        self._said: dict[Link, str] = {}
+        """The rule of each link as it was told last."""
         self._read: dict[str, int] = {}
         """The tick of the last reading that was told, by robot and channel."""
 
@@ -59,19 +60,24 @@ class Watched:
                 messages.append({"type": "readings", "robot": robot, "channel": channel, "points": new})
         return messages
 
-    def drops(self, report: Mapping[str, Any], links: Iterable[Link]) -> list[dict[str, Any]]:
-        """Return the messages about links whose drops are others than those that were told."""
+    def drops(
+        self, report: Mapping[str, Any], links: Iterable[Link], at_ns: int = 0, who: Mapping[int, str] | None = None
+    ) -> list[dict[str, Any]]:
+        """Return the messages about links whose drops are others than those that were told, or whose rule is another
+        one at this time; `who` names who asked for the events of the network of a tick."""
         told: dict[Link, Any] = {}
+        said: dict[Link, str] = {}
         messages = []
         for source, destination in links:
-            rows = report.get("drops", {}).get(f"{source}>{destination}", [])
-            told[source, destination] = rows
-            if (source, destination) not in self._told or self._told[source, destination] != rows:
-                messages.append(self._message(report, source, destination))
-        self._told = told
+            link, rows = (source, destination), report.get("drops", {}).get(f"{source}>{destination}", [])
+            asked = [(tick, event) for tick, event in report.get("asked", [])]
+            told[link], said[link] = rows, self._rules.text(source, destination, at_ns, asked, who)
+            if self._told.get(link) != rows or self._said.get(link) != said[link]:
+                messages.append(self._message(report, source, destination, said[link]))
+        self._told, self._said = told, said
         return messages
 
-    def _message(self, report: Mapping[str, Any], source: str, destination: str) -> dict[str, Any]:
+    def _message(self, report: Mapping[str, Any], source: str, destination: str, rule: str) -> dict[str, Any]:
         frames = list(self._frames)  # more of them come meanwhile
 
         def frame(tick: int) -> Frame | None:
@@ -84,16 +90,9 @@ class Watched:
         return {
             "type": "watched",
             "link": [source, destination],
-            "rule": self._rule(source, destination),
+            "rule": rule,
             "drops": [self._drop(row, explained) for row, explained in found],
         }
-
-    def _rule(self, source: str, destination: str) -> str:
-        if (source, destination) not in self._rules:
-            if len(self._rules) >= RULES_KEPT:
-                self._rules.clear()
-            self._rules[source, destination] = rule_text(self._deployment, source, destination)
-        return self._rules[source, destination]
 
     def _drop(self, row: PacketRow, explained: Explained) -> dict[str, Any]:
         return {

@@ -13,7 +13,6 @@ from foosim.client.payloads import decode_payload
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.capture_status import status_at
 from foosim.console.recorded.link_history import PACKET_MARKS
-from foosim.console.recorded.playhead import Playhead
 from foosim.console.shown.curves import link_figure, value_at
 from foosim.console.shown.source import Curve
 from foosim.protocol.channel_kinds import channel_kind
@@ -72,8 +71,7 @@ def _status(history: CaptureHistory, curve: Curve, tick: int) -> float | None:
     recording = history.recording
     if curve.status.startswith("packets."):
         return value_at({"packets": history.links.totals(tick * recording.tick_ns)}, curve.status)
-    playhead = Playhead(*recording.span, recording.tick_ns)
-    return value_at(status_at(recording, playhead, tick, recording.look(tick)), curve.status)
+    return value_at(status_at(recording, {}, tick, recording.look(tick)), curve.status)
 
 
 def reading_points(

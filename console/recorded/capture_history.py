@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory
 from foosim.console.recorded.recording import Recording
-from foosim.console.shown.rule_text import rule_text
+from foosim.console.shown.rule_text import RuleTexts
 from foosim.console.shown.timeline import Mark, Timeline
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
@@ -21,7 +21,6 @@ from foosim.vhub.explain import Explained, explain_row, network_events
 from foosim.vhub.rows import CLIENTS, EPOCHS, FRAME, PACKETS, RECOVERIES, TICK, ClientRow, PacketRow
 
 SLICE_ROWS: Final = 500
-RULES_KEPT: Final = 256
 TOLD_MAX: Final = 1024
 """Drops whose explanations are kept."""
 PACKETS_MAX: Final = 10_000_000
@@ -46,7 +45,7 @@ class CaptureHistory:
         self._asked: list[tuple[int, str]] = []
         """What was asked of the network, by tick."""
         self._told: dict[int, Explained] = {}
-        self._rules: dict[tuple[str, str], str] = {}
+        self._rules = RuleTexts(recording.deployment)
         self._generation = recording.index.generation
 
     def refresh(self) -> None:
@@ -136,14 +135,8 @@ class CaptureHistory:
                     "verdict": told.verdict,
                 }
             )
-        return {"link": [source, destination], "rule": self._rule(source, destination), "drops": drops}
-
-    def _rule(self, source: str, destination: str) -> str:
-        if (source, destination) not in self._rules:
-            if len(self._rules) >= RULES_KEPT:
-                self._rules.clear()
-            self._rules[source, destination] = rule_text(self.deployment, source, destination)
-        return self._rules[source, destination]
+        rule = self._rules.text(source, destination, at_ns, self.asked(at_ns // self.recording.tick_ns))
+        return {"link": [source, destination], "rule": rule, "drops": drops}
 
     # What `explain` asks for: this is its evidence.
 

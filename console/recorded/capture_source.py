@@ -19,8 +19,8 @@ from foosim.console.recorded.branch_text import branch_answer
 from foosim.console.recorded.capture_curves import curve_points, reading_points
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.capture_status import status_at
-from foosim.console.recorded.comparing import Comparing
-from foosim.console.recorded.deck import ARGUMENTS, VERBS, Deck, checked
+from foosim.console.recorded.comparing import Compare, compared
+from foosim.console.recorded.deck import ARGUMENTS, VERBS, Clock, Deck, checked
 from foosim.console.recorded.playhead import Playhead
 from foosim.console.recorded.recording import Look, Recording
 from foosim.console.recorded.whereabouts import Whereabouts
@@ -51,25 +51,28 @@ UNSEEN_HZ: Final = 2.0
 
 
 class FileSource:
-    """A capture file. Without a `deck` it has one of its own, and is what people ask for; with one it follows."""
+    """A capture file. Without a `clock` it has a deck of its own, and is what people ask for; with one it follows."""
 
     def __init__(
         self,
         path: Path,
-        deck: Deck | None = None,
+        clock: Clock | None = None,
         offset_ns: int = 0,
         recompute: Recompute | None = None,
-        compare: Callable[[], Where] | None = None,
+        compare: Compare | None = None,
     ) -> None:
-        """`offset_ns`: this capture's time at time 0 of the deck. `compare`: opens what it is compared with.
+        """`offset_ns`: this capture's time at time 0 of the clock. `compare`: what it is compared with.
 
         Raises CaptureError.
         """
         self.recording: Final = Recording(path)
-        self.is_master: Final = deck is None
         first, last = self.recording.span
         tick_ns = self.recording.tick_ns
-        self.deck: Final = deck or Deck(Playhead(first, last, tick_ns), tick_ns, time.monotonic_ns)
+        self._deck: Deck | None = None
+        """The clock, where it is this capture's own."""
+        if clock is None:
+            clock = self._deck = Deck(Playhead(first, last, tick_ns), tick_ns, time.monotonic_ns)
+        self.clock: Final = clock
         self.offset_ns: Final = offset_ns
         verbs = (*VERBS, BRANCH) if self.is_master else (BRANCH,)
         self._about = About("capture", path.name, self.recording.deployment.world, tick_ns, verbs, (first, last))
@@ -95,9 +98,14 @@ class FileSource:
     def about(self) -> About:
         return self._about
 
+    @property
+    def is_master(self) -> bool:
+        """Whether the clock is its own."""
+        return self._deck is not None
+
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
-        self.deck.changed()
+        self.clock.changed()
 
     # --- running -----------------------------------------------------------------------------------------------------
 
@@ -108,7 +116,7 @@ class FileSource:
                 for work in (self._show, self._gather, self._tell_status, self._tell_links, self._refresh):
                     tasks.create_task(work(feed))
                 if self._compare is not None:
-                    tasks.create_task(Comparing(self.deck, self._compare, self.opened()).run(feed))
+                    tasks.create_task(compared(self.clock, self._compare, self.opened(), self.covers).run(feed))
         finally:
             for pool in (self._front, self._back, self._exact):
                 pool.shutdown(wait=False, cancel_futures=True)
@@ -117,21 +125,26 @@ class FileSource:
         """Return what opens the capture once more, for a comparison in a thread of its own."""
         return lambda: Whereabouts(Recording(self.recording.path), self.offset_ns, links=links)
 
+    def covers(self) -> tuple[int, int]:
+        """Return the first and the last tick of the clock at which there is something."""
+        first_ns, last_ns = (tick * self.recording.tick_ns - self.offset_ns for tick in self.recording.span)
+        return -(-first_ns // self.clock.tick_ns), last_ns // self.clock.tick_ns
+
     async def _in(self, pool: ThreadPoolExecutor, work: Callable[..., T], *arguments: Any) -> T:
         return await asyncio.get_running_loop().run_in_executor(pool, work, *arguments)
 
     def tick(self) -> int:
-        """Return the own tick at the deck's time, within what there is."""
+        """Return the own tick at the clock's time, within what there is."""
         first, last = self.recording.span
-        return min(max((self.deck.time_ns() + self.offset_ns) // self.recording.tick_ns, first), last)
+        return min(max((self.clock.time_ns() + self.offset_ns) // self.recording.tick_ns, first), last)
 
     async def _show(self, feed: Feed) -> None:
         """Tell what is seen, the newest wish alone, at most as often as somebody looks."""
         shown: tuple[int, int, bool] | None = None
-        head, jumps, due_ns = self.deck.playhead, self.deck.playhead.jumps, 0
+        clock, jumps, due_ns = self.clock, self.clock.jumps, 0
         while True:
-            tick = self.tick()
-            wish = tick, head.jumps, head.paused
+            seen, tick = clock.changes, self.tick()
+            wish = tick, clock.jumps, clock.paused
             if wish != shown or self._look is None:
                 try:
                     look = await self._in(self._front, self.recording.look, tick)
@@ -139,24 +152,24 @@ class FileSource:
                     feed.tell({"type": "note", "level": "error", "text": str(error)})
                     look = None
                 if look is not None:
-                    self._tell_moment(feed, look, jump=head.jumps != jumps)
-                    jumps = head.jumps
+                    self._tell_moment(feed, look, jump=clock.jumps != jumps)
+                    jumps = clock.jumps
                 shown = wish
-                if head.paused and look is not None and look.kind != "frame":
+                if clock.paused and look is not None and look.kind != "frame":
                     await self._show_exactly(feed, look)
                     if self.tick() != tick:
                         continue
             due_ns = self._next_ns(tick, due_ns)
-            await self.deck.wait(None if head.paused and self._look is not None else due_ns)
+            await clock.wait(None if clock.paused and self._look is not None else due_ns, seen)
 
     def _next_ns(self, tick: int, due_ns: int) -> int:
         """Return the wall time at which there is something else to see: that of the next frame, but not too soon."""
-        now_ns = self.deck.clock_ns()
+        now_ns = self.clock.clock_ns()
         period_ns = round(1e9 / (self._wanted.hz or UNSEEN_HZ))
         later = self.recording.neighbour(tick, later=True)
         wall_ns = None
         if later is not None:
-            wall_ns = self.deck.wall_ns(later * self.recording.tick_ns - self.offset_ns)
+            wall_ns = self.clock.wall_ns(later * self.recording.tick_ns - self.offset_ns)
         soonest_ns = max(due_ns + period_ns * 9 // 10, now_ns + 1_000_000)
         # A little behind its time: a timer that is early would find the frame before.
         next_ns = now_ns + period_ns if wall_ns is None else wall_ns + EARLY_NS
@@ -167,9 +180,9 @@ class FileSource:
             self._world = look.world
             self._describe(feed)
         self._look = look
-        paused = self.deck.playhead.paused
+        paused = self.clock.paused
         feed.show(Moment(look.tick, look.poses, look.values, jump, paused))
-        now_ns = self.deck.clock_ns()
+        now_ns = self.clock.clock_ns()
         if self._wanted.overlays and look.frame is not None and (paused or now_ns >= self._overlay_ns):
             self._overlay_ns = now_ns + OVERLAY_NS
             drawing = self.recording.worlds[look.world].drawing
@@ -246,9 +259,9 @@ class FileSource:
                 continue
             first, last = self.recording.span
             self._about = replace(self._about, span=(first, last))
-            if self.is_master:
-                self.deck.playhead.grow(first, last, self.deck.clock_ns())
-                self.deck.changed()
+            if self._deck is not None:
+                self._deck.playhead.grow(first, last, self._deck.clock_ns())
+                self._deck.changed()
             self._describe(feed)
             if self._look is not None and self._world >= 0:
                 self._tell_moment(feed, self._look, jump=False)
@@ -258,7 +271,7 @@ class FileSource:
         while True:
             history = self._history
             look = self._look
-            status = status_at(self.recording, self.deck.playhead, self.tick(), look)
+            status = status_at(self.recording, self.clock.account(), self.tick(), look)
             status["gathered"] = 0.0 if history is None else round(history.share, 3)
             if history is not None and history.is_complete:
                 at_ns = self.tick() * self.recording.tick_ns
@@ -298,7 +311,14 @@ class FileSource:
             self._ends.move(frame)
         links = self._ends.with_ends(history.links.windows(at_ns, WINDOW_NS))
         told: list[dict[str, Any]] = [
-            {"type": "links", "at": tick, "window_s": WINDOW_NS / 1e9, "links": links, "drops": drops}
+            {
+                "type": "links",
+                "at": tick,
+                "window_s": WINDOW_NS / 1e9,
+                "in_all": len(links),
+                "links": links,
+                "drops": drops,
+            }
         ]
         for source, destination in self._wanted.links:
             told.append({"type": "watched", **history.watched(source, destination, at_ns)})
@@ -313,12 +333,12 @@ class FileSource:
     # --- asked -------------------------------------------------------------------------------------------------------
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
-        if verb == BRANCH or not self.is_master:
+        if verb == BRANCH or self._deck is None:
             checked(verb, arguments, {BRANCH: {"tick": (int,)}})
             tick = arguments.get("tick", self.tick())
             return await self._in(self._front, branch_answer, self.recording, tick)
         checked(verb, arguments, {**ARGUMENTS, BRANCH: {}})
-        return self.deck.ask(verb, arguments, lambda tick, later: self.recording.neighbour(tick, later=later))
+        return self._deck.ask(verb, arguments, lambda tick, later: self.recording.neighbour(tick, later=later))
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         name, unit = name_and_unit(curve)

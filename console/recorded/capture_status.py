@@ -4,17 +4,17 @@ tells: score, ball, who owned what, what had happened. Pure: neighbours are `rec
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-from foosim.console.recorded.playhead import Playhead
 from foosim.console.recorded.recording import Look, Recording
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import BALL
 from foosim.protocol.names import TEAMS
 
 
-def status_at(recording: Recording, playhead: Playhead, tick: int, look: Look | None) -> dict[str, Any]:
-    """Return the status at a tick, of which `look` is what is seen."""
+def status_at(recording: Recording, account: Mapping[str, Any], tick: int, look: Look | None) -> dict[str, Any]:
+    """Return the status at a tick, of which `look` is what is seen; `account` is what the clock says of itself."""
     about, deployment = recording.about, recording.deployment
     first, last = recording.span
     epoch = recording.epoch_at(tick)
@@ -30,9 +30,7 @@ def status_at(recording: Recording, playhead: Playhead, tick: int, look: Look | 
         "last_tick": last,
         "tick_ns": recording.tick_ns,
         "epoch": 0 if epoch is None else epoch.epoch,
-        "state": "paused" if playhead.paused else "running",
-        "pace": str(playhead.pace),
-        "loop": playhead.loops,
+        **account,
         "finished": recording.index.finished,
         "shown": None if look is None else {"kind": look.kind, "tick": look.tick},
         "digest": {"frame": frame.digest.hex()} if frame is not None and frame.tick == tick else None,

@@ -1,12 +1,14 @@
-"""One playhead for one or two sources: two captures, run and what-if, simulation and a recorded reality, on one clock.
+"""One clock for one or two sources: two captures, run and what-if, simulation and a recorded reality.
 
-The clock is simulated time. A source that follows shows its own tick at that time, plus its offset. Neighbours:
-`playhead` (the position), `capture_source`, `poses_source`.
+The clock is simulated time. A source that follows shows its own tick at that time, plus its offset. A `Deck` is the
+clock of recordings, `leading.HeardClock` that of a source that has its own. Neighbours: `playhead` (the position),
+`capture_source`, `poses_source`.
 """
 
 from __future__ import annotations
 
 import asyncio
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -30,31 +32,49 @@ VERBS: Final = tuple(ARGUMENTS)
 UNITS: Final = ("ticks", "frames")
 
 
-class Deck:
-    """A playhead in ticks of the first source, and who waits for it to change; all of it in the event loop's thread."""
+class Clock(ABC):
+    """Simulated time that sources follow, and who waits for it to change; all of it in the event loop's thread."""
 
-    def __init__(self, playhead: Playhead, tick_ns: int, clock_ns: Callable[[], int]) -> None:
-        """`clock_ns` is a monotonic wall clock."""
-        self.playhead: Final = playhead
-        self.tick_ns: Final = tick_ns
+    def __init__(self, tick_ns: int, clock_ns: Callable[[], int]) -> None:
+        """`tick_ns`: of the first source. `clock_ns` is a monotonic wall clock."""
+        self.tick_ns = tick_ns
         self.clock_ns: Final = clock_ns
+        self.changes = 0
+        """How often it has changed otherwise than by time that passes."""
         self._waiting: set[asyncio.Event] = set()
 
-    def time_ns(self) -> int:
-        """Return the simulated time of the tick that was reached."""
-        return self.playhead.tick(self.clock_ns()) * self.tick_ns
+    @property
+    @abstractmethod
+    def jumps(self) -> int:
+        """How often time has jumped: paths are cut where this changes."""
 
+    @property
+    @abstractmethod
+    def paused(self) -> bool:
+        """Whether time stands still."""
+
+    @abstractmethod
+    def time_ns(self) -> int:
+        """Return the simulated time that was reached."""
+
+    @abstractmethod
     def wall_ns(self, time_ns: int) -> int | None:
-        """Return the wall time at which a simulated time is reached; None while it stands still."""
-        return self.playhead.wall_ns(-(-time_ns // self.tick_ns))
+        """Return the wall time at which a simulated time is reached; None where it stands still, or nobody knows."""
+
+    @abstractmethod
+    def account(self) -> dict[str, Any]:
+        """Return what a status says of it."""
 
     def changed(self) -> None:
-        """Wake those that wait: a request was done, or the ends are others."""
+        """Wake those that wait: a request was done, the ends are others, or time is told."""
+        self.changes += 1
         for event in self._waiting:
             event.set()
 
-    async def wait(self, until_ns: int | None) -> None:
-        """Wait for a change, at most until a wall time."""
+    async def wait(self, until_ns: int | None, seen: int) -> None:
+        """Wait for another change than the first `seen`, at most until a wall time."""
+        if self.changes != seen:
+            return
         event = asyncio.Event()
         self._waiting.add(event)
         try:
@@ -65,6 +85,33 @@ class Deck:
             return
         finally:
             self._waiting.discard(event)
+
+
+class Deck(Clock):
+    """A playhead in ticks of the first source."""
+
+    def __init__(self, playhead: Playhead, tick_ns: int, clock_ns: Callable[[], int]) -> None:
+        """`clock_ns` is a monotonic wall clock."""
+        super().__init__(tick_ns, clock_ns)
+        self.playhead: Final = playhead
+
+    @property
+    def jumps(self) -> int:
+        return self.playhead.jumps
+
+    @property
+    def paused(self) -> bool:
+        return self.playhead.paused
+
+    def time_ns(self) -> int:
+        return self.playhead.tick(self.clock_ns()) * self.tick_ns
+
+    def wall_ns(self, time_ns: int) -> int | None:
+        return self.playhead.wall_ns(-(-time_ns // self.tick_ns))
+
+    def account(self) -> dict[str, Any]:
+        head = self.playhead
+        return {"state": "paused" if head.paused else "running", "pace": str(head.pace), "loop": head.loops}
 
     def ask(self, verb: str, arguments: Mapping[str, Any], neighbour: Callable[[int, bool], int | None]) -> Answered:
         """Do what is asked. `neighbour` gives the next tick, later or not, of which something is recorded.

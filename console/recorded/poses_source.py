@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from foosim.console.recorded.comparing import Comparing
-from foosim.console.recorded.deck import VERBS, Deck
+from foosim.console.recorded.comparing import Compare, compared
+from foosim.console.recorded.deck import VERBS, Clock, Deck
 from foosim.console.recorded.playhead import Playhead
 from foosim.console.recorded.poses_csv import BadPoses, read_tracks
-from foosim.console.shown.compare import Where
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, NotAsked, Wanted
 from foosim.console.shown.tracks import Pose, Track
@@ -50,31 +49,34 @@ def load_tracks(path: Path) -> dict[str, Track]:
 
 
 class PosesSource:
-    """A table of poses. Without a `deck` it has one of its own, else it follows."""
+    """A table of poses. Without a `clock` it has a deck of its own, else it follows."""
 
     def __init__(
         self,
         path: Path,
-        deck: Deck | None = None,
+        clock: Clock | None = None,
         offset_ns: int = 0,
         deployment: Deployment | None = None,
-        compare: Callable[[], Where] | None = None,
+        compare: Compare | None = None,
     ) -> None:
-        """`offset_ns`: the table's time at time 0 of the deck. `deployment`: whose links are drawn. `compare`:
-        opens what it is compared with. Raises BadPoses.
+        """`offset_ns`: the table's time at time 0 of the clock. `deployment`: whose links are drawn. `compare`:
+        what it is compared with. Raises BadPoses.
         """
         self.tracks: Final = load_tracks(path)
         first_ns = min(int(track.times_ns[0]) for track in self.tracks.values())
         last_ns = max(int(track.times_ns[-1]) for track in self.tracks.values())
-        self.is_master: Final = deck is None
         self.offset_ns: Final = offset_ns
-        if deck is None:
-            deck = Deck(Playhead(first_ns // TICK_NS, -(-last_ns // TICK_NS), TICK_NS), TICK_NS, time.monotonic_ns)
-        self.deck: Final = deck
-        first, last = ((time_ns - offset_ns) // deck.tick_ns for time_ns in (first_ns, last_ns))
+        self._deck: Deck | None = None
+        """The clock, where it is this table's own."""
+        if clock is None:
+            head = Playhead(first_ns // TICK_NS, -(-last_ns // TICK_NS), TICK_NS)
+            clock = self._deck = Deck(head, TICK_NS, time.monotonic_ns)
+        self.clock: Final = clock
+        first, last = ((time_ns - offset_ns) // clock.tick_ns for time_ns in (first_ns, last_ns))
+        self._covers = first, last
         verbs = VERBS if self.is_master else ()
         world = "" if deployment is None else deployment.world
-        self._about = About("poses", path.name, world, deck.tick_ns, verbs, (first, last))
+        self._about = About("poses", path.name, world, clock.tick_ns, verbs, (first, last))
         self._scene = _scene(self.tracks, deployment)
         self._compare = compare
         self._wanted = Wanted()
@@ -83,12 +85,21 @@ class PosesSource:
     def about(self) -> About:
         return self._about
 
+    @property
+    def is_master(self) -> bool:
+        """Whether the clock is its own."""
+        return self._deck is not None
+
+    def covers(self) -> tuple[int, int]:
+        """Return the first and the last tick of the clock at which something is known."""
+        return self._covers
+
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
-        self.deck.changed()
+        self.clock.changed()
 
     def where(self, time_ns: int) -> dict[str, Pose]:
-        """Return what is known at a time of the deck, by name."""
+        """Return what is known at a time of the clock, by name."""
         found = {name: track.at(time_ns + self.offset_ns) for name, track in self.tracks.items()}
         return {name: pose for name, pose in found.items() if pose is not None}
 
@@ -97,29 +108,29 @@ class PosesSource:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._show(feed))
             if self._compare is not None:
-                tasks.create_task(Comparing(self.deck, self._compare, lambda: self.where).run(feed))
+                tasks.create_task(compared(self.clock, self._compare, lambda: self.where, self.covers).run(feed))
 
     async def _show(self, feed: Feed) -> None:
         names = [link["name"] for link in self._scene["links"]]
-        head, jumps = self.deck.playhead, self.deck.playhead.jumps
+        clock, jumps = self.clock, self.clock.jumps
         shown: tuple[int, int, bool] | None = None
         while True:
-            time_ns = self.deck.time_ns()
-            wish = time_ns, head.jumps, head.paused
+            seen, time_ns = clock.changes, clock.time_ns()
+            wish = time_ns, clock.jumps, clock.paused
             if wish != shown:
                 known = self.where(time_ns)
                 rows = [(*known[name][0], *known[name][1]) if name in known else NOWHERE for name in names]
                 poses = np.array(rows, np.float32).reshape(len(names), 7)
-                moment = Moment(time_ns / self.deck.tick_ns, poses, np.empty(0), head.jumps != jumps, head.paused)
+                moment = Moment(time_ns / clock.tick_ns, poses, np.empty(0), clock.jumps != jumps, clock.paused)
                 feed.show(moment)
-                shown, jumps = wish, head.jumps
+                shown, jumps = wish, clock.jumps
             period_ns = round(1e9 / (self._wanted.hz or UNSEEN_HZ))
-            await self.deck.wait(None if head.paused else self.deck.clock_ns() + period_ns)
+            await clock.wait(None if clock.paused else clock.clock_ns() + period_ns, seen)
 
     async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
-        if not self.is_master:
+        if self._deck is None:
             raise NotAsked("recorded poses follow the first source: ask that one")
-        return self.deck.ask(verb, arguments, lambda tick, later: tick + (1 if later else -1))
+        return self._deck.ask(verb, arguments, lambda tick, later: tick + (1 if later else -1))
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         return "", "", []
@@ -147,7 +158,7 @@ def _scene(tracks: Mapping[str, Track], deployment: Deployment | None) -> dict[s
         {"name": name, "model": models.get(name, ""), "links": [place], "removable": False, "pushable": False}
         for place, name in enumerate(tracks)
     ]
-    empty = {"layout": "", "scenery": [], "fields": [], "sensors": [], "meshes": {}, "addable": []}
+    empty = {"layout": "", "scenery": [], "fields": [], "commands": [], "sensors": [], "meshes": {}, "addable": []}
     return {**empty, "meshes": content.get("meshes", {}), "links": links, "bodies": bodies, "bounds": _bounds(tracks)}
 
 

@@ -21,6 +21,7 @@ from foosim.client.replay import Replay, ReplayedLine, ReplayedPoses, ReplayedRo
 from foosim.console.recorded.deck import Known, checked, needed
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.layout import ADDABLE, build_layout
 
@@ -60,6 +61,15 @@ class PlayedSource:
         self._jumps = 0
         self._asked: queue.SimpleQueue[Ask] = queue.SimpleQueue()
         self._ended = threading.Event()
+
+    @property
+    def deployment(self) -> Deployment:
+        """What was captured."""
+        return self._replay.deployment
+
+    def close(self) -> None:
+        """End the connection of a source that is not to run."""
+        self._replay.close()
 
     def want(self, wanted: Wanted) -> None:
         """A replay sends what it sends, however many look."""

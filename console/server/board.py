@@ -22,7 +22,7 @@ MARKS_MAX: Final = 4096
 """Of one source: the last so many."""
 WATCHED_MAX: Final = 64
 """Links, and readings, that all browsers together have looked at."""
-KEPT: Final = frozenset({"status", "links", "compared", "overlay"})
+KEPT: Final = frozenset({"status", "links", "compared", "overlay", "presence"})
 """Messages of which the last one is kept for those that join, and of which only the newest waits."""
 PLOTTED: Final = frozenset({"status", "links", "readings"})
 
@@ -46,6 +46,8 @@ class Told:
     shown: Shown | None = None
     kept: dict[str, bytes] = field(default_factory=dict)
     warning: bytes = b""
+    presence: Mapping[str, Any] = field(default_factory=dict)
+    """Whether it is there, as it told last."""
     watched: dict[Link, bytes] = field(default_factory=dict)
     """The last message about each link that somebody watches."""
     marks: list[Mapping[str, Any]] = field(default_factory=list)
@@ -174,6 +176,11 @@ class Board:
                 self._wanted[number] = wanted
                 source.want(wanted)
 
+    def has_ended(self) -> str:
+        """Return how the first source has ended; empty while it goes on."""
+        presence = self._told[0].presence
+        return str(presence["text"]) if presence.get("state") == "ended" else ""
+
     # --- what sources tell -------------------------------------------------------------------------------------------
 
     def describe(self, source: int, about: About, scene: Mapping[str, Any]) -> None:
@@ -215,6 +222,9 @@ class Board:
             told.kept[kind] = text
         if kind == "watched":
             told.watched[message["link"][0], message["link"][1]] = text
+        if kind == "presence":
+            told.presence = message
+            told.warning = b""  # it was about this
         if kind == "note":
             told.warning = b"" if message["level"] == "info" else text
         for reader in list(self.readers.values()):

@@ -48,7 +48,9 @@ REASON_BYTES_MAX: Final = 123
 WRONG_TOKEN: Final = 4401
 WRONG_ORIGIN: Final = 4403
 TOO_SLOW: Final = 4408
+ENDED: Final = 4410
 TOO_MANY: Final = 4429
+GOING: Final = 1001
 AGAINST_THE_RULES: Final = 1008
 PLAIN: Final = "text/plain; charset=utf-8"
 LOCAL_HOSTS: Final = frozenset({"127.0.0.1", "localhost", "[::1]"})
@@ -120,6 +122,7 @@ class ConsoleServer:
         try:
             yield server.sockets[0].getsockname()[1]
         finally:
+            await self._take_leave()
             server.close()
             await server.wait_closed()
             for task in self._tasks:
@@ -136,6 +139,21 @@ class ConsoleServer:
             await source.run(self.board.feed(number))
         except Refused as refused:
             self.board.tell(number, {"type": "note", "level": "error", "text": str(refused)})
+
+    async def _take_leave(self) -> None:
+        """Tell all browsers why no more comes: that what they look at has ended, or this console alone."""
+        text = self.board.has_ended()
+        code, why = (ENDED, text) if text else (GOING, "the console was ended")
+
+        async def end(reader: Reader, connection: ServerConnection) -> None:
+            with contextlib.suppress(TimeoutError, ConnectionClosed):
+                async with asyncio.timeout(CLOSE_S):
+                    while (message := reader.take()) is not None:
+                        await connection.send(message)
+            await _close(connection, code, why)
+
+        readers = self.board.readers.values()
+        await asyncio.gather(*(end(reader, self._connections[reader.name]) for reader in readers))
 
     # --- HTTP --------------------------------------------------------------------------------------------------------
 

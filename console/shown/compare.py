@@ -7,7 +7,7 @@ Pure: neighbours are `tracks` (what is known between samples), `poses_csv`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import dist
 from typing import Any, Final
@@ -72,12 +72,61 @@ class Comparison:
     def as_json(self, tick: int) -> dict[str, Any]:
         """Return what is known: the distance of each entity at a tick, and the series of the largest, m."""
         time_ns = tick * self._tick_ns
-        now = distances(self._one(time_ns), self._other(time_ns))[:ENTITIES_TOLD]
-        return {
-            "at": tick,
-            "entities": [{"name": found.name, "distance_m": round(found.metres, 6)} for found in now],
-            "series": [
-                [tick, None if metres is None else round(metres, 6)] for tick, metres in sorted(self._most.items())
-            ],
-            "complete": self.is_complete,
-        }
+        found = distances(self._one(time_ns), self._other(time_ns))
+        return {**_content(tick, found, sorted(self._most.items())), "complete": self.is_complete}
+
+
+class Course:
+    """The series of distances along a source that is known only where it is, thinned as it gets long."""
+
+    def __init__(self) -> None:
+        self._points: list[tuple[int, float | None]] = []
+        self._apart = 0
+        """Ticks between points that are kept."""
+        self._is_interrupted = False
+
+    def interrupt(self) -> None:
+        """Have a hole before the next point: what was in between is not known."""
+        self._is_interrupted = bool(self._points)
+
+    def take(self, tick: int, found: Sequence[Distance]) -> dict[str, Any]:
+        """Take the distances at a tick and return what is known. Where time went back, what was later is forgotten."""
+        while self._points and self._points[-1][0] >= tick:
+            self._points.pop()
+        if self._is_interrupted and self._points and self._points[-1][0] + 1 < tick:
+            self._points.append((self._points[-1][0] + 1, None))
+        self._is_interrupted = False
+        newest = tick, found[0].metres if found else None
+        told = _content(tick, found, [*self._points, newest])
+        known = [at for at, metres in self._points[-1:] if metres is not None]
+        if not known or newest[1] is None or tick - known[0] >= self._apart:
+            self._keep(newest)
+        return {**told, "complete": True}
+
+    def _keep(self, point: tuple[int, float | None]) -> None:
+        if point[1] is None and [metres for _, metres in self._points[-2:]] == [None, None]:
+            self._points.pop()  # a hole is known by its ends
+        self._points.append(point)
+        if len(self._points) > POINTS:
+            first, last = self._points[0][0], self._points[-1][0]
+            self._apart = max(1, 2 * (last - first) // POINTS)
+            self._points = [*self._thinned()][-POINTS:]
+
+    def _thinned(self) -> Iterator[tuple[int, float | None]]:
+        """Yield the points that are far enough from the one before, the first of each hole, and the last one."""
+        at, was_known = self._points[0][0] - self._apart, True
+        for tick, metres in self._points[:-1]:
+            if (metres is None and was_known) or tick - at >= self._apart:
+                yield tick, metres
+                at = tick
+            was_known = metres is not None
+        yield self._points[-1]
+
+
+def _content(tick: int, found: Sequence[Distance], series: Iterable[tuple[int, float | None]]) -> dict[str, Any]:
+    """Return what is told: the distance of each entity at a tick, and the series of the largest, m."""
+    return {
+        "at": tick,
+        "entities": [{"name": one.name, "distance_m": round(one.metres, 6)} for one in found[:ENTITIES_TOLD]],
+        "series": [[at, None if metres is None else round(metres, 6)] for at, metres in series],
+    }

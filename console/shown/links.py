@@ -58,8 +58,9 @@ class Windows:
         self._window_s = window_s
         self._is_beginning = False
         """Whether the only count is one of the run's first seconds: all of it is in the window."""
-        self._kept: deque[tuple[float, dict[Key, Count]]] = deque()
-        """Simulated time in s, and the counts then; the first is the one that the window begins with."""
+        self._kept: deque[tuple[float, dict[Key, Count], bool]] = deque()
+        """Simulated time in s, the counts then, and whether they are those of all links; the first is the one that the
+        window begins with."""
 
     @property
     def length_s(self) -> float:
@@ -68,17 +69,24 @@ class Windows:
             return self._kept[-1][0] - self._kept[0][0]
         return self._kept[0][0] if self._is_beginning else 0.0
 
-    def take(self, at_s: float, counts: dict[Key, Count]) -> dict[Key, Count]:
+    def take(self, at_s: float, counts: dict[Key, Count], *, are_all: bool = True) -> dict[Key, Count]:
         """Return what has happened on each link since the window began; time that goes back begins a new one, and so
-        does a time in which nobody has counted."""
+        does a time in which nobody has counted. Where not all links were counted, one that was not has its own
+        beginning: its first count."""
         if self._kept and not 0.0 <= at_s - self._kept[-1][0] <= self._window_s:
             self._kept.clear()
         self._is_beginning = not self._kept and at_s <= self._window_s
-        self._kept.append((at_s, counts))
+        self._kept.append((at_s, counts, are_all))
         while len(self._kept) > 2 and self._kept[1][0] <= at_s - self._window_s:
             self._kept.popleft()
-        before = {} if self._is_beginning else self._kept[0][1]
-        return {key: _between(before.get(key, _NOTHING), count) for key, count in counts.items()}
+        return {key: _between(self._before(key), count) for key, count in counts.items()}
+
+    def _before(self, key: Key) -> Count:
+        """Return what a link had done when the window began."""
+        if self._is_beginning:
+            return _NOTHING
+        known = (counts.get(key, _NOTHING if are_all else None) for _, counts, are_all in self._kept)
+        return next((count for count in known if count is not None), _NOTHING)
 
 
 def _between(before: Count, after: Count) -> Count:
@@ -134,11 +142,15 @@ class Links:
         """Return the message `links` of a status."""
         rows = {(row[0], row[1], row[6]): row for row in status["links"]}
         counts = {key: Count(row[2], row[3], row[4], row[5] * row[3], row[8]) for key, row in rows.items()}
-        seen = self._windows.take(status["ticks"] * status["tick_ns"] / 1e9, counts)
+        in_all = max(status["links_in_all"], len(rows))
+        at_s = status["ticks"] * status["tick_ns"] / 1e9
+        seen = self._windows.take(at_s, counts, are_all=in_all == len(rows))
         self._look([key for key in rows if self._is_on_air(key)])
         links = [self._line(key, rows[key][7], count) for key, count in seen.items()]
         window_s = round(self._windows.length_s, 1)
-        return {"type": "links", "at": status["ticks"], "window_s": window_s, "links": links, "drops": _drops(seen)}
+        drops = _drops(seen)
+        at = status["ticks"]
+        return {"type": "links", "at": at, "window_s": window_s, "in_all": in_all, "links": links, "drops": drops}
 
     def _line(self, key: Key, queue_ns: int, count: Count) -> dict[str, Any]:
         source, destination, rule = key

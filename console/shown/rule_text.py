@@ -1,37 +1,114 @@
-"""The rule of a link in words: whose packets it is for, what it says, over which radio, what that amounts to.
+"""The rule of a link as people read it: whose packets it is for, what it says, over which radio, what events of the
+network have made of it at a time, and what that amounts to.
 
-Neighbours: `vhub.settings_text` (settings in words), `vhub.lint` (what they amount to).
+Neighbours: `vhub.settings_text` (settings in words), `vhub.events` (what events do), `vhub.lint` (what it amounts to).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+from pydantic import ValidationError
 
 from foosim.protocol.deployment import Deployment
-from foosim.protocol.network import LinkRule
+from foosim.protocol.errors import Refused
+from foosim.protocol.network import LinkRule, event_of
+from foosim.vhub.events import FOREVER_NS, Cut, Hold, Settings, Timeline
 from foosim.vhub.lint import Use, meaning_of
 from foosim.vhub.lint_text import meaning_line
-from foosim.vhub.profiles import NO_RADIO, ON_BOARD, Profile, Profiles
+from foosim.vhub.profiles import NO_RADIO, ON_BOARD, Profile, Profiles, over
 from foosim.vhub.settings_text import impairments_text, radio_text, rule_ends
+
+TEXTS_KEPT: Final = 256
+
+
+class RuleTexts:
+    """The rules of one deployment, which has its files, with what was asked of its network."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._deployment = deployment
+        self._endpoints = deployment.endpoints()
+        self._profiles = Profiles(deployment, deployment.network)
+        self._asked: tuple[tuple[int, str], ...] = ()
+        self._timeline = self._timeline_of(())
+        self._texts: dict[tuple[object, ...], str] = {}
+
+    def text(
+        self,
+        source: str,
+        destination: str,
+        at_ns: int = 0,
+        asked: Iterable[tuple[int, str]] = (),
+        who: Mapping[int, str] | None = None,
+    ) -> str:
+        """Return what holds at a time for the packets from one endpoint to another, in lines; the empty text where
+        there is no such endpoint.
+
+        `asked` are the events that were asked of the network by then, (tick, event as JSON); `who` names who asked for
+        those of a tick, where that is known.
+        """
+        if not {source, destination} <= {*self._endpoints}:
+            return ""
+        events = tuple((tick, event) for tick, event in asked)
+        if events != self._asked:
+            self._asked, self._timeline = events, self._timeline_of(events)
+        cut = [*self._cuts(source, destination, at_ns)]
+        lines: list[str] = []
+        for rule in self._deployment.network.rules_for(source, destination):
+            profile = self._profiles.of_rule(rule, source, destination)
+            changes = self._timeline.changes_of(profile.rule, source, destination)
+            in_force = [change for change in changes if change.start_ns <= at_ns < change.end_ns]
+            lines.append(self._rule(rule, profile, in_force, who or {}))
+        lines += [f"{what}{self._when(event, who or {})}" for what, event in cut]
+        return "\n".join(lines)
+
+    def _timeline_of(self, asked: Iterable[tuple[int, str]]) -> Timeline:
+        deployment = self._deployment
+        network = deployment.network
+        timeline = Timeline(network, deployment.seed if network.seed is None else network.seed, self._endpoints)
+        for tick, event in asked:
+            try:
+                timeline.add(event_of(event, tick * deployment.tick_ns))
+            except (ValidationError, ValueError, TypeError, Refused):
+                continue  # a capture's row that is damaged
+        return timeline
+
+    def _cuts(self, source: str, destination: str, at_ns: int) -> Iterator[tuple[str, Cut | Hold]]:
+        for cut in self._timeline.cuts:
+            if cut.start_ns <= at_ns < cut.end_ns and cut.parts(source, destination):
+                yield "cut by a partition: nothing passes", cut
+        for hold in self._timeline.holds:
+            if hold.start_ns <= at_ns < hold.end_ns and source in hold.sources and destination in hold.destinations:
+                yield "clogged: packets wait", hold
+
+    def _when(self, event: Settings | Cut | Hold, who: Mapping[int, str]) -> str:
+        """Say since when something holds, by whom, until when."""
+        tick_ns = self._deployment.tick_ns
+        tick = event.start_ns // tick_ns
+        is_asked = any(asked == tick for asked, _ in self._asked)
+        by = f"asked for by {who[tick]}" if tick in who else "asked for" if is_asked else "by the deployment"
+        until = "" if event.end_ns >= FOREVER_NS else f" until {event.end_ns / 1e9:g} s"
+        return f", since {event.start_ns / 1e9:g} s (tick {tick}), {by}{until}"
+
+    def _rule(self, rule: LinkRule | None, profile: Profile, in_force: list[Settings], who: Mapping[int, str]) -> str:
+        said = [f"{impairments_text(change.changes)}{self._when(change, who)}" for change in in_force]
+        key = None if rule is None else rule.id, profile.rule, profile.radio, tuple(said)
+        if key not in self._texts:
+            if len(self._texts) >= TEXTS_KEPT:
+                self._texts.clear()
+            self._texts[key] = "\n".join(_lines(self._deployment, rule, profile, in_force, said))
+        return self._texts[key]
 
 
 def rule_text(deployment: Deployment, source: str, destination: str) -> str:
-    """Return what the deployment, which has its files, says of the packets from one endpoint to another, in lines; the
-    empty text where it has no such endpoint.
-
-    What events of the network change meanwhile is not in it.
-    """
-    if not {source, destination} <= {*deployment.endpoints()}:
-        return ""
-    network, profiles = deployment.network, Profiles(deployment, deployment.network)
-    lines: list[str] = []
-    for rule in network.rules_for(source, destination):
-        profile = profiles.of_rule(rule, source, destination)
-        lines += _lines(deployment, rule, profile)
-    return "\n".join(lines)
+    """Return what the deployment alone says of the packets from one endpoint to another, at its start."""
+    return RuleTexts(deployment).text(source, destination)
 
 
-def _lines(deployment: Deployment, rule: LinkRule | None, profile: Profile) -> Iterator[str]:
+def _lines(
+    deployment: Deployment, rule: LinkRule | None, profile: Profile, in_force: list[Settings], said: list[str]
+) -> Iterator[str]:
     network = deployment.network
     if profile.rule == NO_RADIO:
         yield "no radio in common, or not that of their rule: nothing passes (no_route)"
@@ -48,5 +125,9 @@ def _lines(deployment: Deployment, rule: LinkRule | None, profile: Profile) -> I
         yield f"radio {profile.radio}: preset {radio.preset}{', ' if written else ''}{written}"
     elif profile.rule != ON_BOARD:
         yield f"defaults: preset {network.defaults.preset}"
-    meaning = meaning_of(Use(profile.rule, profile.radio, profile.settings), deployment.asset_files)
+    settings = profile.settings
+    for change, text in zip(in_force, said, strict=True):
+        settings = over(settings, change.changes)
+        yield f"changed: {text}"
+    meaning = meaning_of(Use(profile.rule, profile.radio, settings), deployment.asset_files)
     yield f"which is {meaning_line(meaning)}"

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from foosim.client.payloads import COMMANDS
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.layout import ADDABLE, BALL, Layout
 from foosim.protocol.mesh import Mesh
@@ -74,6 +75,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
         "scenery": scenery,
         "bodies": bodies,
         "fields": _fields(layout),
+        "commands": _commands(layout),
         "sensors": _sensors(deployment),
         "meshes": {key: _mesh(mesh) for key, mesh in meshes.items()},
         "bounds": standing_bounds(scene),
@@ -138,6 +140,19 @@ def _fields(layout: Layout) -> list[dict[str, Any]]:
                     }
                 )
     return fields
+
+
+def _commands(layout: Layout) -> list[dict[str, Any]]:
+    """Return the numbers of a frame that are set-points: what an actuator holds of the last command that it took."""
+    found = []
+    for entity in layout.robots:
+        if entity.model in COMMANDS:
+            channel, command = COMMANDS[entity.model]
+            units = WANTED_UNITS[entity.model]
+            for place, name in enumerate(command._fields):
+                unit, index = units[min(place, len(units) - 1)], entity.offsets["wanted"] + place
+                found.append({"robot": entity.name, "channel": channel, "number": name, "unit": unit, "index": index})
+    return found
 
 
 def _runs(count: int, units: int) -> list[tuple[int, int]]:

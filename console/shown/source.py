@@ -110,7 +110,7 @@ class Feed(Protocol):
 
     def tell(self, message: Mapping[str, Any]) -> None:
         """Say a message of one of the types `status`, `links`, `overlay`, `watched`, `readings`, `marks`, `compared`,
-        `note`; its number as a source is added to it."""
+        `presence`, `note`; its number as a source is added to it."""
 
 
 class Source(Protocol):

@@ -126,7 +126,7 @@ def test_it_plays_round_and_refuses_what_it_cannot_do(run: Path) -> None:
             assert (await source.ask("play", {}, "me")).text == "plays at tick 0, 0 s"
             await heard.until(lambda: sum(moment.jump for moment in heard.moments) > 1)
             ticks = [moment.tick for moment in heard.moments]
-            assert source.deck.playhead.jumps > 1
+            assert source.clock.jumps > 1
             assert all(tick % 10 == 0 or tick == Recording(run).worlds[1].tick for tick in ticks)
             await source.ask("pause", {}, "me")
             with pytest.raises(Refused, match=r"no request of a recording, 'pase': .* nearest is pause"):
@@ -221,8 +221,8 @@ def test_two_sources_have_one_clock_and_a_distance(run: Path, tmp_path: Path) ->
 
     async def look() -> None:
         one = FileSource(run)
-        other = FileSource(run, one.deck, 40_000_000, compare=one.opened())
-        csv = PosesSource(table, one.deck, deployment=one.recording.deployment, compare=one.opened(links=True))
+        other = FileSource(run, one.clock, 40_000_000, compare=one.opened())
+        csv = PosesSource(table, one.clock, deployment=one.recording.deployment, compare=one.opened(links=True))
         assert csv.about.kind == "poses" and csv.about.verbs == () and other.about.verbs == ("branch",)
         async with running(one) as ours, running(other) as theirs, running(csv) as real:
             await one.ask("seek", {"tick": 100}, "me")
@@ -244,7 +244,7 @@ def test_two_sources_have_one_clock_and_a_distance(run: Path, tmp_path: Path) ->
                 await csv.ask("play", {}, "me")
             with pytest.raises(Refused, match="there are branch"):
                 await other.ask("play", {}, "me")
-            assert one.deck.time_ns() == 100 * TICK_NS
+            assert one.clock.time_ns() == 100 * TICK_NS
 
     asyncio.run(look())
 

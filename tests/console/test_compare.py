@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import cos, pi, sin
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from foosim.console.recorded.recording import Recording
 from foosim.console.recorded.whereabouts import Whereabouts
-from foosim.console.shown.compare import POINTS, Comparison
+from foosim.console.shown.compare import POINTS, Comparison, Course, Distance
 from foosim.console.shown.tracks import Track
 
 MS = 1_000_000
@@ -70,3 +71,31 @@ def test_a_capture_is_nowhere_from_itself_and_interpolated_between_its_frames(ru
     shifted = Whereabouts(Recording(run), 20 * MS)
     assert shifted(0) == one(20 * MS), "an offset is the capture's time at the deck's time 0"
     assert "red.goal/slide" in Whereabouts(Recording(run), links=True)(0) and "red.goal/slide" not in one(0)
+
+
+def test_a_course_has_the_newest_point_a_hole_where_nobody_looked_and_forgets_what_was_later() -> None:
+    course = Course()
+    for tick in (10, 20):
+        told = course.take(tick, [Distance("ball", tick / 10), Distance("rod", 0.5)])
+    assert told["entities"] == [{"name": "ball", "distance_m": 2.0}, {"name": "rod", "distance_m": 0.5}]
+    assert (told["at"], told["series"]) == (20, [[10, 1.0], [20, 2.0]])
+    course.interrupt()
+    assert course.take(50, [Distance("ball", 5.0)])["series"] == [[10, 1.0], [20, 2.0], [21, None], [50, 5.0]]
+    assert course.take(20, [Distance("ball", 7.0)])["series"] == [[10, 1.0], [20, 7.0]], "time went back"
+    for tick in (30, 40, 50, 60, 70):
+        told = course.take(tick, [])
+    known = [at for at, metres in told["series"] if metres is None]
+    assert told["entities"] == [] and known == [30, 60, 70], "of a hole the ends are kept"
+
+
+def test_a_long_course_is_thinned_and_keeps_its_beginning_and_its_holes() -> None:
+    course = Course()
+    for tick in range(10_000):
+        if tick == 5000:
+            course.interrupt()
+        told = course.take(2 * tick, [Distance("ball", tick)])
+    ticks = [at for at, _ in told["series"]]
+    assert len(ticks) <= POINTS + 1 and ticks == sorted(set(ticks)) and (ticks[0], ticks[-1]) == (0, 19_998)
+    assert max(later - at for at, later in pairwise(ticks)) < 20_000 / POINTS * 4
+    (hole,) = (at for at, metres in told["series"] if metres is None)
+    assert 10_000 - 2 * 20_000 / POINTS < hole < 10_000

@@ -103,6 +103,7 @@ def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
         "recoveries": [],
         "requests": list(requests),
         "links": [],
+        "links_in_all": 0,
         "score": None,
         "watched": {},
     }

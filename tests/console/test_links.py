@@ -6,7 +6,7 @@ from typing import Any
 from foosim.console.recorded.link_history import LinkHistory, PacketMark
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Count, Links, Windows
-from foosim.console.shown.rule_text import rule_text
+from foosim.console.shown.rule_text import RuleTexts, rule_text
 from foosim.protocol.deployment_file import load_deployment
 from foosim.protocol.layout import build_layout
 from foosim.protocol.start import initial_frame
@@ -23,6 +23,36 @@ def test_the_rule_of_a_link_is_told_in_words(fleet_text: Callable[..., str]) -> 
     assert rule_text(deployment, "pilot01", "nobody") == ""
     perfect, meaning = rule_text(deployment, "rover01", "pilot01").splitlines()
     assert "perfect" in perfect and meaning == "which is on_board: no medium, loss 0, delay 0"
+
+
+def test_a_rule_says_what_is_in_force_what_was_changed_by_whom_and_what_that_amounts_to(
+    fleet_text: Callable[..., str],
+) -> None:
+    events = "network.events=[{at: 1 s, set: {link: fleet, delay: 50 ms}}]"
+    deployment = load_deployment(fleet_text(2, events), "hall")
+    tick_ns = deployment.tick_ns
+    asked = [
+        (2_000_000_000 // tick_ns, '{"set": {"link": "fleet", "loss": "30 %"}}'),
+        (2_500_000_000 // tick_ns, '{"partition": [["pilot01"], ["pilot02"]], "for": "1 s"}'),
+        (4_000_000_000 // tick_ns, '{"heal": "all"}'),
+    ]
+    texts, who = RuleTexts(deployment), {asked[0][0]: "browser 3"}
+
+    def changes(at_s: float, events: list[tuple[int, str]] = asked) -> list[str]:
+        lines = texts.text("pilot01", "pilot02", int(at_s * 1e9), events, who).splitlines()
+        assert lines[0].startswith("rule fleet, ") and lines[1].startswith("radio wifi: ")
+        return [line for line in lines[2:] if not line.startswith("which is ")]
+
+    base, tick = rule_text(deployment, "pilot01", "pilot02"), {at: at * 1_000_000_000 // tick_ns for at in (1, 2)}
+    planned = f"changed: delay 50 ms, since 1 s (tick {tick[1]}), by the deployment"
+    by_plan = f"{planned} until 4 s"
+    by_hand = f"changed: loss 30 %, since 2 s (tick {tick[2]}), asked for by browser 3 until 4 s"
+    assert changes(0.5) == changes(4.5) == [] and changes(1.5) == [by_plan]
+    cut = f"cut by a partition: nothing passes, since 2.5 s (tick {asked[1][0]}), asked for until 3.5 s"
+    assert changes(2.2) == [by_plan, by_hand] and changes(3.2) == [by_plan, by_hand, cut]
+    assert changes(2.2, []) == [planned]
+    meaning = texts.text("pilot01", "pilot02", 2_200_000_000, asked, who).splitlines()[-1]
+    assert meaning != base.splitlines()[-1] and "50" in meaning, "what it amounts to counts the changes"
 
 
 def count(offered: int, dropped: int, delay_ns: int = 0, **causes: int) -> Count:
@@ -53,8 +83,21 @@ def test_a_link_that_counts_anew_and_time_that_goes_back_begin_a_window() -> Non
     assert windows.take(0.5, {KEY: count(12, 1, snr=1)})[KEY] == count(12, 1, snr=1)
 
 
+def test_a_link_that_was_not_told_before_begins_with_its_first_count() -> None:
+    """Of many links the busiest are told: one that comes among them has not done all in this window."""
+    windows, other = Windows(5.0), ("b", "c", "rule")
+    windows.take(60.0, {KEY: count(600, 60)}, are_all=False)
+    assert windows.take(61.0, {KEY: count(610, 60), other: count(700, 70)}, are_all=False)[other] == count(0, 0)
+    assert windows.take(62.0, {KEY: count(610, 60), other: count(705, 71)}, are_all=False)[other] == count(5, 1)
+    windows.take(63.0, {KEY: count(610, 60), other: count(705, 71)})
+    new = ("c", "d", "rule")
+    for at_s in (70.0, 71.0):
+        found = windows.take(at_s, {KEY: count(610, 60), **({new: count(4, 0)} if at_s > 70.0 else {})})
+    assert found[new] == count(4, 0), "all were told: it is new"
+
+
 def status(ticks: int, *rows: list[Any]) -> dict[str, Any]:
-    return {"ticks": ticks, "tick_ns": 10_000_000, "links": list(rows)}
+    return {"ticks": ticks, "tick_ns": 10_000_000, "links": list(rows), "links_in_all": len(rows)}
 
 
 def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callable[..., str]) -> None:
@@ -68,7 +111,8 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
     links.turn_to(drawing.scene)
     links.move(initial_frame(deployment))
     row = ["pilot01", "pilot02", 10, 6, 4, 2_000_000, "fleet/wifi", 0, {"snr": 3, "queue_full": 1}, []]
-    message = links.message(status(100, row))
+    message = links.message({**status(100, row), "links_in_all": 300})
+    assert message["in_all"] == 300
     (line,) = message["links"]
     assert (line["radio"], line["loss"], line["delay_ms"]) == (True, 0.4, 2.0)
     history = LinkHistory(10_000_000)

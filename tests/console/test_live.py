@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from foosim.console.live import live_source
 from foosim.console.live.live_source import LiveSource
-from foosim.console.shown.source import About, Moment
+from foosim.console.live.presence import how_ended
+from foosim.console.shown.source import About, Curve, Moment, Wanted
 from foosim.protocol.errors import BadValue
+from foosim.protocol.inbox import Inbox
+from foosim.protocol.messages import Answer
 from foosim.supervisor.control import Control
-from foosim.supervisor.run_folder import NoRun
+from foosim.supervisor.outcome import result_without_supervisor
+from foosim.supervisor.run_folder import NoRun, create_run
+from foosim.supervisor.run_options import RunOptions, launch_of
+from tests.console.test_following import described, frame_of, status
+from tests.replay.conftest import TABLE
 
 
 class Heard:
@@ -21,6 +29,7 @@ class Heard:
 
     def __init__(self) -> None:
         self.notes: list[str] = []
+        self.presences: list[tuple[str, str]] = []
 
     def describe(self, about: About, scene: Mapping[str, Any]) -> None:
         raise AssertionError("there is no world")
@@ -29,8 +38,21 @@ class Heard:
         raise AssertionError("there is no world")
 
     def tell(self, message: Mapping[str, Any]) -> None:
-        assert message["type"] == "note"
-        self.notes.append(message["text"])
+        assert message["type"] in ("note", "presence")
+        if message["type"] == "note":
+            self.notes.append(message["text"])
+        else:
+            self.presences.append((message["state"], message["text"]))
+
+
+class Seen:
+    """A feed that takes all."""
+
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None: ...
+
+    def show(self, moment: Moment) -> None: ...
+
+    def tell(self, message: Mapping[str, Any]) -> None: ...
 
 
 def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,6 +75,105 @@ def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest
         "mine is not there: run mine is starting; it is looked for",
         "mine is not there: run mine is over; it is looked for",
     ]
+    assert heard.presences == [("away", note) for note in heard.notes], "it may be started again"
+
+
+@pytest.mark.parametrize("first", ["the run", "the console"])
+def test_how_a_run_has_ended_is_said_once_also_as_the_last_thing_that_a_console_says(
+    monkeypatch: pytest.MonkeyPatch, first: str
+) -> None:
+    monkeypatch.setattr(live_source, "AGAIN_S", 0.0)
+    monkeypatch.setattr(live_source, "ENDED_S", 0.0)
+    heard, tried = Heard(), [0]
+
+    def connect(give_up: Callable[[], bool]) -> Control:
+        tried[0] += 1
+        raise NoRun("run mine is over")
+
+    def how_ended(stopped_by: str) -> Mapping[str, Any] | None:
+        has_ended = tried[0] > 2 if first == "the run" else source._closing.is_set()
+        return {"type": "presence", "state": "ended", "text": "done"} if has_ended else None
+
+    source = LiveSource("mine", connect, None, how_ended)
+
+    async def scene() -> None:
+        running = asyncio.create_task(source.run(heard))
+        while tried[0] < 6:
+            await asyncio.sleep(0)
+        running.cancel()
+        await asyncio.wait((running,))
+
+    asyncio.run(scene())
+    assert heard.presences == [("away", "mine is not there: run mine is over; it is looked for"), ("ended", "done")]
+
+
+@pytest.mark.parametrize("ends", ["done", "stopped", "lost vhub: it was killed"])
+def test_the_end_of_a_run_names_who_stopped_it_and_what_shows_its_capture(
+    ends: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    folder = create_run("table", "mine")
+    assert how_ended(folder, "browser 3") is None, "it may be resumed"
+    folder.write_launch(launch_of(RunOptions(TABLE), run if ends != "done" else None))
+    failed = ends.startswith("lost")
+    folder.write_result({**result_without_supervisor({"ticks": 70}, ends), "failed": failed})
+    told = how_ended(folder, "browser 3")
+    assert told is not None and told["state"] == "ended"
+    assert told["text"] == {
+        "done": "The run has ended at tick 70: done. It has no capture.",
+        "stopped": f"The run has ended at tick 70: stopped by browser 3. Its capture is {run}; "
+        f"this shows it: foosim-replay view {run}",
+        "lost vhub: it was killed": f"The run has failed at tick 70: lost vhub: it was killed."
+        f" Its capture is {run}; this shows it: foosim-replay view {run}",
+    }[ends]
+
+
+class Standing(Control):
+    """A run that is not moved by anybody, without a wire: it remembers what it was asked for."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def describe(self, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool) -> dict[str, Any]:
+        return described(frame_of(5), [])
+
+    def status(self, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool) -> dict[str, Any]:
+        self.asked.append("status")
+        return status("running") | {"ticks": 100 * self.asked.count("status")}
+
+    def ask(
+        self, verb: str, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool, **arguments: Any
+    ) -> Answer:
+        self.asked.append(verb)
+        return Answer("operator", "1", True, 5, "", b"")
+
+    def view(self, inbox: Inbox) -> None:
+        """No frame comes."""
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+def test_while_nobody_looks_statuses_alone_are_asked_for_and_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_source, "UNSEEN_S", 0.0)
+    control = Standing()
+
+    async def scene() -> None:
+        source = LiveSource("mine", lambda give_up: control, None)
+        running = asyncio.create_task(source.run(Seen()))
+        async with asyncio.timeout(30):
+            while control.asked.count("status") < 4:
+                await asyncio.sleep(0)
+            assert {*control.asked} == {"status"}, "no frames"
+            name, _, points = await source.history(Curve("t", status="ticks"))
+            assert name == "ticks" and points[:3] == [(100.0, 100.0), (200.0, 200.0), (300.0, 300.0)]
+            source.want(Wanted(1, 50.0))
+            while "watch" not in control.asked:
+                await asyncio.sleep(0)
+        running.cancel()
+        await asyncio.wait((running,))
+
+    asyncio.run(scene())
 
 
 @pytest.mark.parametrize("name", ["self", "timeout_s", "a b", ""])

@@ -46,3 +46,18 @@ def test_every_number_of_a_frame_belongs_to_one_field() -> None:
     assert numbers == list(range(layout.size))
     rod = [(run["unit"], run["count"]) for run in fields if run["field"] == "joint_positions"]
     assert rod[:2] == [("m", 1), ("rad", 1)]
+
+
+def test_the_commands_of_a_world_are_the_set_points_of_its_actuators(fleet_text: Callable[..., str]) -> None:
+    for deployment, channel, told in (
+        (table(), "position", [("slide", "m"), ("spin", "rad")]),
+        (load_deployment(fleet_text(2), "hall"), "drive", [("left", "m/s"), ("right", "m/s")]),
+    ):
+        layout = build_layout(deployment)
+        commands = scene_content(deployment, layout, build_scene(deployment, layout))["commands"]
+        assert {command["channel"] for command in commands} == {channel}
+        robot = next(entity for entity in layout.robots if "wanted" in entity.offsets)
+        mine = [command for command in commands if command["robot"] == robot.name]
+        assert [(command["number"], command["unit"]) for command in mine] == told
+        assert [command["index"] - robot.offsets["wanted"] for command in mine] == [0, 1]
+        assert len(commands) == 2 * sum("wanted" in entity.offsets for entity in layout.robots)

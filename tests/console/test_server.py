@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 
 import pytest
-from websockets.exceptions import ConnectionClosedError
+from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 
 from foosim.console.server.server import CONNECTIONS_MAX
 from tests.console.memory import Console, MemorySource, console, table
@@ -51,6 +51,30 @@ def test_a_browser_gets_scene_and_moment_at_once_and_its_numbers_behind_the_pose
             assert (head[4], len(poses), len(values)) == (2, 18, 0)
 
     play(part)
+
+
+@pytest.mark.parametrize("has_ended", [True, False])
+def test_a_console_that_ends_says_why_and_last_that_its_run_has_ended(has_ended: bool) -> None:
+    async def scene() -> None:
+        async with asyncio.timeout(60):
+            async with console(MemorySource(table())) as stage:
+                opened = stage.browser()
+                browser = await opened.__aenter__()
+                await browser.hear("scene")
+                if has_ended:
+                    text = "The run has ended: done. " + "x" * 200
+                    stage.source.tell(type="presence", state="ended", text=text)
+            if has_ended:
+                assert (await browser.hear("presence"))["text"] == text
+            with pytest.raises(ConnectionClosed) as closed:
+                await browser.hear("nothing")
+            rcvd = closed.value.rcvd
+            assert rcvd is not None
+            found = rcvd.code, rcvd.reason[:25]
+            assert found == ((4410, "The run has ended: done. ") if has_ended else (1001, "the console was ended"))
+            await opened.__aexit__(None, None, None)
+
+    asyncio.run(scene())
 
 
 def test_what_is_asked_is_answered_to_the_one_who_asked() -> None:

@@ -261,6 +261,7 @@ VERBS: Final[dict[str, dict[str, Any]]] = {
     "add": {"name": "b2", "model": "ball", "position": [0, 0, 0.5], "velocity": [0, 0, 0]},
     "remove": {"name": "b2"},
     "move": {"robot": "red.goal", "node": "n2"},
+    "balance": {},
     "step": {"ticks": 5},
     "rate": {"pace": "2x"},
     "pause": {},

@@ -49,12 +49,15 @@ class Seen:
     systems: list[System] = field(default_factory=list)
     shown: list[tuple[bool, int, int, int]] = field(default_factory=list)
     """What the supervisor's status said as it heard the vHub: whether it is away, packets offered, links, clients."""
+    lost: list[dict[str, Any] | None] = field(default_factory=list)
+    """And of its loss."""
 
     def watch(self, traced: Traced) -> None:
         if traced.process == channels.SUPERVISOR and traced.channel in HUB_HEARD and traced.name == channels.VHUB:
-            said = self.systems[0].supervisor.status()
+            said = self.systems[0].supervisor.status(traced.now_ns)
             counts = said["packets"]["offered"], said["links_in_all"], len(said["clients"])
             self.shown.append((said["vhub_away"], *counts))
+            self.lost.append(said["vhub_lost"])
         if traced.what == "publish" and traced.channel == channels.DELIVERIES.name:
             self.deliveries.setdefault(decode(Deliveries, traced.payload).tick, set()).add(traced.payload)
         elif traced.what == "receive" and traced.channel == channels.DOWN.name:
@@ -128,6 +131,9 @@ def assert_counts_stay(seen: Seen) -> None:
     """What the vHub has counted stays while it is away and while another one has not counted anything yet."""
     away = [shown for shown, *_ in seen.shown]
     counted = [counts for _, *counts in seen.shown]
+    assert [lost is not None for lost in seen.lost] == away, "and says since when, and why"
+    assert all(lost["reason"] and lost["for_s"] >= 0 for lost in seen.lost if lost is not None)
+    assert len({lost["tick"] for lost in seen.lost if lost is not None}) > 1
     first = next(at for at, counts in enumerate(counted) if counts[0])
     assert {*away} == {True, False}
     assert all(all(counts) for counts in counted[first:])

@@ -331,3 +331,19 @@ def test_nothing_else_of_the_codec_is_public() -> None:
     assert {name for name in public if not name.startswith("_")} == {
         "encode", "decode", "decode_any",
     }  # fmt: skip
+
+
+def test_decoders_are_made_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two threads that make them at once crash the interpreter, now and then: so who makes one has to hold the lock."""
+    made: list[Any] = []
+
+    def make(kind: Any) -> Any:
+        assert codec._making.locked()
+        made.append(kind)
+        return plain(kind)
+
+    plain: Any = msgspec.msgpack.Decoder
+    monkeypatch.setattr(msgspec.msgpack, "Decoder", make)
+    kind = dict[str, tuple[int, str]]
+    assert [decode_any(kind, msgpack.packb({"a": [1, "b"]})) for _ in range(2)] == [{"a": (1, "b")}] * 2
+    assert made == [kind] and not codec._making.locked()

@@ -14,8 +14,11 @@ import numpy as np
 import pytest
 
 from foosim.console.shown.asked import moves
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import BALL, WORLD
+from foosim.protocol.start import initial_frame, kickoff_ticks
 from foosim.rehearsal import report_command
-from foosim.rehearsal.report import Band, BinReport, Mark, Report, bin_width_ns, gather
+from foosim.rehearsal.report import Band, BinReport, Mark, Report, _Gathered, bin_width_ns, gather
 from foosim.rehearsal.report_drawings import drawings
 from foosim.rehearsal.report_page import page
 from foosim.rehearsal.report_tallies import SAMPLES, LinkTally, Sample
@@ -125,6 +128,26 @@ def test_what_was_asked_of_the_world_is_among_the_events(found: Report, radio_ru
     assert world[1] == "move red.goal from n1 to n2" and dict_of(moved)["red.goal"] == "n2"
     rows = Page(page(found)).rows
     assert all(any(row[1:] == [text, "asked for"] for row in rows) for text in world)
+
+
+def test_what_the_rules_did_is_among_the_events_as_on_the_time_line_of_the_console(run: Path) -> None:
+    capture = open_capture(run)
+    gathered, frame, wait = _Gathered(capture), initial_frame(capture.deployment), kickoff_ticks(capture.deployment)
+    gathered.take_frame(frame)
+    goal = {(BALL, "wait_ticks"): wait - 3, (WORLD, "score"): 1}
+    for tick, written in ((wait + 6, {(WORLD, "kickoffs"): 1}), (1000, goal)):
+        values = np.array(frame.values)
+        for (entity, field), value in {(BALL, "wait_ticks"): 0, **written}.items():
+            values[frame.layout[entity].offsets[field]] = value
+        frame = Frame(tick, frame.layout, values)
+        gathered.take_frame(frame)
+    report = gathered.result("run")
+    told = [(event.at_ns // report.tick_ns, event.kind, event.text) for event in report.happenings if event.kind]
+    assert told == [(wait, "kickoff", "kick-off of ball"), (997, "goal", "goal of red, 1 : 0")]
+    drawn = Page(page(report))
+    lanes = {lane["name"]: lane for lane in drawn.drawings["events"]["lanes"]}
+    assert lanes["goal"]["mark"] == "goal" and lanes["goal"]["entries"][0]["text"] == "1.994 s: goal of red, 1 : 0"
+    assert ["1.994 s", "goal of red, 1 : 0", "rules"] in [row[:3] for row in drawn.rows]
 
 
 def test_what_another_node_adopts_is_no_move() -> None:

@@ -26,15 +26,13 @@ def test_the_command_opens_captures_and_tables_and_the_second_follows_the_first(
     table.write_text("time,entity,x,y\n0,ball,0,0\n")
     one, other = open_sources(run, run, -5_000_000)
     assert isinstance(one, FileSource) and isinstance(other, FileSource)
-    assert one.is_master and not other.is_master and other.deck is one.deck and other.offset_ns == -5_000_000
+    assert one.is_master and not other.is_master and other.clock is one.clock and other.offset_ns == -5_000_000
     _, real = open_sources(run, table)
     assert isinstance(real, PosesSource) and real.about.world == "table"
     (alone,) = open_sources(table)
     assert isinstance(alone, PosesSource) and alone.is_master
     with pytest.raises(BadValue, match="give the capture first"):
         open_sources(table, run)
-    with pytest.raises(BadValue, match="has its own clock"):
-        open_sources(Path("tcp/127.0.0.1:1"), run)
 
 
 def test_what_cannot_be_shown_ends_the_command_as_bad_input(run: Path, tmp_path: Path, bad_files: list[Path]) -> None:
@@ -83,6 +81,35 @@ def test_a_replay_on_its_plane_is_seen_and_controlled(run: Path) -> None:
         asyncio.run(look(played.address))
 
 
+def test_a_recording_follows_a_replay_on_its_plane(run: Path, tmp_path: Path) -> None:
+    csv = tmp_path / "poses.csv"
+    assert replay("export", run, "--what", "poses", "-o", csv).code == 0
+
+    async def look(address: str) -> None:
+        one, other = open_sources(Path(address), csv, 40_000_000)
+        for source in (one, other):
+            source.want(Wanted(1, 50.0))
+        async with running(one) as played, running(other) as real:
+            await one.ask("seek", {"tick": 40}, "me")
+            await one.ask("step", {"count": 10}, "me")
+            await played.until(lambda: played.tick == 50)
+            await real.until(lambda: real.tick == 50 and real.moments[-1].paused)
+            await real.until(lambda: bool(real.of("compared")) and real.of("compared")[-1]["at"] == 50)
+            told = real.of("compared")[-1]
+            assert told["covers"] == (-20, TICKS - 20) and told["entities"][0]["distance_m"] > 1e-4
+            names = [link["name"] for link in real.scenes[0]["links"]]
+            assert {entity["name"] for entity in told["entities"]} <= {*names}
+            with pytest.raises(Refused, match="ask that one"):
+                await other.ask("play", {}, "me")
+
+    with playing(run, paused=True) as play:
+        strangers = tmp_path / "strangers.csv"
+        strangers.write_text("time,entity,x,y\n0,tiger,0,0\n")
+        with pytest.raises(BadValue, match="nothing that the table has"):
+            open_sources(Path(play.address), strangers)
+        asyncio.run(look(play.address))
+
+
 def test_a_replay_that_ends_is_told(run: Path) -> None:
     def connect_to(address: str, streams: Sequence[str]) -> Replay:
         """Connect so that everything up to the end is heard while `resume` is asked."""
@@ -94,7 +121,7 @@ def test_a_replay_that_ends_is_told(run: Path) -> None:
                 connection._read(None)
             return status
 
-        connection.ask = ask  # type: ignore[assignment, method-assign]
+        connection.ask = ask  # type: ignore[method-assign, assignment]
         return connection
 
     async def look(address: str) -> Heard:

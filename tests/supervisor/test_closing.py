@@ -10,6 +10,8 @@ from typing import Any, Final
 import pytest
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.frame import Frame
+from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.vhub.core import HubCore
@@ -29,6 +31,7 @@ class Slow:
         """What happens when, in s behind the end of the run."""
         self.seen: list[dict[str, Any]] = []
         self.waited: set[str] = set()
+        self.committed: Callable[[Frame], None] = lambda frame: None
         self.ended_ns = 0
 
     def __call__(self, hub: HubCore, passed_ns: int) -> bool:
@@ -40,16 +43,16 @@ class Slow:
         hub.recording = {"state": "closing", "problem": "", "written": min(passed_ns, self.stalls_ns) // (S // 2)}
         hub.disk_progress = min(passed_ns, self.syncs_ns) // (S // 2)
         self.waited |= {hub.waiting_for}
-        told = self.system.supervisor.status()
+        told = self.system.supervisor.status(0)
         self.seen.append({"written": told["recording"]["written"], "waits": told["processes"][VHUB]["waiting_for"]})
         return passed_ns >= self.takes_ns
 
-    def run(self) -> dict[str, Any]:
+    def run(self, ticks: int = 10, pace: Pace | None = None) -> dict[str, Any]:
         def prepare(system: System) -> None:
             self.system = system
 
-        settings = Settings(closing=self)
-        rehearse(TABLE.read_text(), TABLE.name, 10, 1, ["engine=pure"], settings, prepare=prepare)
+        settings = Settings(closing=self, on_commit=self.committed)
+        rehearse(TABLE.read_text(), TABLE.name, ticks, 1, ["engine=pure"], settings, pace=pace, prepare=prepare)
         self.took_s = (self.system.bus.now_ns - self.ended_ns) / S
         return self.system.supervisor.result()
 
@@ -95,6 +98,23 @@ def test_a_vhub_that_ends_while_it_closes_its_capture_cuts_it_off() -> None:
     found = slow.run()
     assert found["reason"] == "done; the capture is cut off: its vHub ended before it was closed"
     assert found["failed"] and 15 <= slow.took_s < 17
+
+
+def test_a_vhub_that_was_gone_before_the_end_and_is_back_cuts_nothing_off() -> None:
+    """Its connection was lost while the world ran, and behind the end for as long as the deadline allows."""
+
+    slow = Slow(takes_s=55)
+
+    def saw(frame: Frame) -> None:
+        if frame.tick == 50:
+            slow.system.later(0, partial(slow.system._supervisor_sees_gone, VHUB))
+
+    slow.committed = saw
+    slow.at[20] = lambda system: system._supervisor_sees_gone(VHUB)
+    found = slow.run(ticks=700, pace=Pace("realtime"))
+    assert [recovery["name"] for recovery in found["recoveries"]] == ["vhub"]
+    assert (found["reason"], found["failed"], found["capture"]) == ("done", False, "run.mcap")
+    assert 55 <= slow.took_s < 56
 
 
 def test_a_supervisor_that_stood_still_meanwhile_cuts_nothing_off() -> None:

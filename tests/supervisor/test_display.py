@@ -164,7 +164,7 @@ def test_fast_has_no_lag_and_a_pause_says_so(running: dict[str, Any]) -> None:
 
 def test_before_the_first_tick_it_says_who_is_waited_for() -> None:
     settings = RunSettings("run", "table.yaml", TABLE.read_text(), parse_pace("realtime"))
-    content = SupervisorCore(settings, library_fingerprint(), 0).status()
+    content = SupervisorCore(settings, library_fingerprint(), 0).status(0)
     assert plain_line(content) == "starting, waiting for blue, red, vhub"
     assert "waiting for blue, red, vhub" in render_text(content)
     assert "not here yet" in row_of(render_text(content), "blue.attack")

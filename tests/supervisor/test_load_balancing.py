@@ -9,7 +9,7 @@ import pytest
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.load_balancing import EVERY_NS, SETTLE_NS, STAY_NS, Balancer, Shift
+from foosim.supervisor.load_balancing import EVERY_NS, SETTLE_NS, STAY_NS, Balancer, Shift, shifts_at_once
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 OWNERS = {"a": "n1", "b": "n1", "c": "n1", "d": "n2"}
@@ -75,3 +75,40 @@ def test_a_run_that_is_balanced_is_the_same_world() -> None:
     usual = rehearse(text, TABLE.name, ticks, 1, sets)
     balanced = rehearse(text, TABLE.name, ticks, 3, sets, Settings(), pace=pace, prepare=prepare)
     assert balanced.json["moves"] == 1 and balanced.digests == usual.digests
+
+
+def test_at_once_all_move_of_which_it_is_expected_that_they_make_nodes_alike() -> None:
+    owners = dict.fromkeys("abcdefgh", "n1") | {"x": "n2"}
+    shifts = shifts_at_once({"n1": 0.8, "n2": 0.1, "n3": 0.0}, owners, {"h": "n3"})
+    told = [(shift.robot, shift.target) for shift in shifts]
+    assert told == [("h", "n3"), ("a", "n2"), ("b", "n3"), ("c", "n2"), ("d", "n3")], "then each has 30 %"
+    assert {(shift.source_load, shift.target_load) for shift in shifts} == {(0.8, 0.0), (0.8, 0.1)}, "as measured"
+    assert shifts_at_once({"n1": 0.3, "n2": 0.2, "n3": 0.2}, owners, {}) == []
+
+
+def test_an_operator_has_it_done_once_and_is_told_what_moved_and_why() -> None:
+    asked: list[str] = []
+
+    def busy(system: System) -> None:
+        for name, load in (("n1", 0.9), ("n2", 0.1), ("n3", 0.2)):
+            system.processes[name].core.busy = load
+
+    def prepare(system: System) -> None:
+        def ask() -> None:
+            asked.append(system.people.request("balance", 0, {}))
+
+        system.at_tick(5, lambda: busy(system))
+        system.at_tick(650, ask)
+        system.at_tick(660, ask)
+        system.at_tick(690, lambda: told.update({each: system.people.answers[each].text for each in asked}))
+
+    told: dict[str, str] = {}
+    text, sets, pace = TABLE.read_text(), ["engine=pure"], Pace("realtime")
+    usual = rehearse(text, TABLE.name, 700, 1, sets)
+    balanced = rehearse(text, TABLE.name, 700, 3, sets, Settings(), pace=pace, prepare=prepare)
+    assert balanced.digests == usual.digests and balanced.json["moves"] > 0
+    loads = "n1 90%, n2 10%, n3 20%"
+    assert [told[each] for each in asked] == [
+        f"moved at tick 650, for loads were {loads}: blue.attack from n1 to n2; blue.midfield from n1 to n3",
+        f"nothing moves at tick 660: loads are {loads}; no move would win more than a robot's share, or 15%",
+    ]

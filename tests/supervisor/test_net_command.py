@@ -18,8 +18,7 @@ from foosim.protocol.settings import nested
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor import net_command
-from foosim.supervisor.links_shown import links_shown, use_text
-from foosim.supervisor.net_text import link_line
+from foosim.supervisor.net_text import link_line, links_shown, use_text
 from foosim.vhub.capture_reader import CaptureData, open_capture
 from foosim.vhub.explain import PacketName, explain_packet, parse_packet
 from foosim.vhub.explain_stages import STAGE_NAMES

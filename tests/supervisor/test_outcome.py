@@ -14,7 +14,7 @@ import pytest
 from foosim.protocol.actions import Journal as JournalAction
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any
-from foosim.protocol.command import REFUSED
+from foosim.protocol.command import DONE, FAILED, REFUSED
 from foosim.protocol.errors import Refused
 from foosim.protocol.inbox import Inbox
 from foosim.protocol.journal import Journal, journal_files, read_records
@@ -66,7 +66,7 @@ def test_a_result_without_a_supervisor_has_the_keys_of_any_other(run: Run) -> No
     blank = result_without_supervisor({"run": "mine", **plan_facts(plan.deployment)}, "lost supervisor: it is gone")
     assert blank.keys() == run.result.keys()
     assert (blank["world"], blank["ticks"], blank["failed"]) == ("table", None, True)
-    seen = result_without_supervisor(run.system.supervisor.status(), "lost supervisor: it is gone")
+    seen = result_without_supervisor(run.system.supervisor.status(0), "lost supervisor: it is gone")
     assert seen.keys() == blank.keys() and seen["ticks"] == TICKS and seen["digest"] == run.result["digest"]
     assert (seen["reason"], seen["failed"]) == ("lost supervisor: it is gone", True)
 
@@ -94,6 +94,7 @@ class Left:
 
     def __init__(self, run: Run, capture: Path) -> None:
         self.folder: RunFolder = create_run("table", "mine")
+        self.capture = capture
         options = RunOptions(TABLE, duration="120 ms", sets=("engine=pure",))
         self.folder.write_launch(launch_of(options, capture))
         (self.folder.path / "launcher").touch()
@@ -243,6 +244,28 @@ def test_each_tick_of_the_ball_is_somebodys(run: Run) -> None:
     nodes = run.result["nodes"].values()
     assert sum(node["ball_ticks"] for node in nodes) == TICKS
     assert all(node["ball_ticks"] <= node["solved_ticks"] for node in nodes)
+
+
+@pytest.mark.parametrize("is_closed", [True, False])
+def test_a_capture_that_has_its_end_is_not_cut_off_whatever_was_heard_of_its_vhub(
+    run: Run, left: Left, is_closed: bool
+) -> None:
+    """The farewell was lost: the file says whether it was closed."""
+    left.capture.write_bytes((run.capture if is_closed else run.cut).read_bytes())
+    left.journal(SUPERVISOR).unlink()
+    plan = make_plan(RunOptions(TABLE, duration="120 ms", sets=("engine=pure",)))
+    thresholds = gc.get_threshold()
+    with Session.router("tcp/127.0.0.1:0") as session, Journal(left.folder.journals, SUPERVISOR) as written:
+        inbox = Inbox(1000)
+        process = SupervisorProcess(plan.settings(left.folder.name), None, left.folder, session, inbox, written, None)
+        process.core.finish("stopped", failed=False)
+        process.core.state.finished, process.core.state.cut_off = True, "the capture is cut off: nobody said how"
+        assert process.run() == (DONE if is_closed else FAILED)
+    gc.set_threshold(*thresholds)
+    gc.unfreeze()
+    told = left.folder.result()
+    assert told is not None and told["failed"] != is_closed
+    assert told["reason"] == ("stopped" if is_closed else "stopped; the capture is cut off: nobody said how")
 
 
 def test_of_a_run_that_is_not_gone_on_with_no_result_is_written(left: Left) -> None:

@@ -81,7 +81,7 @@ def test_each_kind_of_process_delayed_is_named_in_the_lag_line(process: str, del
     seen = delayed(process, delay_ms)
     assert seen.result["ticks"] == TICKS and seen.result["reason"] == "done"
     assert {name for tick, name in seen.late.items() if tick > 5} == {process}
-    late = seen.system.supervisor.status()["late"]
+    late = seen.system.supervisor.status(0)["late"]
     assert late["waited_for"] == process and 0 < late["tick"] <= TICKS
     lines = [line for line in seen.lines if "lag" in line]
     assert lines and all(f"ms, waited for {process}" in line for line in lines)
@@ -106,7 +106,7 @@ def test_at_another_pace_it_is_the_same() -> None:
 def test_a_run_in_time_names_nobody() -> None:
     seen = Seen().go()
     assert set(seen.late.values()) == {""} and not [line for line in seen.lines if "lag" in line]
-    assert seen.system.supervisor.status()["late"] == {"lag_ms": 0.0, "waited_for": "", "tick": -1}
+    assert seen.system.supervisor.status(0)["late"] == {"lag_ms": 0.0, "waited_for": "", "tick": -1}
 
 
 def test_in_fast_nobody_is_late() -> None:

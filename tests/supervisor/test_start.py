@@ -80,13 +80,13 @@ def test_a_node_that_was_cut_off_while_players_start_takes_part() -> None:
     run.system.later(2 * S, lambda: run.system.pause("n1", 4 * S))
     run.system.later(3 * S, lambda: run.core.process_gone("n1", run.system.bus.now_ns))
     begun: list[bool] = []
-    run.system.later(11 * S, lambda: begun.append(run.core.status()["begun"]))
+    run.system.later(11 * S, lambda: begun.append(run.core.status(0)["begun"]))
     run.go()
     assert run.seen.json["reason"] == "done" and run.seen.digests == undisturbed()
     assert run.seen.json["recoveries"] == [] and run.core.state.epoch == 1
     silent = "lost node n1: its connection closed: nothing was heard of it for 1.1 s; the run waits"
     assert any(line.startswith(silent) for line in run.lines), "it was stopped, its lease ran out"
-    assert begun == [False] and run.core.status()["begun"]
+    assert begun == [False] and run.core.status(0)["begun"]
 
 
 @pytest.mark.parametrize("when", ["first", "later"])

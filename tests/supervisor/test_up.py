@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Final
 
+import msgspec
 import pytest
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
@@ -21,7 +22,7 @@ from foosim.supervisor.liveness import UNANSWERED_MAX
 from foosim.supervisor.outcome import capture_lines
 from foosim.supervisor.plan import make_plan
 from foosim.supervisor.restarts import WAITS_S
-from foosim.supervisor.run_folder import RunInfo
+from foosim.supervisor.run_folder import RESULT_FILE, RunInfo
 from foosim.supervisor.run_options import RunOptions
 from foosim.supervisor.status import NOT_RECORDED
 from foosim.supervisor.up import END_S, Killed, Up
@@ -129,6 +130,32 @@ def test_what_follows_when_the_supervisor_ends(
     assert killed.value.result.keys() == outcome.result.keys()
     assert killed.value.result["reason"] == "killed by a second Ctrl-C"
     up._launcher.close()
+
+
+def test_the_console_ends_last_when_it_is_known_how_the_run_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So that it can tell its pages: the supervisor's result, with what `up` knows better."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    waits, seen = tmp_path / "waits", tmp_path / "seen"
+
+    def start(up: Up) -> bool:
+        for name, code in ((SUPERVISOR, 0), ("red", 1)):
+            up._launch(name, ["sh", "-c", f"exit {code}"])
+            up._launcher.children[name].process.wait()
+        up.folder.write_result({**up.unended(""), "reason": "stopped", "failed": False})
+        up._lost = up._launcher.children["red"]
+        result = up.folder.path / RESULT_FILE
+        page = f'trap "cp {result} {seen}; exit" TERM; touch {waits}; while :; do sleep 0.01; done'
+        up._console._launcher.start("console", ["sh", "-c", page], up.folder.log("console"))
+        while not waits.exists():
+            time.sleep(0.01)
+        return False
+
+    monkeypatch.setattr(Up, "_start", start)
+    outcome = Up(make_plan(RunOptions(TABLE)), None, Display(io.StringIO()), "run").run()
+    told = msgspec.json.decode(seen.read_bytes())
+    assert told["reason"] == outcome.result["reason"] == "lost red: it ended with exit code 1"
 
 
 def test_of_a_player_that_hangs_it_is_said_where_its_stack_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,6 +27,7 @@ from foosim.rehearsal.bus import Traced
 from foosim.rehearsal.system import Settings, System
 from foosim.supervisor.drops_shown import Reported, explain_drops
 from foosim.supervisor.settings import RunSettings
+from foosim.vhub import report
 from foosim.vhub.explain import explain_row
 from foosim.vhub.packet import DROPPED, Flight
 from foosim.vhub.records import Closing
@@ -139,6 +140,17 @@ def test_the_last_drops_of_a_watched_link_are_told_as_rows() -> None:
     assert rows == dropped[at + 1 - DROPS_KEPT : at + 1] and len(dropped) - at < 20, "the last ones when it was told"
 
 
+def test_watched_links_are_told_beside_the_busiest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(report, "LINKS_TOLD_MAX", 3)
+    state = seen().system.hub.state
+    assert state is not None and len(state.fabric.states) > 4
+    order = sorted(state.fabric.states, key=lambda key: (-state.fabric.states[key].offered, key))
+    last = order[-1]
+    for watched, expected in (([], order[:3]), ([last[:2], ("no", "body")], [*order[:3], last])):
+        lines = decode_json(bytes(report.LinksTold().lines(state, watched, anew=True)))
+        assert [(line[0], line[1], line[6]) for line in lines] == sorted(expected)
+
+
 def test_the_readings_of_a_watched_sensor_are_told_with_their_ticks() -> None:
     told = seen().watched["readings"]
     assert set(told) == {"camera/ball"}
@@ -197,6 +209,14 @@ def test_an_event_that_was_asked_for_is_known_in_an_explanation() -> None:
     assert {row.cause for row, _ in told} == {"partition"}
     policy = [step.text for _, explained in told for step in explained.steps if step.stage == "policy"]
     assert all("cut by request 1" in text for text in policy)
+    deployment = run.system.supervisor.state.deployment
+    console, (tick, _) = Shown(deployment), run.watched["asked"][-1]
+    calm = {**run.watched, "drops": {f"{LINK[0]}>{LINK[1]}": []}}
+    (before,) = console.drops(calm, [LINK], (tick - 1) * deployment.tick_ns, {tick: "browser 3"})
+    assert "cut" not in before["rule"] and console.drops(calm, [LINK], (tick - 1) * deployment.tick_ns) == []
+    (after,) = console.drops(calm, [LINK], tick * deployment.tick_ns, {tick: "browser 3"})
+    assert after["rule"].startswith(f"{before['rule']}\ncut by a partition: nothing passes, since ")
+    assert f"(tick {tick}), asked for by browser 3 until " in after["rule"]
 
 
 def test_nobody_looks_any_more_and_nothing_is_kept() -> None:

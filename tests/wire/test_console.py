@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from websockets.asyncio.client import connect
 
 from tests.console.memory import Browser
@@ -33,18 +34,36 @@ async def status_with(browser: Browser, is_so: Callable[[dict[str, Any]], bool])
             return status
 
 
+async def moment_of(browser: Browser, source: int) -> tuple[tuple[int, ...], np.ndarray[Any, Any]]:
+    """Head and poses of the next moment of a source."""
+    while True:
+        head, poses, _ = await browser.moment()
+        if head[1] == source:
+            return head, poses
+
+
 async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
     """What a page does while the run goes on."""
     page, _, token = addresses["operate"].partition("#operate=")
     async with connect(f"{page.replace('http', 'ws')}ws", origin=page.rstrip("/"), max_size=None) as connection:  # type: ignore[arg-type]
         browser = Browser(connection)
         await browser.say(type="hello", token=token)
-        assert (await browser.hear("welcome"))["role"] == "operator"
-        scene = await browser.hear("scene")
-        head, poses, _ = await browser.moment()
+        welcome = await browser.hear("welcome")
+        assert (welcome["role"], [source["kind"] for source in welcome["sources"]]) == ("operator", ["live", "poses"])
+        scenes: dict[int, dict[str, Any]] = {}
+        while len(scenes) < 2:
+            scene = await browser.hear("scene")
+            scenes[scene["source"]] = scene
+        scene = scenes[0]
+        head, poses = await moment_of(browser, 0)
         assert len(poses) == len(scene["links"])
-        while (await browser.moment())[0][5] == head[5]:
+        while (await moment_of(browser, 0))[0][5] == head[5]:
             pass
+        followed, _ = await moment_of(browser, 1)
+        assert followed[5] >= head[5], "what was recorded follows the run"
+        compared = await browser.hear("compared")
+        assert [entity["name"] for entity in compared["entities"]] == ["ball"]
+        assert compared["covers"] == [-1000, 999_000]
         await browser.say(type="plot", series=[{"id": "x", "reading": ["camera", "ball"], "index": 0}])
         await browser.say(type="watch", link=["camera", "red.goal"])
         assert (await browser.hear("plotted"))["series"][0]["id"] == "x"
@@ -61,14 +80,33 @@ async def look(addresses: dict[str, str], kill: Callable[[str], None]) -> None:
         kill("supervisor")
         status = await status_with(browser, lambda status: bool(status["recoveries"]) and status["state"] == "paused")
         assert (await answered(browser, 4, "resume"))["tick"] == paused["tick"]
-        while (await browser.moment())[0][5] <= paused["tick"] + 1:
+        while (await moment_of(browser, 0))[0][5] <= paused["tick"] + 1:
             pass
         links = await browser.hear("links")
         assert links["at"] >= paused["tick"]
+    await look_later(page, token, paused["tick"])
+
+
+async def look_later(page: str, token: str, tick: int) -> None:
+    """What a page that is opened later plots: also what was before a tick at which it was not there."""
+    async with connect(f"{page.replace('http', 'ws')}ws", max_size=None) as connection:
+        later = Browser(connection)
+        await later.say(type="hello", token=token)
+        await later.hear("scene")
+        curves: dict[str, dict[str, Any]] = {"t": {"status": "ticks"}, "n": {"field": 0}}
+        curves["x"] = {"reading": ["camera", "ball"]}
+        await later.say(type="plot", series=[{"id": name, **curve} for name, curve in curves.items()])
+        while len(told := {one["id"]: one["points"] for one in (await later.hear("plotted"))["series"]}) < len(curves):
+            pass
+        assert [name for name, points in told.items() if points[0][0] > tick] == []
 
 
 def test_a_page_sees_and_moves_a_run_and_neither_end_harms_the_other(house: House) -> None:
-    up = house.up("--console", "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x")
+    table = house.folder / "walk.csv"
+    rows = [f"{at},ball,0.1,0,0" for at in range(2001)]
+    table.write_text("\n".join(["time,entity,x,y,z", *rows]))
+    beside = ("--second", "walk.csv", "--offset", "2 s")
+    up = house.up("--console", *beside, "--json", "--engine", "pure", "--no-capture", "--pace", "0.5x")
     house.ticking()
     path = house.live().path / "console.json"
 

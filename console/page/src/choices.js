@@ -10,7 +10,10 @@ const LINK_FIGURES = /** @type {[string, string, string][]} */ ([
 /** More would make the list of names slow to open. */
 const NAMES_MAX = 4000;
 
-/** @typedef {{name: string, unit: string, request: Omit<SeriesRequest, "id">}} Choice */
+/**
+ * @typedef {{name: string, unit: string, request: Omit<SeriesRequest, "id">, hint?: string, step?: boolean}} Choice
+ * `hint` says what it is, `step` that a value holds until the next one
+ */
 
 /** @param {[string, string]} link @param {string} figure @returns {Choice} */
 export function linkChoice(link, figure) {
@@ -25,6 +28,14 @@ function component(field, count, place) {
   if (count === 1) return "";
   const isVector = count === 3 || (count === 4 && field.includes("orientation"));
   return isVector ? `.${AXES[place]}` : `[${place}]`;
+}
+
+/**
+ * What robots were told: the set-points that their actuators hold.
+ * @param {SceneCommand[]} commands @returns {Choice[]}
+ */
+function commandsOf(commands) {
+  return commands.map(({ robot, channel, number, unit, index }) => ({ name: `command ${robot}/${channel}.${number}`, unit, hint: "set-point", step: true, request: { field: index } }));
 }
 
 /** All numbers of the frame: a field whose numbers differ in unit is several runs. @param {SceneField[]} runs */
@@ -53,8 +64,11 @@ function statusUnit(path) {
  * @returns {Map<string, Choice>}
  */
 export function choicesOf(source) {
+  const commands = source.scene?.commands ?? [];
+  const held = new Set(commands.map(({ index }) => index));
   /** @type {Choice[]} */
-  const choices = numbersOf(source.scene?.fields ?? []);
+  const choices = numbersOf((source.scene?.fields ?? []).filter(({ index }) => !held.has(index)));
+  choices.push(...commandsOf(commands));
   for (const { robot, channel, unit } of source.scene?.sensors ?? []) {
     choices.push({ name: `reading ${robot}/${channel}[0]`, unit, request: { reading: [robot, channel], index: 0 } });
   }

@@ -26,11 +26,21 @@ export class Comparison {
     store.on("theme", () => this.chart.redraw());
   }
 
+  /**
+   * What is said where the second one has nothing at this time.
+   * @param {Compared} compared @param {import("./store.js").Source} main
+   */
+  beyond({ at, covers }, main) {
+    if (!covers || (covers[0] <= at && at <= covers[1])) return "";
+    const name = this.store.sources.get(1)?.info.name ?? "the second";
+    return ` · ${name} has ${time(main.seconds(covers[0]))} to ${time(main.seconds(covers[1]))} of this clock, and nothing here`;
+  }
+
   draw() {
     const { compared, main } = this.store;
     if (!compared || !main || byId("panel-compare").hidden) return;
     const names = [...this.store.sources.values()].map(({ info }) => info.name).join(" and ");
-    setText(this.head, `${names} at ${time(main.seconds(compared.at))}`);
+    setText(this.head, `${names} at ${time(main.seconds(compared.at))}${this.beyond(compared, main)}`);
     const series = compared.series.map(([tick, metres]) => /** @type {[number, number]} */ ([main.seconds(tick), metres]));
     this.chart.update([{ name: "greatest distance", unit: "m", points: series }]);
     const rows = [...compared.entities].sort((a, b) => b.distance_m - a.distance_m).slice(0, ROWS_MAX);

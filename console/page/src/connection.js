@@ -2,7 +2,10 @@
 
 const FIRST_WAIT_MS = 250;
 const WAIT_MAX_MS = 5000;
+const ENDED_WAIT_MS = 15_000;
 const ANSWER_MS = 60_000;
+/** Close code of a console whose run has ended. */
+const ENDED = 4410;
 
 /** Why the server closed, where another try is of no use. */
 const REFUSED = /** @type {Record<number, string>} */ ({
@@ -36,6 +39,7 @@ export class Connection {
     /** @type {WebSocket | null} */
     this._socket = null;
     this.connected = false;
+    this._has_ended = false;
   }
 
   open() {
@@ -84,6 +88,7 @@ export class Connection {
     if (message.type === "welcome") {
       this.connected = true;
       this._wait_ms = FIRST_WAIT_MS;
+      this._has_ended = false;
       this._handlers.changed(true, "");
     } else if (message.type === "answer") {
       const waiting = this._waiting.get(message.id);
@@ -116,10 +121,13 @@ export class Connection {
       this._handlers.changed(false, refused);
       return;
     }
-    const why = event.code === 4429 ? "the console has as many pages as it takes" : event.reason || "the console does not answer";
-    this._handlers.changed(false, `Not connected: ${why}. Trying again …`);
-    // Pages that were lost together do not come back together.
-    window.setTimeout(() => this.open(), this._wait_ms * (0.75 + 0.5 * Math.random()));
+    if (event.code === ENDED) this._has_ended = true;
+    const full = event.code === 4429 ? "the console has as many pages as it takes" : "";
+    const why = full || event.reason || "the console does not answer";
+    this._handlers.changed(false, event.code === ENDED ? event.reason : `Not connected: ${why}. Trying again …`);
+    // Pages that were lost together do not come back together. Of a run that is over nobody may ever come back.
+    const wait_ms = this._has_ended ? ENDED_WAIT_MS : this._wait_ms;
+    window.setTimeout(() => this.open(), wait_ms * (0.75 + 0.5 * Math.random()));
     this._wait_ms = Math.min(WAIT_MAX_MS, this._wait_ms * 2);
   }
 }

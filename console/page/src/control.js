@@ -1,6 +1,7 @@
 // The bar at the top: what is looked at, its state, and the tempo: pause, resume, step, pace.
 
 import { confirmed, dialog, shown } from "./dialogs.js";
+import { stateOf } from "./presence.js";
 import { time } from "./text.js";
 import { button, byId, field, h, select, setText } from "./ui.js";
 
@@ -9,7 +10,7 @@ const SPEEDS = ["0.1x", "0.25x", "0.5x", "1x", "2x", "5x", "10x"];
 
 /** Signs for states, so that they are told apart without their colours. */
 const SIGNS = /** @type {Record<string, string>} */ ({
-  running: "▶", paused: "❚❚", starting: "…", recovering: "…", ended: "■", "not connected": "✕", failed: "✕", playing: "▶",
+  running: "▶", paused: "❚❚", starting: "…", recovering: "…", ended: "■", "not connected": "✕", "supervisor away": "…", failed: "✕", playing: "▶",
 });
 
 export class Control {
@@ -23,7 +24,7 @@ export class Control {
     this.pace = select([], "", { id: "pace", "aria-label": "Pace", title: "How fast simulated time goes", onchange: () => this.setPace() });
     this.end = button("End run …", () => this.down(), { id: "down", class: "danger" });
     byId("tempo").append(this.play, this.step, this.steps, this.pace, this.end);
-    for (const name of ["sources", "status", "poses", "connected"]) store.on(name, () => this.later());
+    for (const name of ["sources", "status", "poses", "connected", "presence"]) store.on(name, () => this.later());
     this.waits = false;
     this.draw();
   }
@@ -42,9 +43,8 @@ export class Control {
     const source = this.store.main;
     if (!source) return "starting";
     const state = source.status?.state;
-    if (!this.desk.connection.connected) return "not connected";
-    if (source.info.kind === "live") return state ?? "starting";
-    return source.paused ? "paused" : "playing";
+    const told = source.info.kind === "live" ? (state ?? "starting") : source.paused ? "paused" : "playing";
+    return stateOf(this.desk.connection.connected, source.presence, told);
   }
 
   draw() {

@@ -22,7 +22,7 @@ export class Desk {
 
   /** Whether a verb may be asked of the main source. @param {string} verb */
   may(verb) {
-    return this.connection.connected && (this.store.main?.may(verb) ?? false);
+    return this.connection.connected && this.store.main?.presence?.state !== "ended" && (this.store.main?.may(verb) ?? false);
   }
 
   /**

@@ -13,6 +13,7 @@ export class LinkDetail {
     this.place = place;
     this.store = store;
     this.head = h("h2");
+    this.unused = h("p", { class: "hint" }, "No packet was told of on this link so far: figures come with the first.");
     this.rule = h("pre", { class: "rule", tabindex: 0, "aria-label": "Rule of the link" });
     this.causes = h("div", { "aria-label": "Drops by cause" });
     this.drops = h("div", { class: "drops" });
@@ -26,7 +27,7 @@ export class LinkDetail {
     const actions = h("div", { class: "row" },
       button("Plot delay", plot("delay_ms")), button("Plot loss", plot("loss")), button("Plot queue", plot("queue_ms")),
       button("Close", () => store.selectLink(null)));
-    place.append(this.head, actions, charts, h("h3", {}, "Drops by cause"), this.causes, h("h3", {}, "Rule"), this.rule, h("h3", {}, "The last drops"), this.drops);
+    place.append(this.head, this.unused, actions, charts, h("h3", {}, "Drops by cause"), this.causes, h("h3", {}, "Rule"), this.rule, h("h3", {}, "The last drops"), this.drops);
     store.on("link", () => this._chosen());
     store.on("links", (source) => source.info.id === 0 && this._take(source));
     store.on("watched", (source) => source.info.id === 0 && this._watched(source));
@@ -49,6 +50,7 @@ export class LinkDetail {
   _take(source) {
     const chosen = this.store.link;
     const link = chosen && source.links.find((one) => one.from === chosen[0] && one.to === chosen[1]);
+    this.unused.hidden = !chosen || !!link;
     if (!link) return;
     this.rings.delay.push(source.tick, link.delay_ms);
     this.rings.queue.push(source.tick, link.queue_ms);

@@ -1,7 +1,7 @@
 // The tab "Machines": nodes with what they own, load, lag, who is waited for; recoveries. Robots are dragged to nodes.
 
 import { coloursOf, paletteColour } from "./colours.js";
-import { confirmed, dialog } from "./dialogs.js";
+import { confirmed } from "./dialogs.js";
 import { timeChart } from "./plots.js";
 import { Ring } from "./ring.js";
 import { counted, milliseconds, number, percent } from "./text.js";
@@ -33,7 +33,7 @@ export class Machines {
     this.desk = desk;
     this.lags = new Ring(6000);
     this.head = h("p", { class: "summary" });
-    this.balance = button("Balance …", () => void this.askBalance(), { id: "balance", title: "Give every node as many robots" });
+    this.balance = button("Balance", () => void this.desk.ask("balance"), { id: "balance", title: "Move robots from busy nodes to idle ones; the answer says which, and why" });
     this.nodes = h("div", { class: "nodes", "aria-label": "Nodes" });
     this.others = h("tbody");
     this.recoveries = h("ol", { class: "recoveries", "aria-label": "Recoveries" });
@@ -65,8 +65,8 @@ export class Machines {
     const nodes = Object.entries(status.nodes ?? {});
     const colours = coloursOf(nodes.map(([name]) => name));
     keyed(this.nodes, nodes, ([name]) => name, ([name]) => this._card(name), (card, [name, node]) => this._fill(card, name, node, status, colours));
-    this.balance.hidden = !source.may("move") || nodes.length < 2;
-    this.balance.disabled = !this.desk.may("move");
+    this.balance.hidden = !source.may("balance") || nodes.length < 2;
+    this.balance.disabled = !this.desk.may("balance");
     const others = Object.entries(status.processes ?? {}).filter(([name]) => !(name in (status.nodes ?? {})));
     keyed(this.others, others, ([name]) => name, () => h("tr", {}, h("th", { scope: "row", class: "left" }), h("td", { class: "left" }), h("td"), h("td", { class: "left" })), (row, [name, process]) => {
       [name, process.role, percent(process.busy, 0), doing(process)].forEach((text, index) => setText(row.children[index], text));
@@ -166,41 +166,6 @@ export class Machines {
     }
     const text = `Its robots move to the other nodes first. The world does not notice; the node can be started again.`;
     if (await confirmed(`Stop node ${name}?`, text, "Stop node")) await this.desk.ask("stop", { node: name });
-  }
-
-  /** Moves that give every node that takes part as many robots, one more or less. */
-  moves() {
-    const status = this.store.main?.status;
-    const here = Object.entries(status?.nodes ?? {}).filter(([name]) => {
-      const process = status.processes?.[name];
-      return process && !process.stopped && !process.lost;
-    });
-    const owned = new Map(here.map(([name, node]) => [name, [.../** @type {any} */ (node).owned]]));
-    /** @type {{robot: string, from: string, node: string}[]} */
-    const moves = [];
-    for (;;) {
-      const order = [...owned].sort((a, b) => b[1].length - a[1].length);
-      if (order.length < 2 || order[0][1].length - order[order.length - 1][1].length < 2) return moves;
-      const robot = order[0][1].pop();
-      order[order.length - 1][1].push(robot);
-      moves.push({ robot, from: order[0][0], node: order[order.length - 1][0] });
-    }
-  }
-
-  async askBalance() {
-    const moves = this.moves();
-    const list = moves.map(({ robot, from, node }) => h("li", {}, `${robot}: ${from} → ${node}`));
-    const content = moves.length ? [h("p", {}, `${counted(moves.length, "robot")} would move; the world does not notice.`), h("ul", { class: "scroll" }, ...list)] : [h("p", {}, "The nodes own as many robots each already.")];
-    await dialog("Balance the nodes", content, {
-      action: moves.length ? "Move them" : "Done",
-      send: async () => {
-        for (const { robot, node } of moves) {
-          const wrong = await this.desk.ask("move", { robot, node });
-          if (wrong) return wrong;
-        }
-        return "";
-      },
-    });
   }
 }
 

@@ -13,6 +13,7 @@ import { MapView } from "./mapview.js";
 import { decodePoses } from "./messages.js";
 import { Network } from "./network.js";
 import { PlotPanel } from "./plot_panel.js";
+import { bannerOf } from "./presence.js";
 import { shortcutsOf } from "./shortcuts.js";
 import { Store } from "./store.js";
 import { Timeline } from "./timeline.js";
@@ -36,6 +37,14 @@ const memory = new Memory();
 /** @type {import("./view3d.js").Options} */
 const options = { labels: true, owners: false, paths: false, contacts: false, rays: false, radio: true, two: "ghost", ...memory.get("show", {}), follow: false };
 
+let lost = "";
+
+function drawBanner() {
+  const text = bannerOf(lost, store.main?.presence);
+  byId("banner").hidden = !text;
+  setText(byId("banner"), text);
+}
+
 const scheme = window.location.protocol === "https:" ? "wss" : "ws";
 const connection = new Connection(`${scheme}://${window.location.host}/ws`, tokenOf(window.location.hash), {
   binary: (buffer) => {
@@ -50,8 +59,8 @@ const connection = new Connection(`${scheme}://${window.location.host}/ws`, toke
   },
   changed: (connected, text) => {
     stat.connected = connected;
-    byId("banner").hidden = !text;
-    setText(byId("banner"), text);
+    lost = text;
+    drawBanner();
     if (connected) queueMicrotask(() => store.emit("connected", true));
     else store.emit("connected", false);
   },
@@ -120,6 +129,7 @@ store.on("connected", (connected) => {
   watch();
 });
 store.on("link", watch);
+for (const name of ["presence", "sources"]) store.on(name, drawBanner);
 store.on("sources", () => {
   stat.role = store.role;
   byId("role").textContent = store.role;

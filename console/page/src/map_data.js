@@ -1,6 +1,9 @@
 // A scene and its poses as data of a map: shapes as seen from above.
 
-import { FLOATS_PER_LINK } from "./messages.js";
+import { decodeMesh, FLOATS_PER_LINK } from "./messages.js";
+
+/** Corners of a mesh that its outline is made of; of a mesh with more the outermost ones in so many directions. */
+const CORNERS_MAX = 400;
 
 /** @param {Rgba} colour */
 function cssColour([red, green, blue, alpha]) {
@@ -23,14 +26,51 @@ function turned(q, v) {
   return [x, y, z];
 }
 
+/** @type {WeakMap<{vertices: string, triangles: string}, Vec3[]>} */
+const cornersKnown = new WeakMap();
+
+/** The corners (m) of a mesh that its convex outline is made of. @param {{vertices: string, triangles: string}} mesh */
+export function cornersOf(mesh) {
+  let corners = cornersKnown.get(mesh);
+  if (!corners) {
+    const { vertices } = decodeMesh(mesh);
+    const all = Array.from({ length: vertices.length / 3 }, (_, index) => /** @type {Vec3} */ ([...vertices.subarray(3 * index, 3 * index + 3)]));
+    corners = all.length > CORNERS_MAX ? outermost(all) : all;
+    cornersKnown.set(mesh, corners);
+  }
+  return corners;
+}
+
+/** The points that are farthest in directions that are spread evenly (a Fibonacci sphere). @param {Vec3[]} points */
+function outermost(points) {
+  /** @type {Set<Vec3>} */
+  const found = new Set();
+  for (let index = 0; index < CORNERS_MAX; index += 1) {
+    const z = 1 - (2 * index + 1) / CORNERS_MAX;
+    const across = Math.sqrt(1 - z * z);
+    const angle = index * Math.PI * (3 - Math.sqrt(5));
+    const [x, y] = [across * Math.cos(angle), across * Math.sin(angle)];
+    let best = points[0];
+    let far = -Infinity;
+    for (const point of points) {
+      const reach = x * point[0] + y * point[1] + z * point[2];
+      if (reach > far) [best, far] = [point, reach];
+    }
+    found.add(best);
+  }
+  return [...found];
+}
+
 /**
- * What is seen of a shape from above: the outline of its bounding box's projection, or a circle.
+ * What is seen of a shape from above: the convex outline of its projection, or a circle. A cylinder that lies is seen as
+ * the box around it; null for a mesh that is not known.
  * @param {Shape} shape
  * @param {Vec3} position of its link
  * @param {Quat} orientation of its link
+ * @param {SceneMessage["meshes"]} meshes
  * @returns {import("./map.js").MapShape | null}
  */
-export function fromAbove(shape, position, orientation) {
+export function fromAbove(shape, position, orientation, meshes) {
   const [x, y] = turned(orientation, shape.position);
   const at = /** @type {[number, number]} */ ([position[0] + x, position[1] + y]);
   const turn = times(orientation, shape.orientation);
@@ -39,7 +79,12 @@ export function fromAbove(shape, position, orientation) {
   const up = turned(turn, [0, 0, 1]);
   const radius = shape.radius ?? 0;
   if (shape.kind === "cylinder" && Math.abs(up[2]) > 0.9) return { kind: "circle", at, radius, colour };
-  if (shape.kind === "mesh") return null;
+  if (shape.kind === "mesh") {
+    const mesh = meshes[shape.mesh ?? ""];
+    if (!mesh) return null;
+    const seen = cornersOf(mesh).map((corner) => turned(turn, corner));
+    return { kind: "polygon", at, points: hull(seen.map(([cx, cy]) => [cx, cy])), colour };
+  }
   const half = shape.kind === "box" ? (shape.half ?? [0, 0, 0]) : [radius, radius, (shape.length ?? 0) / 2];
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => {
     const corner = half.map((size, index) => (bits & (1 << index) ? size : -size));
@@ -84,11 +129,11 @@ export function mapOf(scene, poses) {
     const { position } = poseOf(body.links[body.links.length - 1]);
     const shapes = body.links.flatMap((link) => {
       const pose = poseOf(link);
-      return scene.links[link].shapes.map((shape) => fromAbove(shape, pose.position, pose.orientation));
+      return scene.links[link].shapes.map((shape) => fromAbove(shape, pose.position, pose.orientation, scene.meshes));
     });
     return { name: body.name, at: /** @type {[number, number]} */ ([position[0], position[1]]), shapes: present(shapes) };
   });
-  const scenery = present(scene.scenery.map((shape) => fromAbove(shape, [0, 0, 0], [0, 0, 0, 1])));
+  const scenery = present(scene.scenery.map((shape) => fromAbove(shape, [0, 0, 0], [0, 0, 0, 1], scene.meshes)));
   return { bounds: [[low[0], low[1]], [high[0], high[1]]], scenery, bodies };
 }
 

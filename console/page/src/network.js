@@ -3,12 +3,14 @@
 import { lossColour, css, lossGradient } from "./colours.js";
 import { Disturb } from "./disturb.js";
 import { LinkDetail } from "./link_detail.js";
-import { causesText, counted, milliseconds, percent, whole } from "./text.js";
+import { causesText, counted, milliseconds, number, percent, whole } from "./text.js";
 import { button, byId, h, keyed, setText } from "./ui.js";
 
 const ROWS_MAX = 200;
 /** A disturbance that is over is shown no longer than that many. */
 const DISTURBANCES_SHOWN = 6;
+/** Endpoints that a message names. */
+const ENDPOINTS_SAID = 8;
 
 /**
  * @typedef {object} Column
@@ -46,6 +48,14 @@ export class Network {
     this.filter = h("input", { type: "search", placeholder: "Find links", "aria-label": "Find links by end, rule or cause", oninput: () => this.draw() });
     this.body = h("tbody");
     this.more = h("p", { class: "hint" });
+    this.old = h("p", { class: "warning", role: "status", hidden: true });
+    this.from = h("input", { list: "endpoints", placeholder: "From", "aria-label": "Who sends on the link to watch", autocomplete: "off" });
+    this.to = h("input", { list: "endpoints", placeholder: "To", "aria-label": "Who receives on the link to watch", autocomplete: "off" });
+    this.pick = h("form", { class: "row", id: "watch-link", "aria-label": "Watch a link by its ends" }, this.from, this.to, h("button", { type: "submit", title: "Show this link, also one that is not in the table" }, "Watch"));
+    this.pick.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.watch();
+    });
     this.endpoints = h("datalist", { id: "endpoints" });
     this.rules = h("datalist", { id: "rules" });
     this.heads = COLUMNS.map((column, index) => {
@@ -57,8 +67,8 @@ export class Network {
     const legend = h("div", { class: "legend", title: "Lines in the view: the half of a link at its sender has its colour" }, "loss 0 %", h("i", { style: `background:${lossGradient()}` }), "100 %");
     const detail = h("section", { class: "detail", "aria-label": "Selected link" });
     byId("panel-network").append(
-      h("section", {}, h("h2", {}, "Packets"), this.summary, this.buttons, this.disturbances),
-      h("section", { class: "fill" }, h("div", { class: "row" }, h("h2", {}, "Links"), this.filter, legend), h("div", { class: "scroll" }, this.table), this.more),
+      h("section", {}, h("h2", {}, "Packets"), this.old, this.summary, this.buttons, this.disturbances),
+      h("section", { class: "fill" }, h("div", { class: "row" }, h("h2", {}, "Links"), this.filter, legend), h("div", { class: "scroll" }, this.table), this.more, this.pick),
       detail, this.endpoints, this.rules,
     );
     this.detail = new LinkDetail(detail, store, plots);
@@ -108,10 +118,22 @@ export class Network {
     const rises = COLUMNS[column].name === "From" || COLUMNS[column].name === "To" ? !down : down;
     this.heads.forEach((head, index) => head.setAttribute("aria-sort", index !== column ? "none" : rises ? "ascending" : "descending"));
     keyed(this.body, found.slice(0, ROWS_MAX), keyOf, (link) => this._row(link), (row, link) => this._update(row, link));
-    const hidden = found.length - ROWS_MAX;
-    setText(this.more, hidden > 0 ? `and ${counted(hidden, "more link")}: find the ones you want above` : source.links.length ? "" : "No link was used yet.");
+    setText(this.more, moreText(source.links.length, source.links_in_all, found.length));
+    this.pick.hidden = !source.scene?.network;
     this._draw_lists(source);
     this.detail.draw();
+  }
+
+  /** Watch the link between the ends that were typed, whether the table has it or not. */
+  watch() {
+    const [from, to] = [this.from.value.trim(), this.to.value.trim()];
+    const endpoints = this.store.main?.scene?.network?.endpoints ?? [];
+    const wrong = [from, to].find((name) => !endpoints.includes(name));
+    if (wrong !== undefined) {
+      this.store.note("error", `There is no endpoint ${wrong || "without a name"}; there are ${endpoints.slice(0, ENDPOINTS_SAID).join(", ")}${endpoints.length > ENDPOINTS_SAID ? ", …" : ""}`);
+      return;
+    }
+    this.store.selectLink([from, to]);
   }
 
   /** @param {LinkWindow} link */
@@ -137,6 +159,10 @@ export class Network {
   /** @param {import("./store.js").Source} source */
   _draw_summary(source) {
     const packets = source.status?.packets;
+    const old = oldText(source.status);
+    this.old.hidden = !old;
+    setText(this.old, old);
+    this.table.classList.toggle("old", old !== "");
     setText(this.summary, packets
       ? `${whole(packets.offered)} offered, ${whole(packets.delivered)} delivered, ${whole(packets.dropped)} dropped, ${whole(packets.in_flight)} on their way. Links below: the last ${source.window_s} s.`
       : "Nothing is known of packets yet.");
@@ -157,6 +183,26 @@ export class Network {
       keyed(list, names, (name) => name, (value) => h("option", { value }));
     }
   }
+}
+
+/**
+ * What the table has not: links that are not told, links that its filter or its length leave out.
+ * @param {number} told @param {number} all links that were used @param {number} found by the filter
+ */
+export function moreText(told, all, found) {
+  const parts = [];
+  if (!told) return "No link was used yet.";
+  if (all > told) parts.push(`${whole(told)} of ${whole(all)} links, the busiest and the watched ones. Any other is watched by its ends.`);
+  if (found > ROWS_MAX) parts.push(`${counted(found - ROWS_MAX, "more link")}: find the ones you want above.`);
+  return parts.join(" ");
+}
+
+/** That the figures are old, since when, and why; empty where they are not. @param {Status} status */
+export function oldText(status) {
+  if (!status?.vhub_away) return "";
+  const lost = status.vhub_lost;
+  const since = lost ? ` since tick ${lost.tick}, for ${number(lost.for_s, 2)} s: ${lost.reason}` : "";
+  return `⚠ The vHub is away${since}. Packets and links are those that it told last.`;
 }
 
 /**

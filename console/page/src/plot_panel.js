@@ -35,13 +35,13 @@ export class PlotPanel {
     this.end_s = null;
     this.next_ms = 0;
     this.names = h("datalist", { id: "plottable" });
-    this.pick = h("input", { id: "pick", list: "plottable", placeholder: "Pick a value: red.goal, lag_ms, loss …", autocomplete: "off", spellcheck: false });
+    this.pick = h("input", { id: "pick", list: "plottable", placeholder: "Pick a value: red.goal, command, lag_ms, loss …", autocomplete: "off", spellcheck: false });
     this.span = select(SPANS, String(this.span_s), { "aria-label": "Length of the time axis", onchange: () => this._spanned() });
     this.back = h("input", { type: "range", min: 0, max: 0, value: 0, step: "any", "aria-label": "Scroll back", oninput: () => this._scrolled() });
     this.live = button("Live", () => this.follow(), { "aria-pressed": "true", title: "Follow the newest values" });
     this.at = h("span", { class: "hint" });
     this.list = h("div", { class: "charts" });
-    this.empty = h("p", { class: "hint" }, "Nothing is plotted yet. Numbers of the world, readings, figures of links and values of the status can be picked above; links and entities have buttons of their own.");
+    this.empty = h("p", { class: "hint" }, "Nothing is plotted yet. Numbers of the world, commands, readings, figures of links and values of the status can be picked above; links and entities have buttons of their own.");
     this._build();
     store.on("poses", (source) => source.info.id === 0 && this._take(source));
     store.on("plotted", (message) => message.source === 0 && this._merge(message.series));
@@ -66,7 +66,7 @@ export class PlotPanel {
     const source = this.store.main;
     if (!source) return;
     const choices = [...choicesOf(source).values()];
-    keyed(this.names, choices, ({ name }) => name, ({ name, unit }) => h("option", { value: name }, unit));
+    keyed(this.names, choices, ({ name }) => name, ({ name, unit, hint }) => h("option", { value: name }, [hint, unit].filter(Boolean).join(", ")));
   }
 
   /** @param {string} text the beginning of names */
@@ -232,8 +232,8 @@ export class PlotPanel {
     setText(this.at, this.end_s === null ? "" : `to ${time(end_s)}`);
     const first_s = Math.max(end_s - this.span_s, Math.min(oldest_s, end_s - 1));
     for (const { lines, chart } of this.cards) {
-      const series = lines.map(({ name, unit, ring }) => ({
-        name, unit,
+      const series = lines.map(({ name, unit, ring, step }) => ({
+        name, unit, step,
         points: /** @type {[number, number | null][]} */ (ring.window(first_s / tick_s, end_s / tick_s, COLUMNS).map(([tick, value]) => [tick * tick_s, value])),
       }));
       chart.update(series, [first_s, end_s]);

@@ -141,15 +141,15 @@ class LineChart {
   /** @param {Series[]} series @returns {uPlot.Series[]} */
   _lines(series) {
     const { stacked, colours } = this.options;
-    const paths = stacked ? uPlot.paths.bars?.({ size: [0.9, 60] }) : undefined;
-    const lines = series.map(({ name, unit, points }, index) => {
+    const bars = stacked ? uPlot.paths.bars?.({ size: [0.9, 60] }) : undefined;
+    const lines = series.map(({ name, unit, points, step }, index) => {
       const colour = colours?.[index] ?? paletteColour(index);
       return {
         label: name,
         stroke: colour,
         fill: stacked ? colour : undefined,
         width: stacked ? 0 : 1.5,
-        paths,
+        paths: step && !stacked ? uPlot.paths.stepped?.({ align: 1 }) : bars,
         dash: index >= 8 && !stacked ? [6, 4] : undefined,
         points: { show: !stacked, filter: (/** @type {uPlot} */ plot, /** @type {number} */ line) => lonely(plot.data[line]), size: 4 },
         value: (/** @type {uPlot} */ _, /** @type {number | null} */ value, /** @type {number} */ _line, /** @type {number | null} */ at) => {

@@ -17,12 +17,16 @@ export class Source {
     /** @type {LinkWindow[]} */
     this.links = [];
     this.window_s = 0;
+    /** How many links were used: of many the busiest are told, and those that are watched. */
+    this.links_in_all = 0;
     /** @type {WatchedMessage | null} */
     this.watched = null;
     /** @type {Overlay | null} */
     this.overlay = null;
     /** @type {Mark[]} */
     this.marks = [];
+    /** @type {Presence | null} */
+    this.presence = null;
   }
 
   get tick() {
@@ -178,6 +182,7 @@ export class Store {
       case "links":
         source.links = message.links;
         source.window_s = message.window_s;
+        source.links_in_all = message.in_all;
         break;
       case "watched":
         source.watched = message;
@@ -185,6 +190,9 @@ export class Store {
       case "overlay":
         if (source.scene?.generation !== message.generation) return;
         source.overlay = message;
+        break;
+      case "presence":
+        source.presence = message;
         break;
       case "marks":
         this._take_marks(source, message.marks);

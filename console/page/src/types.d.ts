@@ -19,6 +19,7 @@ interface Shape {
 interface SceneLink { name: string; body: string; shapes: Shape[] }
 interface SceneBody { name: string; model: string; links: number[]; removable: boolean; pushable: boolean }
 interface SceneField { entity: string; field: string; unit: string; index: number; count: number }
+interface SceneCommand { robot: string; channel: string; number: string; unit: string; index: number }
 interface SceneSensor { robot: string; channel: string; kind: string; unit: string }
 interface Addable { model: string; position: Vec3; velocity: Vec3 }
 
@@ -31,6 +32,7 @@ interface SceneMessage {
   scenery: Shape[];
   bodies: SceneBody[];
   fields: SceneField[];
+  commands: SceneCommand[];
   sensors: SceneSensor[];
   meshes: Record<string, { vertices: string; triangles: string }>;
   bounds: [Vec3, Vec3];
@@ -84,8 +86,24 @@ interface Mark { tick: number; kind: string; text: string }
 interface Step { stage: string; outcome: string; text: string }
 interface ExplainedDrop { tick: number; cause: string; head: string; steps: Step[]; verdict: string }
 interface WatchedMessage { source: number; link: [string, string]; rule: string; drops: ExplainedDrop[] }
+/** Whether a run is there, its supervisor away, or the run over; then how, and what shows its capture. */
+interface Presence {
+  source: number;
+  state: "here" | "away" | "ended";
+  text: string;
+  failed?: boolean;
+  reason?: string;
+  capture?: string | null;
+  command?: string;
+}
 interface Answer { id: number; accepted: boolean; text: string; tick: number; verb: string; who: string }
-interface Compared { at: number; entities: { name: string; distance_m: number }[]; series: [number, number][] }
+interface Compared {
+  at: number;
+  /** First and last tick of the first source's clock at which the second one has something. */
+  covers?: [number, number];
+  entities: { name: string; distance_m: number }[];
+  series: [number, number][];
+}
 interface Overlay {
   source: number;
   generation: number;
@@ -97,8 +115,8 @@ interface Overlay {
 /** The status of a run, as the supervisor answers it. */
 type Status = any;
 
-/** One line of a chart: ticks ascending, a value each; null where there is none. */
-interface Series { name: string; unit: string; points: [number, number | null][] }
+/** One line of a chart: ticks ascending, a value each; null where there is none. With `step` a value holds until the next one. */
+interface Series { name: string; unit: string; points: [number, number | null][]; step?: boolean }
 
 interface SeriesRequest {
   id: string;

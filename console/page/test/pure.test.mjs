@@ -4,11 +4,13 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { choiceOf, choicesOf } from "../src/choices.js";
 import { lossColour } from "../src/colours.js";
-import { tokenOf } from "../src/connection.js";
+import { Connection, tokenOf } from "../src/connection.js";
 import { settingsOf } from "../src/disturb.js";
 import { scaleLength } from "../src/map.js";
 import { fromAbove } from "../src/map_data.js";
 import { decodePoses } from "../src/messages.js";
+import { bannerOf, stateOf } from "../src/presence.js";
+import { moreText, oldText } from "../src/network.js";
 import { Ring } from "../src/ring.js";
 import { Source, Store } from "../src/store.js";
 import { number, numberPaths, time, valueAt } from "../src/text.js";
@@ -90,6 +92,19 @@ test("numbers of a field whose units differ have names of their own", () => {
   assert.equal(choiceOf(choices, "nothing"), null);
 });
 
+test("a command is picked by robot, channel and number, and holds until the next one", () => {
+  const source = new Source(INFO);
+  const run = { entity: "red.goal", field: "wanted" };
+  const told = { robot: "red.goal", channel: "position" };
+  source.scene = {
+    fields: [{ ...run, unit: "m", index: 4, count: 1 }, { ...run, unit: "rad", index: 5, count: 1 }], sensors: [],
+    commands: [{ ...told, number: "slide", unit: "m", index: 4 }, { ...told, number: "spin", unit: "rad", index: 5 }],
+  };
+  const choices = choicesOf(source);
+  assert.deepEqual([...choices.keys()], ["command red.goal/position.slide", "command red.goal/position.spin"]);
+  assert.deepEqual(choiceOf(choices, "command red.goal/position.spin"), { name: "command red.goal/position.spin", unit: "rad", hint: "set-point", step: true, request: { field: 5 } });
+});
+
 test("values of a status are found by their path, also under names with dots", () => {
   const status = { lag_ms: { p99: 1.5 }, nodes: { "a.b": { solved_ticks: 3 } }, state: "running" };
   assert.deepEqual(numberPaths(status).map((path) => [path, valueAt(status, path)]), [["lag_ms.p99", 1.5], ["nodes.a.b.solved_ticks", 3]]);
@@ -114,8 +129,85 @@ test("tokens, times, numbers, scales", () => {
 
 test("a box that is turned is seen from above as it lies", () => {
   const box = { kind: "box", half: [2, 1, 1], position: [0, 0, 0], orientation: [0, 0, Math.SQRT1_2, Math.SQRT1_2], colour: [1, 0, 0, 1], name: "" };
-  const { at, points } = fromAbove(box, [3, 4, 0], [0, 0, 0, 1]);
+  const { at, points } = fromAbove(box, [3, 4, 0], [0, 0, 0, 1], {});
   assert.deepEqual(at, [3, 4]);
   assert.equal(Math.round(Math.max(...points.map(([x]) => x))), 1);
   assert.equal(Math.round(Math.max(...points.map(([, y]) => y))), 2);
+});
+
+test("a run that has ended is said, with its capture, whatever becomes of the console", () => {
+  const store = new Store();
+  store.take({ type: "welcome", role: "viewer", version: "1", sources: [INFO] });
+  const ended = { type: "presence", source: 0, state: "ended", failed: false, text: "The run has ended at tick 5: done." };
+  const away = { type: "presence", source: 0, state: "away", text: "lost run; it is looked for" };
+  assert.equal(bannerOf("", store.main.presence), "");
+  store.take(away);
+  assert.deepEqual([bannerOf("", store.main.presence), stateOf(true, store.main.presence, "running")], [away.text, "supervisor away"]);
+  assert.deepEqual([bannerOf("Not connected", away), stateOf(false, away, "running")], ["Not connected", "not connected"]);
+  store.take(ended);
+  assert.deepEqual([bannerOf("Not connected", store.main.presence), stateOf(false, store.main.presence, "running")], [ended.text, "ended"]);
+  assert.equal(stateOf(true, { ...ended, failed: true }, "running"), "failed");
+});
+
+test("a console whose run has ended is asked for every 15 s, another one sooner, until it is back", () => {
+  const [sockets, waits, told] = [[], [], []];
+  globalThis.window = { setTimeout: (_, wait_ms) => waits.push(wait_ms) };
+  globalThis.WebSocket = class {
+    constructor() {
+      this.on = {};
+      sockets.push(this);
+    }
+    addEventListener(name, listener) { this.on[name] = listener; }
+  };
+  const connection = new Connection("ws://x/ws", "", { binary: () => {}, message: () => {}, changed: (_, text) => told.push(text) });
+  const close = (event) => {
+    connection.open();
+    sockets.at(-1).on.close(event);
+  };
+  close({ code: 1001, reason: "the console was ended" });
+  close({ code: 4410, reason: "The run has ended: done." });
+  close({ code: 1006, reason: "" });
+  connection.open();
+  sockets.at(-1).on.message({ data: '{"type": "welcome"}' });
+  close({ code: 1006, reason: "" });
+  delete globalThis.window;
+  delete globalThis.WebSocket;
+  assert.deepEqual(waits.map((wait_ms) => (wait_ms > 11_000 ? "long" : wait_ms < 1000 ? "short" : wait_ms)), ["short", "long", "long", "short"]);
+  assert.equal(told[0], "Not connected: the console was ended. Trying again …");
+  assert.equal(told[1], "The run has ended: done.");
+});
+
+test("what the table of links leaves out, and that its figures are old, is said", () => {
+  assert.equal(moreText(0, 0, 0), "No link was used yet.");
+  assert.equal(moreText(18, 18, 18), "");
+  assert.equal(moreText(200, 1482, 3), "200 of 1,482 links, the busiest and the watched ones. Any other is watched by its ends.");
+  assert.equal(moreText(203, 203, 203), "3 more links: find the ones you want above.");
+  assert.equal(oldText({ vhub_away: false, vhub_lost: null }), "");
+  assert.equal(oldText(null), "");
+  assert.equal(
+    oldText({ vhub_away: true, vhub_lost: { reason: "its connection has closed", tick: 73, for_s: 1.25 } }),
+    "⚠ The vHub is away since tick 73, for 1.25 s: its connection has closed. Packets and links are those that it told last.",
+  );
+});
+
+function meshOf(points) {
+  const base64 = (array) => Buffer.from(array.buffer).toString("base64");
+  return { vertices: base64(Float32Array.from(points.flat())), triangles: base64(new Uint32Array(0)) };
+}
+
+test("a mesh is seen from above by its convex outline, turned as it stands", () => {
+  const shape = { kind: "mesh", mesh: "m", position: [0, 0, 0], orientation: [0, 0, 0, 1], colour: [1, 0, 0, 1], name: "" };
+  const wedge = meshOf([[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 3], [0.5, 0.2, 1]]);
+  const around = (points) => points.map((point) => point.map((value) => Math.round(value * 100) / 100 + 0));
+  const flat = fromAbove(shape, [1, 1, 0], [0, 0, 0, 1], { m: wedge });
+  assert.deepEqual([flat.at, around(flat.points)], [[1, 1], [[0, 0], [2, 0], [0, 1]]]);
+  const lying = fromAbove(shape, [0, 0, 0], [0, Math.SQRT1_2, 0, Math.SQRT1_2], { m: wedge });
+  assert.deepEqual(around(lying.points), [[0, 0], [3, 0], [0, 1]], "what was up points along x");
+  assert.equal(fromAbove(shape, [0, 0, 0], [0, 0, 0, 1], {}), null);
+  const ball = Array.from({ length: 5000 }, (_, index) => {
+    const [z, angle] = [1 - (2 * index + 1) / 5000, index * 2.399963];
+    return [Math.sqrt(1 - z * z) * Math.cos(angle), Math.sqrt(1 - z * z) * Math.sin(angle), z];
+  });
+  const { points } = fromAbove(shape, [0, 0, 0], [0, 0, 0, 1], { m: meshOf(ball) });
+  assert.ok(points.length > 10 && points.length < 400 && points.every((point) => Math.hypot(...point) > 0.95));
 });

@@ -1,0 +1,218 @@
+"""What the console keeps of a run that it looks at, so that a page that is opened later scrolls back.
+
+Numbers of frames, values of the status, figures of links and readings that were plotted: of each the last rows, some
+time apart, of at most so many bytes. Nobody is asked for anything because of it: it keeps what is heard anyway. Pure.
+Neighbours: `following` (which hears it), `curves` (the points behind what is kept).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Mapping
+from math import isnan
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from foosim.console.shown.curves import link_figure
+from foosim.console.shown.source import FIGURES, Curve, Link, Reading, Wanted
+from foosim.protocol.frame import Frame
+from foosim.protocol.layout import Layout
+
+WINDOW_NS: Final = 300_000_000_000
+"""How far back is kept at least, simulated time, where there is room."""
+APART_NS: Final = 100_000_000
+"""Between rows, simulated time, where there is room."""
+ROWS_MAX: Final = WINDOW_NS // APART_NS
+FRAMES_BYTES: Final = 16 * 1024 * 1024
+STATUSES_BYTES: Final = 8 * 1024 * 1024
+LINKS_BYTES: Final = 8 * 1024 * 1024
+READINGS_MAX: Final = 64
+"""Channels of which readings are kept: those that were heard last."""
+READINGS_BYTES: Final = 32 * 1024 * 1024 // READINGS_MAX
+ROW_BYTES: Final = 256
+"""Of a row beside its numbers."""
+
+Points = list[tuple[float, float]]
+Numbers = NDArray[np.floating[Any]]
+Row = tuple[int, Any, Numbers]
+"""The tick, what the numbers are, the numbers; none of them is where nothing was heard before the next row."""
+_HOLE: Final[Numbers] = np.empty(0)
+
+
+class Rows:
+    """The last rows of one kind."""
+
+    def __init__(self, bytes_max: int, dtype: DTypeLike = np.float64) -> None:
+        self._rows: deque[Row] = deque()
+        self._bytes_max, self._dtype = bytes_max, dtype
+        self._bytes = 0
+        self._is_interrupted = False
+
+    def interrupt(self) -> None:
+        """Have a hole before the next row."""
+        self._is_interrupted = bool(self._rows)
+
+    def is_due(self, tick: int, tick_ns: int, count: int) -> bool:
+        """Whether a row of so many numbers is to be kept at a tick. What is later is forgotten: time went back."""
+        while self._rows and self._rows[-1][0] > tick:
+            self._bytes -= _size(self._rows.pop())
+        if not self._rows:
+            return True
+        size = count * np.dtype(self._dtype).itemsize + ROW_BYTES
+        apart_ns = max(APART_NS, WINDOW_NS * size // self._bytes_max)
+        return (tick - self._rows[-1][0]) * tick_ns >= apart_ns
+
+    def keep(self, tick: int, what: Any, numbers: Any) -> None:
+        """Keep a row that is due."""
+        if self._is_interrupted and self._rows:
+            self._add((self._rows[-1][0] + 1, None, _HOLE))
+        self._is_interrupted = False
+        self._add((tick, what, np.array(numbers, self._dtype)))
+        while len(self._rows) > ROWS_MAX or self._bytes > self._bytes_max:
+            self._bytes -= _size(self._rows.popleft())
+
+    def _add(self, row: Row) -> None:
+        self._rows.append(row)
+        self._bytes += _size(row)
+
+    @property
+    def newest(self) -> Any:
+        """What the numbers of the newest row are, None without one."""
+        return self._rows[-1][1] if self._rows else None
+
+    def reader(self, place_in: Callable[[Any], int | None]) -> Callable[[], Points]:
+        """Return what makes the points of one of the numbers of the rows that there are, in any thread.
+
+        `place_in` gives its place from what the numbers of a row are. Not a number is the value of a hole.
+        """
+        rows = list(self._rows)
+        return lambda: [*_points(rows, place_in)]
+
+
+def _points(rows: list[Row], place_in: Callable[[Any], int | None]) -> Iterator[tuple[float, float]]:
+    what: Any = None
+    place: int | None = None
+    for tick, known, numbers in rows:
+        if numbers is _HOLE:
+            yield tick, np.nan
+            continue
+        if known is not what:
+            what, place = known, place_in(known)
+        if place is not None and place < len(numbers):
+            value = float(numbers[place])
+            if not isnan(value):  # as of a link that had no packet
+                yield tick, value
+
+
+def _size(row: Row) -> int:
+    return row[2].nbytes + ROW_BYTES
+
+
+class History:
+    """What is kept of one run."""
+
+    def __init__(self, tick_ns: int) -> None:
+        self._tick_ns = tick_ns
+        self._frames = Rows(FRAMES_BYTES, np.float32)
+        self._statuses = Rows(STATUSES_BYTES)
+        self._links = Rows(LINKS_BYTES)
+        self._readings: dict[Reading, Rows] = {}
+        self._watched: Collection[Reading] = ()
+
+    def listen(self, wanted: Wanted) -> None:
+        """Take note of what is heard from here on: frames while somebody looks, readings that somebody plots."""
+        if not (wanted.readers and wanted.hz):
+            self._frames.interrupt()
+        self._watched = wanted.readings  # further ones come as long as their lease lasts
+        for reading, rows in self._readings.items():
+            if reading not in wanted.readings:
+                rows.interrupt()
+
+    def keep_frame(self, frame: Frame) -> None:
+        """Keep the numbers of a frame."""
+        if self._frames.is_due(frame.tick, self._tick_ns, frame.layout.size):
+            self._frames.keep(frame.tick, frame.layout, frame.values)
+
+    def keep(self, message: Mapping[str, Any]) -> None:
+        """Keep what a message of `status`, `links` or `readings` says."""
+        kind = message["type"]
+        if kind == "status":
+            self._keep_status(message["status"])
+        elif kind == "links":
+            self._keep_links(message["at"], message["links"])
+        elif kind == "readings":
+            self._keep_readings((message["robot"], message["channel"]), message["points"])
+
+    def _keep_status(self, status: Mapping[str, Any]) -> None:
+        before: Mapping[str, int] = self._statuses.newest or {}
+        if self._statuses.is_due(status["ticks"], self._tick_ns, len(before)):
+            numbers = dict(_numbers(status, ""))
+            self._statuses.keep(status["ticks"], _places(before, numbers), [*numbers.values()])
+
+    def _keep_links(self, tick: int, links: list[Mapping[str, Any]]) -> None:
+        if not self._links.is_due(tick, self._tick_ns, len(links) * len(FIGURES)):
+            return
+        rows: dict[Link, list[Mapping[str, Any]]] = {}
+        for row in links:
+            rows.setdefault((row["from"], row["to"]), []).append(row)
+        numbers = [
+            found[0][figure] if len(found) == 1 else link_figure(found, figure)
+            for found in rows.values()
+            for figure in FIGURES
+        ]
+        self._links.keep(tick, _places(self._links.newest or {}, rows), numbers)
+
+    def _keep_readings(self, reading: Reading, points: list[tuple[int, list[float]]]) -> None:
+        if reading not in self._watched:
+            return
+        rows = self._readings.pop(reading, None) or Rows(READINGS_BYTES)
+        self._readings[reading] = rows  # the one that was heard last
+        if len(self._readings) > READINGS_MAX:
+            del self._readings[next(iter(self._readings))]
+        for tick, numbers in points:
+            if rows.is_due(tick, self._tick_ns, len(numbers)):
+                rows.keep(tick, reading, numbers)
+
+    def reader(self, curve: Curve, layout: Layout) -> Callable[[], Points]:
+        """Return what makes the points of a curve, of which a number of the frame is one of this layout."""
+        if curve.field is not None:
+            return self._frames.reader(_place_in_layout(layout, curve.field))
+        if curve.status:
+            return self._statuses.reader(lambda places: places.get(curve.status))
+        if curve.link is not None:
+            link, figure = curve.link, FIGURES.index(curve.figure)
+            return self._links.reader(
+                lambda places: places[link] * len(FIGURES) + figure if link in places else None
+            )
+        rows = None if curve.reading is None else self._readings.get(curve.reading)
+        return list if rows is None else rows.reader(lambda reading: curve.index)
+
+
+def _numbers(content: Mapping[str, Any], stem: str) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a status by their path; lists are left out."""
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            yield from _numbers(value, f"{stem}{key}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield f"{stem}{key}", value
+
+
+def _places(before: Mapping[Any, int], names: Mapping[Any, Any]) -> Mapping[Any, int]:
+    """Return the places of names; the mapping of before where it has the same ones in the same order."""
+    return before if [*before] == [*names] else {name: place for place, name in enumerate(names)}
+
+
+def _place_in_layout(layout: Layout, field: int) -> Callable[[Layout], int | None]:
+    """Return what gives the place that a number of a layout has in another one; None where that has not got it."""
+    entity = next((entity for entity in layout.entities if entity.start <= field < entity.stop), None)
+    if entity is None:
+        return lambda other: None
+    name, start = max(((name, at) for name, at in entity.offsets.items() if at <= field), key=lambda found: found[1])
+
+    def place(other: Layout) -> int | None:
+        known = other[entity.name].offsets.get(name) if entity.name in other else None
+        return None if known is None else known + field - start
+
+    return place

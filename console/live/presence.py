@@ -1,0 +1,46 @@
+"""Whether a run is there, as pages say it: here, away (its supervisor is looked for), or ended, how, with its capture.
+
+How it ended is in its folder, where its supervisor writes the result and `up` what it knows better. Neighbours:
+`live_source` tells it, `supervisor.outcome` has the result with the capture.
+"""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+from foosim.supervisor.outcome import ended_outcome
+from foosim.supervisor.run_folder import RunFolder
+from foosim.vhub.capture_parts import is_complete
+
+HERE = {"type": "presence", "state": "here", "text": ""}
+
+
+def away(text: str) -> dict[str, Any]:
+    """Return the message about a run whose supervisor is not reached, which is looked for."""
+    return {"type": "presence", "state": "away", "text": text}
+
+
+def how_ended(folder: RunFolder, stopped_by: str) -> dict[str, Any] | None:
+    """Return the message about a run that has a result; None for one that has not ended, or may be resumed.
+
+    `stopped_by` names who asked for the end, where that is known.
+    """
+    if folder.result() is None:
+        return None
+    result = ended_outcome(folder).result
+    reason, failed, capture = result["reason"], bool(result["failed"]), result["capture"]
+    if stopped_by and reason == "stopped":
+        reason = f"stopped by {stopped_by}"
+    command = "" if capture is None else f"foosim-replay view {shlex.quote(capture)}"
+    said = f"The run has {'failed' if failed else 'ended'} at tick {result['ticks']}: {reason}. "
+    if capture is None:
+        said += "It has no capture."
+    else:
+        state = "" if is_complete(Path(capture)) else " (unfinished)"
+        said += f"Its capture is {capture}{state}; this shows it: {command}"
+    return {
+        "type": "presence", "state": "ended", "failed": failed, "reason": reason, "capture": capture,
+        "command": command, "text": said,
+    }  # fmt: skip

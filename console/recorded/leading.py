@@ -1,0 +1,119 @@
+"""A source that has a clock of its own, a live run or a replay that somebody plays, and that another source follows.
+
+All that it tells is passed on; its moments are the clock, and say where its entities are. Pure.
+Neighbours: `deck` (the clock of recordings), `comparing` (the distance to what follows), `second` (opens that).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from foosim.console.recorded.deck import Clock
+from foosim.console.shown.compare import Positions
+from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Source, Wanted
+
+
+class HeardClock(Clock):
+    """The time of the moment that was heard last; before the first one it stands at 0."""
+
+    def __init__(self, tick_ns: int, clock_ns: Callable[[], int]) -> None:
+        super().__init__(tick_ns, clock_ns)
+        self._time_ns, self._jumps, self._paused = 0, 0, True
+
+    def heard(self, moment: Moment) -> None:
+        """Take the time of a moment."""
+        self._time_ns, self._paused = round(moment.tick * self.tick_ns), moment.paused
+        self._jumps += moment.jump
+        self.changed()
+
+    @property
+    def jumps(self) -> int:
+        return self._jumps
+
+    @property
+    def paused(self) -> bool:
+        return self._paused
+
+    def time_ns(self) -> int:
+        return self._time_ns
+
+    def wall_ns(self, time_ns: int) -> int | None:
+        return None
+
+    def account(self) -> dict[str, Any]:
+        return {"state": "paused" if self._paused else "running"}
+
+
+class Leader:
+    """A source that passes on what another one tells, and gives the time to who follows."""
+
+    def __init__(self, source: Source, tick_ns: int, clock_ns: Callable[[], int]) -> None:
+        """`tick_ns` is known before the source tells it. `clock_ns` is a monotonic wall clock."""
+        self.source = source
+        self.clock = HeardClock(tick_ns, clock_ns)
+        self.gaps = 0
+        """How often moments were not heard, or not in their order: nobody looked, or time jumped."""
+        self._is_looked_at = False
+        self._places: dict[str, int] = {}
+        """The rows of poses by the names of links, and by those of entities, whose last link it is."""
+        self._moment: Moment | None = None
+
+    @property
+    def about(self) -> About:
+        return self.source.about
+
+    async def run(self, feed: Feed) -> None:
+        await self.source.run(_Overheard(self, feed))
+
+    def want(self, wanted: Wanted) -> None:
+        self.gaps += not (self._is_looked_at and wanted.readers)
+        self._is_looked_at = wanted.readers > 0
+        self.source.want(wanted)
+
+    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        return await self.source.ask(verb, arguments, who)
+
+    async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
+        return await self.source.history(curve)
+
+    def described(self, about: About, scene: Mapping[str, Any]) -> None:
+        """Take the scene, in whose order poses come, and the length of a tick."""
+        self.clock.tick_ns = about.tick_ns
+        links = [link["name"] for link in scene["links"]]
+        self._places = {name: row for row, name in enumerate(links)}
+        self._places |= {body["name"]: body["links"][-1] for body in scene["bodies"] if body["links"]}
+        self._moment = None
+
+    def shown(self, moment: Moment) -> None:
+        """Take a moment."""
+        self.gaps += moment.jump
+        self._moment = moment
+        self.clock.heard(moment)
+
+    def seen(self) -> tuple[int, Positions] | None:
+        """Return time, ns, and poses of the newest moment; None before there is one."""
+        moment = self._moment
+        if moment is None:
+            return None
+        rows = moment.poses.tolist()
+        poses = {name: (tuple(rows[row][:3]), tuple(rows[row][3:])) for name, row in self._places.items()}
+        return self.clock.time_ns(), poses
+
+
+class _Overheard:
+    """A feed that tells the leader what it passes on, after it has: who follows is told later."""
+
+    def __init__(self, leader: Leader, feed: Feed) -> None:
+        self._leader, self._feed = leader, feed
+
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
+        self._feed.describe(about, scene)
+        self._leader.described(about, scene)
+
+    def show(self, moment: Moment) -> None:
+        self._feed.show(moment)
+        self._leader.shown(moment)
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        self._feed.tell(message)

@@ -1,0 +1,92 @@
+"""What follows a first source: another capture or a table of poses, on its clock, with the distance to it.
+
+Neighbours: `leading` (a first source with a clock of its own), `capture_source`, `poses_source`; `console.main` and
+`rehearsal.view_command` open it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from foosim.console.recorded.capture_source import FileSource, Recompute
+from foosim.console.recorded.leading import Leader
+from foosim.console.recorded.poses_source import PosesSource
+from foosim.protocol.deployment import Deployment
+from foosim.protocol.errors import BadValue, read_at, show
+from foosim.protocol.layout import build_layout
+from foosim.protocol.scenes import build_scene
+from foosim.protocol.units import parse_offset_ns
+
+SecondOption = Annotated[
+    Path | None,
+    typer.Option(metavar="CAPTURE|CSV", help="Another one on the same clock, beside it or as a ghost in it."),
+]
+OffsetOption = Annotated[
+    str | None,
+    typer.Option(help="The time of --second at which the first one has time 0, e.g. 2.5s or -1s."),
+]
+TABLE: Final = ".csv"
+"""How the name of a table of poses ends; all else is a capture."""
+NAMES_TOLD: Final = 8
+Recomputing = Callable[[Path], Recompute]
+"""Makes what computes the frames between the captured ones of a capture."""
+
+
+def read_offset(second: Path | None, offset: str | None) -> int:
+    """Return the offset in ns that an option says, 0 without one. Raises BadValue."""
+    if offset is not None and second is None:
+        raise BadValue("--offset needs --second")
+    return 0 if offset is None else read_at("--offset", parse_offset_ns, offset)
+
+
+def is_table(file: Path) -> bool:
+    """Whether a file is a table of poses."""
+    return file.suffix.lower() == TABLE
+
+
+def open_follower(
+    path: Path,
+    leader: Leader,
+    deployment: Deployment,
+    offset_ns: int = 0,
+    recomputing: Recomputing | None = None,
+    added: Iterable[tuple[str, str]] = (),
+) -> tuple[FileSource | PosesSource, list[str]]:
+    """Return the source of a file that follows one with a clock of its own, and the names that both have.
+
+    `deployment` and what was `added` to it (name, model) are the first source's. Raises CaptureError, BadPoses, and
+    BadValue for a file that has nothing of the first source.
+    """
+    scene = build_scene(deployment, build_layout(deployment, added))
+    ours = {*scene.bodies}
+    second: FileSource | PosesSource
+    if is_table(path):
+        second = table = PosesSource(path, leader.clock, offset_ns, deployment, leader)
+        theirs = {*table.tracks}
+        ours |= {link.name for body in scene.bodies.values() for link in body.links}
+    else:
+        recompute = None if recomputing is None else recomputing(path)
+        second = capture = FileSource(path, leader.clock, offset_ns, recompute, leader)
+        theirs = {name for world in capture.recording.worlds for name in world.entities}
+    both = sorted(ours & theirs)
+    if not both:
+        raise BadValue(
+            f"--second has nothing that the {deployment.world} has, {_some(scene.bodies)}; it has {_some(theirs)}",
+            str(path),
+        )
+    return second, both
+
+
+def compared_text(path: Path, both: Collection[str]) -> str:
+    """Return the line that says what is compared."""
+    return f"second: {path.name}, compared by {_some(both)}"
+
+
+def _some(names: Collection[str]) -> str:
+    """Return names, the first of them where there are many."""
+    shown = [show(name)[1:-1] for name in sorted(names)[:NAMES_TOLD]]
+    return f"{', '.join(shown)} and {len(names) - NAMES_TOLD} more" if len(names) > NAMES_TOLD else ", ".join(shown)

@@ -1,0 +1,43 @@
+"""The options of `up` for a page: which of them go together, and what the console is started with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foosim.protocol.errors import BadValue
+from foosim.supervisor.console_child import Page, page_of
+
+
+def test_a_page_has_a_recording_beside_it_whose_path_holds_in_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    second = Path("walk.csv")
+    second.touch()
+    page = page_of(True, False, second, "-1.5s", False)
+    assert page == Page(False, second, "-1.5s")
+    assert page.options() == ["--second", str(tmp_path / "walk.csv"), "--offset=-1.5s"]
+    opened = page_of(False, True, None, None, False)
+    assert opened is not None and opened.options() == ["--open"]
+    assert page_of(False, False, None, None, True) is None
+
+
+@pytest.mark.parametrize(
+    ("console", "second", "offset", "detached", "said"),
+    [
+        (False, "x.csv", None, False, "--second goes with --console, 'x.csv'"),
+        (False, None, "1s", False, "--offset goes with --console, '1s'"),
+        (True, None, None, True, "--console and --detach exclude each other"),
+        (True, None, "1s", False, "--offset needs --second, '1s'"),
+        (True, __file__, "soon", False, "--offset: not a time"),
+        (True, "absent.csv", None, False, "--second: no such file, 'absent.csv'"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(
+    console: bool, second: str | None, offset: str | None, detached: bool, said: str
+) -> None:
+    with pytest.raises(BadValue) as refused:
+        page_of(console, False, None if second is None else Path(second), offset, detached)
+    assert str(refused.value).startswith(said)
