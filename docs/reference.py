@@ -87,16 +87,20 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
         "their own loop; one that stood still for longer says so, and takes no closed connection for a loss",
     ),
     ("protocol.orphan", "UNKNOWN_NS"): ("nodes, vHub", "a supervisor that went before it told the deployment"),
-    ("supervisor.watch", "DOUBT_NS"): (
+    ("supervisor.progress", "DOUBT_NS"): (
         "supervisor",
         "connections that close behind a standstill of its own: their processes have `heartbeat` to be heard again",
     ),
-    ("supervisor.watch", "CUT_SEEN_NS"): (
+    ("supervisor.progress", "CUT_SEEN_NS"): (
         "supervisor",
         "the end of the vHub's connection, before nodes are lost whose samples it lacks though they have sent them",
     ),
-    ("supervisor.absence", "SAID_NS"): ("supervisor", "what a process said before its connection closed"),
-    ("supervisor.take_over", "REJOIN_NS"): (
+    ("supervisor.roster", "IN_FLIGHT_NS"): ("supervisor", "the last messages of a process whose connection has closed"),
+    ("supervisor.roster", "SILENT_NS"): (
+        "supervisor",
+        "a sign of life; until then the hello of a successor is refused, afterwards it waits for the connection's end",
+    ),
+    ("supervisor.failover", "REJOIN_NS"): (
         "supervisor",
         "nodes that have to find one that was started again, beside `heartbeat`; then it goes on without them",
     ),

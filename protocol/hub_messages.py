@@ -1,6 +1,6 @@
 """The messages by which a vHub that was started again and the supervisor agree on where the run stands.
 
-Neighbours: `messages` has what they share, `supervisor.branches` decides, `vhub.core` waits for that.
+Neighbours: `messages` has what they share, `supervisor.failover` decides, `vhub.core` waits for that.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from foosim.protocol.deployment import Deployment
 from foosim.protocol.frame import Frame
 from foosim.protocol.layout import Layout
 from foosim.protocol.network import EVENTS_MAX
-from foosim.supervisor.requests import ANSWERS_KEPT
+from foosim.supervisor.records import ANSWERS_KEPT
 from foosim.vhub.geometry import PAIRS_KEPT, Sight
 from foosim.vhub.memory import AirState, LinkState, RadioState
 from foosim.vhub.propagation import LOSS_MAX_DB
@@ -27,9 +27,9 @@ from foosim.vhub.radio.shadowing import CELLS_KEPT
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {
     "Held._messages": limits.HELD_MESSAGES_MAX,
-    "Requests._answers": ANSWERS_KEPT,
-    "Issued.by_tick": limits.EDITED_TICKS_KEPT,
-    "Recovery.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
+    "RunState.answers": ANSWERS_KEPT,
+    "EditLog.by_tick": limits.EDITED_TICKS_KEPT,
+    "RunState.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in its result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 13,
     "_Memory._newer": PAIRS_KEPT,

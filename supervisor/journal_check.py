@@ -15,7 +15,7 @@ from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.journal import journal_files, read_journal, read_newest, read_whole
 from foosim.protocol.messages import Commit
 from foosim.supervisor.leftovers import captured_at
-from foosim.supervisor.records import CommitRecord, HeadRecord, Record
+from foosim.supervisor.records import Checkpoint, CommitRecord, Record
 from foosim.supervisor.run_folder import RunFolder
 from foosim.supervisor.run_options import RunOptions
 from foosim.vhub.branching import branch_command
@@ -70,7 +70,7 @@ def _last_commit(records: list[bytes]) -> int:
     """Return the tick of the last commit, -1 when there is none."""
     for raw in reversed(records):
         record = decode_any(Record, raw)
-        commits = record.commits if isinstance(record, HeadRecord) else []
+        commits = record.commits if isinstance(record, Checkpoint) else []
         if isinstance(record, CommitRecord):
             commits = [record.commit]
         if commits:

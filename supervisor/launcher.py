@@ -24,9 +24,9 @@ from typing import Final
 from foosim.protocol.errors import Failed
 from foosim.protocol.process import STACK_SIGNAL
 from foosim.supervisor.children import GRACE_S, child_environment, script
-from foosim.supervisor.ending import Ending
 from foosim.supervisor.memory import OomKills, oom_kills
 from foosim.supervisor.remote import Remote
+from foosim.supervisor.restarts import Ending
 
 POLL_S: Final = 0.02
 PLAYER: Final = "foosim-player"

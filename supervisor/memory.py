@@ -2,7 +2,7 @@
 
 A process that the kernel kills says nothing, and ends as by anybody's SIGKILL. Only counters tell: of its control group
 (version 2), and of the machine, where others may have been killed as well. The kernel's log names processes, and is for
-administrators. Neighbours: `launcher` compares them, `ending` has the words.
+administrators. Neighbours: `launcher` compares them, `restarts` has the words.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Where a run is captured: a file that is not there yet, in a folder that takes files, on a disk with room.
 
-Neighbours: `cli` asks, `doctor`, `up`; `vhub.room_watch` and `journal_room` look after the room while the run lasts.
+Neighbours: `cli` asks, `doctor`, `up`; `vhub.room_watch` and `main` look after the room while the run lasts.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Order k is the permission to compute tick k. It is released once tick k - W is committed; in realtime also not before
 wall time k T (scaled by the factor), so that no command waits behind ticks that ran ahead of the clock; while paused,
-not at all, but for the ticks that `step` granted. Neighbours: `core` publishes the orders.
+not at all, but for the ticks that `step` granted.
 """
 
 from __future__ import annotations
@@ -88,8 +88,8 @@ class Pacer:
         self.granted = max(self.granted, next_tick) + count if self.paused else next_tick + count
         self.paused = True
 
-    def set_back(self, ticks: int, tick: int, now_ns: int) -> None:
-        """The run goes on from an earlier tick, so many before: now, and while paused no further than it was to go."""
+    def roll_back(self, ticks: int, tick: int, now_ns: int) -> None:
+        """Continue from an earlier tick, `ticks` before; while paused, grant no later tick than before."""
         if self.paused:
             self.granted = max(tick, self.granted - ticks)
         self.start(now_ns, tick)

@@ -113,7 +113,6 @@ SHELLS = {
     "supervisor/doctor_hosts.py",
     "supervisor/doctor_there.py",
     "supervisor/reach.py",
-    "supervisor/journal_room.py",
     "supervisor/launcher.py",
     "supervisor/journal_check.py",
     "supervisor/leftovers.py",

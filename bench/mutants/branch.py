@@ -13,8 +13,8 @@ from bench.mutants.planting import Mutant, Planting, Register
 from foosim.client.core import ClientCore
 from foosim.node.inputs import Inputs
 from foosim.protocol.hub_messages import Proceed
-from foosim.supervisor.branches import Branches
-from foosim.supervisor.requests import Requests
+from foosim.supervisor.failover import Rollback
+from foosim.supervisor.state import RunState
 from foosim.vhub.core import HubCore
 
 register = Register()
@@ -41,12 +41,12 @@ def _takes(planting: Planting) -> None:
 
 @register("supervisor begins no branch", "what the vHub has lost with its machine is void", 3)
 def _none(planting: Planting) -> None:
-    planting.swap(Branches, "is_behind", lambda self, standing: False)
+    planting.swap(Rollback, "is_behind", lambda self, standing: False)
 
 
 @register("a branch forgets what was asked for", "requests keep their ticks in a branch", 3)
 def _forgets(planting: Planting) -> None:
-    planting.swap(Requests, "set_back", lambda self, tick: self._edits.clear())
+    planting.swap(RunState, "reorder_from", lambda self, tick: self.coming_edits.clear())
 
 
 @register("vHub does not wait", "a vHub that goes on from a journal closes nothing until it may", 3)

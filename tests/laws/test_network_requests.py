@@ -96,7 +96,7 @@ def ordering(ticks: Sequence[int]) -> Callable[[System], None]:
 
     def order(system: System) -> None:
         for tick, (_, event) in zip(ticks, EVENTS, strict=True):
-            system.supervisor.requests.order(tick - 1, [Disrupt(encode_json(event).decode())])
+            system.supervisor.state.order(tick - 1, [Disrupt(encode_json(event).decode())])
 
     return lambda system: system.at_tick(1, lambda: order(system))
 

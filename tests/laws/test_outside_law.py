@@ -128,10 +128,10 @@ def test_a_flood_is_refused_to_the_last_message(disturbed: Disturbed) -> None:
 
 def lies_to_nodes(system: System) -> list[Lie]:
     core = system.supervisor
-    tick, epoch, frame = core.frame.tick, core.epoch, core.frame
+    tick, epoch, frame = core.state.frame.tick, core.state.epoch, core.state.frame
     part = Part(epoch, tick + 1, "n2", bytes(32), [], b"", b"", [])
     push: list[Edit] = [Push("ball", (1.0, 0.0, 0.0))]
-    owners = sorted(core.owners.items())
+    owners = sorted(core.state.owners.items())
     new = Epoch(epoch + 9, tick, frame.digest, ["n1", "n2"], owners, [], b"")
     said: list[tuple[Channel, str, msgspec.Struct]] = [
         (channels.PART, "n2", replace(part, node="n1")),
@@ -166,10 +166,10 @@ def lies_to_nodes(system: System) -> list[Lie]:
 
 def lies_to_the_hub(system: System) -> list[Lie]:
     core = system.supervisor
-    tick, epoch, frame = core.frame.tick, core.epoch, core.frame
+    tick, epoch, frame = core.state.frame.tick, core.state.epoch, core.state.frame
     commit = Commit(epoch, FAR, frame.digest, frame.values.tobytes(), [], [], True)
     sample = RobotPacket("camera", 0, "", "ball", b"lie")
-    samples = Samples(tick + 1, bytes(32), "n1", list(core.owners), [sample])
+    samples = Samples(tick + 1, bytes(32), "n1", list(core.state.owners), [sample])
     command = Sent(10**9, "red.goal", "position", 0, COMMAND)
     said: list[tuple[Channel, str, msgspec.Struct]] = [
         (channels.COMMIT, VHUB, commit),
@@ -199,7 +199,7 @@ def lies_to_the_hub(system: System) -> list[Lie]:
 
 
 def lies_to_the_supervisor(system: System) -> list[Lie]:
-    tick, epoch = system.supervisor.frame.tick, system.supervisor.epoch
+    tick, epoch = system.supervisor.state.frame.tick, system.supervisor.state.epoch
     part = Part(epoch, tick + 1, "n1", bytes(32), [], b"", b"", [])
     hello = Hello("node", "n1", "other", limits.PROTOCOL_VERSION, "", bytes(32))
     beat = Heartbeat("n1", FAR, FAR, "", "player-red", float("nan"), b"{}")

@@ -14,7 +14,6 @@ from foosim.protocol.frame import Frame
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.status import result, status
 from foosim.vhub.core import HubCore
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -24,9 +23,7 @@ S: Final = 1_000_000_000
 class Slow:
     """A vHub that takes long to close its capture: rows are written until `stalls_s`, and all are after `takes_s`."""
 
-    def __init__(
-        self, takes_s: float, stalls_s: float = 1e9, capture: str = "run.mcap", syncs_s: float = 0.0
-    ) -> None:
+    def __init__(self, takes_s: float, stalls_s: float = 1e9, capture: str = "run.mcap", syncs_s: float = 0.0) -> None:
         self.syncs_ns = int(syncs_s * S)
         """Until then the disk writes."""
         self.takes_ns, self.stalls_ns, self.capture = int(takes_s * S), int(stalls_s * S), capture
@@ -46,7 +43,7 @@ class Slow:
         hub.shell.recording = {"state": "closing", "problem": "", "written": min(passed_ns, self.stalls_ns) // (S // 2)}
         hub.shell.disk_progress = min(passed_ns, self.syncs_ns) // (S // 2)
         self.waited |= {hub.waiting_for}
-        told = status(self.system.supervisor, 0)
+        told = self.system.supervisor.status(0)
         self.seen.append({"written": told["recording"]["written"], "waits": told["processes"][VHUB]["waiting_for"]})
         return passed_ns >= self.takes_ns
 
@@ -57,7 +54,7 @@ class Slow:
         settings = Settings(closing=self, on_commit=self.committed)
         rehearse(TABLE.read_text(), TABLE.name, ticks, 1, ["engine=pure"], settings, pace=pace, prepare=prepare)
         self.took_s = (self.system.bus.now_ns - self.ended_ns) / S
-        return result(self.system.supervisor)
+        return self.system.supervisor.result()
 
 
 def test_as_long_as_there_is_progress_it_is_waited_for_and_shown() -> None:

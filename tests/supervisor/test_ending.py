@@ -9,9 +9,9 @@ from typing import Any, Final
 import pytest
 
 from foosim.supervisor import launcher, memory
-from foosim.supervisor.ending import Ending
 from foosim.supervisor.launcher import Child
 from foosim.supervisor.memory import OomKills, oom_kills
+from foosim.supervisor.restarts import Ending
 
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
 

@@ -120,7 +120,7 @@ def test_there_are_so_many_events_and_no_more() -> None:
 
     def prepare(system: System) -> None:
         def ask() -> None:
-            system.supervisor.requests.disruptions = EVENTS_MAX
+            system.supervisor.state.disruptions = EVENTS_MAX
             refused.append(system.request("network", event={"heal": "all"}))
 
         system.at_tick(10, ask)

@@ -11,7 +11,7 @@ from foosim.protocol.actions import Action, Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.hub_messages import Proceed, Standing
 from foosim.protocol.messages import Build, ClientHello, Deliveries, Done, Epoch, Want
-from foosim.supervisor.arrivals import Arrivals
+from foosim.supervisor.state import InputBuffer
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import RecordClosing, RecordEpoch
 from foosim.vhub.records import HeadRecord, HubRecord
@@ -160,10 +160,10 @@ def test_a_branch_from_before_what_is_closed_is_refused() -> None:
 
 @pytest.mark.parametrize("branch", [0, 3])
 def test_deliveries_count_in_their_branch(branch: int) -> None:
-    arrivals = Arrivals()
-    arrivals.stand_at(5, branch)
+    inputs = InputBuffer()
+    inputs.reset(5, branch)
     other = Deliveries(5, [], 2, 3 - branch)
-    assert not arrivals.take_deliveries(other, encode(other), 5) and arrivals.delivered == 4
+    assert not inputs.take_deliveries(other, encode(other), 5) and inputs.delivered == 4
     own = Deliveries(5, [], 2, branch)
-    assert arrivals.take_deliveries(own, encode(own), 5) and arrivals.delivered == 7
-    assert decode(Deliveries, arrivals.deliveries[7]) == Deliveries(7, [], 0, branch)
+    assert inputs.take_deliveries(own, encode(own), 5) and inputs.delivered == 7
+    assert decode(Deliveries, inputs.deliveries[7]) == Deliveries(7, [], 0, branch)

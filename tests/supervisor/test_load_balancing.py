@@ -9,7 +9,7 @@ import pytest
 from foosim.protocol.units import Pace
 from foosim.rehearsal.rehearse import rehearse
 from foosim.rehearsal.system import Settings, System
-from foosim.supervisor.balance import EVERY_NS, SETTLE_NS, STAY_NS, Balancer, Shift, shifts_at_once
+from foosim.supervisor.load_balancing import EVERY_NS, SETTLE_NS, STAY_NS, Balancer, Shift, shifts_at_once
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 OWNERS = {"a": "n1", "b": "n1", "c": "n1", "d": "n2"}
@@ -67,7 +67,7 @@ def test_a_run_that_is_balanced_is_the_same_world() -> None:
             system.processes[name].core.busy = load
 
     def prepare(system: System) -> None:
-        system.supervisor.balancer = Balancer(system.supervisor.deployment.owners())
+        system.supervisor.balancer = Balancer(system.supervisor.state.deployment.owners())
         system.at_tick(5, lambda: busy(system))
 
     text, sets, pace = TABLE.read_text(), ["engine=pure"], Pace("realtime")

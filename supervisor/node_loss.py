@@ -1,0 +1,170 @@
+"""Loss, stop and return of nodes: the epoch that follows, and who owns which robot in it.
+
+A run that loses a node goes on from its last commit with a new epoch (design, section 5). The members that are left
+adopt the robots of the lost node and give them back when it returns. Without any node the world stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+
+from foosim.protocol.edits import Edit, Freeze, Thaw
+from foosim.supervisor.roster import IN_FLIGHT_NS, Process, refuse
+from foosim.supervisor.state import RunState
+
+
+class NodeLoss:
+    """Reassigns robots when a node is lost, stopped, or joins."""
+
+    def __init__(
+        self,
+        state: RunState,
+        open_epoch: Callable[[dict[str, str], int, Iterable[str]], None],
+        layout_ready: Callable[[int], None],
+        finish: Callable[[str], None],
+    ) -> None:
+        """`open_epoch` opens one for owners, the time and members, `layout_ready` orders changes of the layout that
+        waited for a node's engine, `finish` ends the run as failed."""
+        self._state = state
+        self._open_epoch = open_epoch
+        self._layout_ready = layout_ready
+        self._finish = finish
+
+    def lose(self, name: str, reason: str, now_ns: int) -> None:
+        """A node is lost: go on without it, or end the run where the deployment says so."""
+        state = self._state
+        process = state.roster.by_name.get(name)
+        if process is not None:
+            state.roster.lose(process)
+        if not state.is_open:
+            state.log("warning", f"lost node {name}: {reason}; the run waits for it")
+            return
+        if self._ends_run(name):
+            self._finish(f"lost {name}: {reason}")
+            return
+        if name not in state.members:
+            return
+        members = [member for member in state.members if member != name]
+        state.note_recovery("node", name, reason)
+        if members:
+            self._freeze(name)
+            self.open(self.adopted([name], members), members, now_ns)
+            state.log("warning", f"lost node {name}: {reason}; goes on from tick {state.frame.tick} without it")
+        else:
+            state.hold()
+            state.log("error", f"lost node {name}: {reason}; no node is left, the run waits for one")
+
+    def begin(self, here: Collection[str], missing: Collection[str], now_ns: int) -> None:
+        """Begin a resumed run with the nodes that are here; the missing ones are lost."""
+        state = self._state
+        for name in missing:
+            reason = "it has not come back to the supervisor"
+            if self._ends_run(name):
+                self._finish(f"lost {name}: {reason}")
+                return
+            state.note_recovery("node", name, reason)
+            self._freeze(name)
+        if here:
+            self.open(self.adopted({*state.owners.values()} - {*here}, here), here, now_ns)
+        else:
+            state.hold()
+
+    def stop(self, name: str, now_ns: int) -> None:
+        """Stop a node by request: its robots move to the other members first."""
+        state = self._state
+        if name in state.members:
+            members = [member for member in state.members if member != name]
+            self.open(self.adopted([name], members), members, now_ns)
+        process = state.roster.by_name.get(name)
+        if process is not None:
+            state.roster.lose(process)
+            state.actions += refuse(process.role, name, process.boot, "stopped by request")
+
+    def join(self, process: Process, now_ns: int) -> None:
+        """Let a node that has built the world take part from the last commit on, with the robots that were its own."""
+        state, name = self._state, process.name
+        owners = dict(state.owners)
+        if not state.members:  # it adopts the robots of all others until they return
+            state.returns = {**owners, **state.returns}
+            owners = dict.fromkeys(owners, name)
+        owners.update((robot, name) for robot, node in state.returns.items() if node == name)
+        away = {robot: node for robot, node in state.returns.items() if node != name}
+        state.note_recovery("join", name, "back" if self._was_lost(name) else "started")
+        if self._freezes:
+            frozen: list[Edit] = [Freeze(robot) for robot in sorted(away)]
+            state.order(state.frame.tick, [] if state.members else frozen)
+            back = [robot for robot in sorted(owners) if owners[robot] == name and robot not in away]
+            state.order(state.released, [Thaw(robot) for robot in back])
+        self.open(owners, [*state.members, name], now_ns)
+        state.returns = away
+        state.journal(state.control())
+        state.log("info", f"node {name} takes part from tick {state.frame.tick}")
+
+    def on_heartbeat(self, process: Process, now_ns: int) -> None:
+        """A lost node sends heartbeats. An epoch without it tells it so, but there is none when it was the last member.
+
+        Then it joins again, if it had built the world and its arithmetic was compared.
+        """
+        state = self._state
+        if not state.is_open and now_ns > process.gone_ns + IN_FLIGHT_NS:
+            process.lost = False  # its connection was cut; it repeats that it is ready until it gets an epoch
+        runs = state.is_open and state.end is None
+        if runs and not state.members and process.ready and process.name not in state.roster.stopped:
+            process.lost = False
+            self.join(process, now_ns)
+
+    def moved(self, robot: str) -> None:
+        """An operator chose the owner of a robot: it does not go back to another node, and runs."""
+        state = self._state
+        if state.returns.pop(robot, None) is not None and self._freezes:
+            state.order(state.released, [Thaw(robot)])
+
+    def open(self, owners: dict[str, str], members: Collection[str], now_ns: int) -> None:
+        """Open an epoch.
+
+        The robots that go back later are journalled before it, so that a crash in between forgets none; the caller
+        strikes off those that are back in it afterwards.
+        """
+        state = self._state
+        state.account.moves += sum(state.owners[robot] != owner for robot, owner in owners.items())
+        state.journal(state.control())
+        self._open_epoch(owners, now_ns, members)
+        self._layout_ready(now_ns)
+
+    def adopted(self, lost: Collection[str], members: Collection[str]) -> dict[str, str]:
+        """Return the owners without some nodes: each of their robots goes to the member that then has the fewest, ties
+        by name. The state keeps to which node each of them goes back."""
+        owners = dict(self._state.owners)
+        for robot in sorted(owners):
+            if owners[robot] in lost:
+                self._state.returns.setdefault(robot, owners[robot])
+                owners[robot] = fewest(owners, members)
+        return owners
+
+    @property
+    def _freezes(self) -> bool:
+        return self._state.deployment.on_node_loss == "freeze"
+
+    def _ends_run(self, name: str) -> bool:
+        """Whether the run cannot go on without a node."""
+        deployment = self._state.deployment
+        return deployment.nodes[name].required or deployment.on_node_loss == "stop"
+
+    def _was_lost(self, name: str) -> bool:
+        return any(entry.what == "node" and entry.name == name for entry in self._state.recovered)
+
+    def _freeze(self, lost: str) -> None:
+        """Where the deployment says so, take the robots of a lost node out of service from the last commit on."""
+        state = self._state
+        if self._freezes:
+            frozen: list[Edit] = [Freeze(robot) for robot, owner in sorted(state.owners.items()) if owner == lost]
+            state.order(state.frame.tick, frozen)
+
+
+def fewest(owners: Mapping[str, str], members: Collection[str]) -> str:
+    """Return the member that owns the fewest robots, the first by name among equals."""
+    count = dict.fromkeys(sorted(members), 0)
+    for owner in owners.values():
+        if owner in count:
+            count[owner] += 1
+    return min(count, key=lambda name: (count[name], name))
