@@ -23,7 +23,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.deployment_file import apply_sets, load_deployment
 from foosim.protocol.frame import Frame
-from foosim.protocol.hub_messages import Proceed
+from foosim.protocol.hub_messages import ResumeGrant
 from foosim.protocol.layout import build_layout
 from foosim.protocol.messages import (
     Build,
@@ -177,7 +177,7 @@ class Talk:
         build = Build(VHUB, core.member.boot, "first", RUN, TABLE.name, self._text, "fast", [])
         self._say(channels.BUILD, VHUB, encode(build))
         core.begin(self._journal.past(core, RUN), 0)
-        self._say(channels.PROCEED, VHUB, encode(Proceed(VHUB, core.member.boot, 0)))
+        self._say(channels.RESUME_GRANT, VHUB, encode(ResumeGrant(VHUB, core.member.boot, 0)))
         self._perform()
         for name in (*self._clients, EAR):
             self._come(name, self.count.crashes)

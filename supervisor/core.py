@@ -21,7 +21,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.edits import Edit, layout_after
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, chain_next
-from foosim.protocol.hub_messages import Standing
+from foosim.protocol.hub_messages import ResumeState
 from foosim.protocol.messages import (
     Commit,
     Deliveries,
@@ -94,7 +94,7 @@ class SupervisorCore:
             Hello: self.handshake.on_hello,
             Fetch: self.handshake.on_fetch,
             Ready: self._on_ready,
-            Standing: self._on_standing,
+            ResumeState: self._on_standing,
             Heartbeat: self._on_heartbeat,
             Part: self._on_part,
             Deliveries: self._on_deliveries,
@@ -496,11 +496,11 @@ class SupervisorCore:
         for tick in range(deliveries.tick, deliveries.last + 1):
             self.progress.delivered(tick, now_ns)
 
-    def _on_standing(self, standing: Standing, payload: bytes, now_ns: int) -> None:
+    def _on_standing(self, standing: ResumeState, payload: bytes, now_ns: int) -> None:
         """The vHub reports its resume position."""
         self.state.repeated += not self._resume_hub(standing, now_ns)
 
-    def _resume_hub(self, standing: Standing, now_ns: int) -> bool:
+    def _resume_hub(self, standing: ResumeState, now_ns: int) -> bool:
         """Let the vHub go on, after a rollback where it needs one; False for a repeat, and for another start's."""
         state, process = self.state, self.state.roster.by_name.get(channels.VHUB)
         if process is None or process.boot != standing.boot or standing.supervisor != state.boot:

@@ -13,7 +13,7 @@ from typing import Final
 
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
-from foosim.protocol.hub_messages import Standing
+from foosim.protocol.hub_messages import ResumeState
 from foosim.protocol.messages import Commit
 from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.progress import ClosingMonitor, ProgressMonitor
@@ -37,14 +37,14 @@ class Rollback:
         self._state = state
         self._progress = progress
 
-    def is_behind(self, standing: Standing) -> bool:
+    def is_behind(self, standing: ResumeState) -> bool:
         """Whether somebody knows more, or may, than a vHub that goes on from a journal."""
         state = self._state
         if not standing.waits or not standing.commit:
             return False
         return standing.lost_machine or max(state.frame.tick - 1, state.inputs.delivered) > standing.final
 
-    def is_due(self, standing: Standing) -> bool:
+    def is_due(self, standing: ResumeState) -> bool:
         """Whether this start of the vHub needs a rollback, and did not have it yet."""
         return standing.boot != self._state.granted_boot and self.is_behind(standing)
 
@@ -57,7 +57,7 @@ class Rollback:
         """Name the branch that has begun after the first epoch in it."""
         self._state.branch = self._state.inputs.branch = epoch
 
-    def begin(self, standing: Standing, now_ns: int) -> None:
+    def begin(self, standing: ResumeState, now_ns: int) -> None:
         """Roll back to the vHub's last closed tick; the branch begins with the epoch that is opened next.
 
         That is one record of the journal, with the entry in the account. A supervisor or vHub that ends before that
@@ -102,7 +102,7 @@ class Failover:
         self._rollback = rollback
         self._finish = finish
         self._publish_commit = publish_commit
-        self._standing: Standing | None = None
+        self._standing: ResumeState | None = None
         """The resume position of the vHub, once it is known."""
         self._living_ns = self._start_ns = self._hub_ns = 0
         self._roster: list[str] = []
@@ -125,7 +125,7 @@ class Failover:
         state.resumed()
         state.log("warning", f"started again: the journal ends at tick {state.frame.tick}, epoch {state.epoch}")
 
-    def on_standing(self, standing: Standing, now_ns: int) -> bool:
+    def on_standing(self, standing: ResumeState, now_ns: int) -> bool:
         """The vHub reports its resume position: go on from its last commit when the journal has lost that, or when the
         vHub has lost what came after it. False for a repeat."""
         state = self._state
@@ -177,12 +177,12 @@ class Failover:
         if len(here) == len(expected) or now_ns >= waits_until_ns:
             self._open(self._standing, here, [name for name in expected if name not in here], now_ns)
 
-    def _is_ahead(self, standing: Standing) -> bool:
+    def _is_ahead(self, standing: ResumeState) -> bool:
         """Whether the vHub knows of commits, or of a branch, that are not in the supervisor's journal."""
         newer = bool(standing.commit) and decode(Commit, standing.commit).tick > self._state.frame.tick
         return newer or standing.branch > self._state.branch
 
-    def _catch_up(self, standing: Standing) -> None:
+    def _catch_up(self, standing: ResumeState) -> None:
         """Go on from the vHub's last commit. Raises Malformed for one that does not fit its frame."""
         state, frame = self._state, self._state.frame_of(standing)
         if standing.branch > state.branch:
@@ -192,7 +192,7 @@ class Failover:
         state.roll_back(frame, standing.chain, standing.commit)
         state.log("warning", f"goes on from the vHub's commit {state.frame.tick}, the journal lost what led to it")
 
-    def _open(self, standing: Standing, here: list[str], missing: list[str], now_ns: int) -> None:
+    def _open(self, standing: ResumeState, here: list[str], missing: list[str], now_ns: int) -> None:
         state = self._state
         state.is_resuming = False
         state.is_open = True

@@ -19,7 +19,7 @@ from foosim.protocol.codec import decode, encode
 from foosim.protocol.edits import Edit, layout_after
 from foosim.protocol.errors import Malformed
 from foosim.protocol.frame import Frame, frame_from_bytes
-from foosim.protocol.hub_messages import Proceed, Standing
+from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.layout import Layout, build_layout
 from foosim.protocol.messages import Answer, Commit, Deliveries, End, Epoch, Part, Prepare, Tempo
 from foosim.protocol.start import AddedEntity, added_to, first_chain, first_frame
@@ -242,14 +242,14 @@ class RunState:
         """Have every node build an engine for a layout."""
         self.publish(channels.PREPARE, channels.SUPERVISOR, Prepare(self.added(layout)))
 
-    def grant(self, standing: Standing) -> None:
+    def grant(self, standing: ResumeState) -> None:
         """Let the vHub go on: its resume position is known.
 
         A branch without an epoch, since no node is here, begins with the first epoch that is opened.
         """
         self.granted_boot = standing.boot
-        grant = Proceed(channels.VHUB, standing.boot, max(self.epoch, self.branch))
-        self.publish(channels.PROCEED, channels.VHUB, grant)
+        grant = ResumeGrant(channels.VHUB, standing.boot, max(self.epoch, self.branch))
+        self.publish(channels.RESUME_GRANT, channels.VHUB, grant)
 
     # --- epochs ------------------------------------------------------------------------------------------------------
 
@@ -430,7 +430,7 @@ class RunState:
         """Order the known edits of a tick, and of those after it, once more."""
         self.coming_edits = self.edit_log.since(tick)
 
-    def frame_of(self, standing: Standing) -> Frame:
+    def frame_of(self, standing: ResumeState) -> Frame:
         """Return the vHub's last committed frame. Raises Malformed for a commit that does not fit its frame."""
         commit = decode(Commit, standing.commit)
         layout = build_layout(self.deployment, [(entity.name, entity.model) for entity in standing.added])

@@ -25,7 +25,7 @@ from foosim.protocol.codec import encode
 from foosim.protocol.deployment import Deployment
 from foosim.protocol.errors import Malformed, Refused
 from foosim.protocol.frame import Frame
-from foosim.protocol.hub_messages import Proceed, Standing
+from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.member import Member
 from foosim.protocol.messages import (
     CAPTURE,
@@ -174,7 +174,7 @@ class HubCore:
             Tempo: clients.on_tempo,
             Watched: self.watching.take,
             End: self._on_end,
-            Proceed: self._on_proceed,
+            ResumeGrant: self._on_proceed,
             ClientHello: self._on_hello,
             Join: self._on_join,
             Up: clients.on_up,
@@ -564,7 +564,7 @@ class HubCore:
         """Return the report of how far the world has come here, which goes before each ready."""
         state, build = self.state, self.member.build
         assert state is not None and build is not None
-        standing = Standing(
+        standing = ResumeState(
             channels.VHUB,
             self.member.boot,
             build.supervisor,
@@ -576,9 +576,9 @@ class HubCore:
             self.handshake.waits,
             self.handshake.lost_machine,
         )
-        return Publish(channels.STANDING, channels.VHUB, encode(standing))
+        return Publish(channels.RESUME_STATE, channels.VHUB, encode(standing))
 
-    def _on_proceed(self, proceed: Proceed, payload: bytes, now_ns: int) -> None:
+    def _on_proceed(self, proceed: ResumeGrant, payload: bytes, now_ns: int) -> None:
         """Take the supervisor's grant: it knows this vHub's resume position."""
         if proceed.boot != self.member.boot or not self.handshake.waits:
             self._repeated += 1

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from bench.mutants.planting import Mutant, Planting, Register
 from foosim.client.core import ClientCore
 from foosim.node.inputs import Inputs
-from foosim.protocol.hub_messages import Proceed
+from foosim.protocol.hub_messages import ResumeGrant
 from foosim.supervisor.failover import Rollback
 from foosim.supervisor.state import RunState
 from foosim.vhub.core import HubCore
@@ -54,7 +54,7 @@ def _does_not_wait(planting: Planting) -> None:
     def go_on(self: Any, past: Any, now_ns: int) -> None:
         before(self, past, now_ns)
         if self.handshake.waits:
-            self._readers[Proceed] = lambda proceed, payload, now_ns: None
+            self._readers[ResumeGrant] = lambda proceed, payload, now_ns: None
             self.handshake.granted_from = 0
             self._enter()
 

@@ -128,7 +128,7 @@ def test_the_end_of_a_run_names_who_stopped_it_and_what_shows_its_capture(
     }[ends]
 
 
-class Standing(Control):
+class ResumeState(Control):
     """A run that is not moved by anybody, without a wire: it remembers what it was asked for."""
 
     def __init__(self) -> None:
@@ -156,7 +156,7 @@ class Standing(Control):
 
 def test_while_nobody_looks_statuses_alone_are_asked_for_and_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_source, "UNSEEN_S", 0.0)
-    control = Standing()
+    control = ResumeState()
 
     async def scene() -> None:
         source = LiveSource("mine", lambda give_up: control, None)

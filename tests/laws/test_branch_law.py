@@ -15,7 +15,7 @@ from foosim.node.inputs import Inputs
 from foosim.protocol import channels, limits
 from foosim.protocol.codec import decode_any
 from foosim.protocol.edits import Add, Push
-from foosim.protocol.hub_messages import Standing
+from foosim.protocol.hub_messages import ResumeState
 from foosim.protocol.messages import ClientWelcome, Epoch
 from foosim.rehearsal.bus import CALM, Weather
 from foosim.rehearsal.failures import Broken
@@ -195,7 +195,7 @@ def test_a_supervisor_that_ends_before_the_branchs_first_epoch_goes_on_with_it(
     def cut_power(system: System) -> None:
         begin = system.supervisor.rollback.begin
 
-        def end_behind(standing: Standing, now_ns: int) -> None:
+        def end_behind(standing: ResumeState, now_ns: int) -> None:
             begin(standing, now_ns)
             system.end_amid(channels.SUPERVISOR, len(system.supervisor.actions))
             system.later(100 * MS, partial(system.start, channels.SUPERVISOR))

@@ -23,7 +23,7 @@ from foosim.protocol.channels import CHANNELS, SUPERVISOR, VHUB, Channel, Plane
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.edits import Edit, Push
 from foosim.protocol.errors import Malformed
-from foosim.protocol.hub_messages import Proceed, Standing
+from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.json_text import encode_json
 from foosim.protocol.messages import (
     Build,
@@ -178,7 +178,7 @@ def lies_to_the_hub(system: System) -> list[Lie]:
         (channels.SAMPLES, "n1", replace(samples, node="n2")),
         (channels.SAMPLES, "n1", samples),
         (channels.SAMPLES, "n1", replace(samples, tick=FAR)),
-        (channels.PROCEED, VHUB, Proceed(VHUB, "other", FAR)),
+        (channels.RESUME_GRANT, VHUB, ResumeGrant(VHUB, "other", FAR)),
         (channels.EPOCH, SUPERVISOR, Epoch(0, 0, frame.digest, [], [], [], b"")),
         (channels.EPOCH, SUPERVISOR, Epoch(epoch + 9, 0, frame.digest, ["n1"], [], [], b"")),
         (channels.TEMPO, SUPERVISOR, Tempo("1e999x", False)),
@@ -220,7 +220,11 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
         (channels.HELLO, "n1", replace(hello, role="dragon", boot="boot")),
         (channels.FETCH, "n1", Fetch("n1", "boot-1", bytes(32), 0)),
         (channels.READY, "n1", Ready("n1", "other", bytes(32), bytes(32))),
-        (channels.STANDING, VHUB, Standing(VHUB, "other", "boot", FAR, FAR, 0, b"", bytes(32), [], 0, True, True)),
+        (
+            channels.RESUME_STATE,
+            VHUB,
+            ResumeState(VHUB, "other", "boot", FAR, FAR, 0, b"", bytes(32), [], 0, True, True),
+        ),
         (channels.HEARTBEAT, "n1", replace(beat, report=b"{")),
         (channels.HEARTBEAT, "n1", beat),
         (channels.HEARTBEAT, NOBODY, replace(beat, sender=NOBODY)),

@@ -11,7 +11,7 @@ from foosim.protocol import channels, limits
 from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode_any
 from foosim.protocol.deployment_file import apply_sets, load_deployment
-from foosim.protocol.hub_messages import Proceed
+from foosim.protocol.hub_messages import ResumeGrant
 from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Down, Epoch, Failure, Go, Join, Tempo
 from foosim.vhub.core import HubCore
 from foosim.vhub.keeping import RecordClosing
@@ -155,7 +155,7 @@ def restarted(hub: Hub, proceeds: bool = True) -> Hub:
     hub.say(channels.BUILD, "vhub", msgspec.structs.replace(BUILD, deployment=PLAYERS, boot="boot-2"))
     hub.core.begin(recall(load_deployment(PLAYERS, TABLE.name), BUILD.run, records, None, 0), 0)
     if proceeds:
-        hub.say(channels.PROCEED, "vhub", Proceed("vhub", "boot-2", 0))
+        hub.say(channels.RESUME_GRANT, "vhub", ResumeGrant("vhub", "boot-2", 0))
     return hub
 
 
@@ -315,7 +315,7 @@ def test_a_vhub_that_dies_behind_the_record_of_who_left_owing_leaves_nothing_uns
     assert owed not in told(hub, RED)
     hub = restarted(hub, proceeds=False)
     assert told(hub, RED) == []
-    hub.say(channels.PROCEED, "vhub", Proceed("vhub", "boot-2", 0))
+    hub.say(channels.RESUME_GRANT, "vhub", ResumeGrant("vhub", "boot-2", 0))
     assert told(hub, RED) == [owed]
 
 

@@ -9,7 +9,7 @@ import pytest
 from foosim.protocol import channels, limits
 from foosim.protocol.actions import Action, Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.hub_messages import Proceed, Standing
+from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.messages import Build, ClientHello, Deliveries, Done, Epoch, Want
 from foosim.supervisor.state import InputBuffer
 from foosim.vhub.core import HubCore
@@ -67,7 +67,7 @@ class Waiting(Storm):
         self.tell(channels.EPOCH, channels.SUPERVISOR, encode(message))
 
     def proceed(self, epoch: int, boot: str = "boot-2") -> None:
-        self.tell(channels.PROCEED, "vhub", encode(Proceed("vhub", boot, epoch)))
+        self.tell(channels.RESUME_GRANT, "vhub", encode(ResumeGrant("vhub", boot, epoch)))
 
 
 def published(said: Said, channel: channels.Channel) -> list[bytes]:
@@ -76,7 +76,7 @@ def published(said: Said, channel: channels.Channel) -> list[bytes]:
 
 def test_it_tells_where_it_stands_and_waits() -> None:
     air = Waiting()
-    (told,) = [decode(Standing, payload) for payload in published(air.take(), channels.STANDING)]
+    (told,) = [decode(ResumeState, payload) for payload in published(air.take(), channels.RESUME_STATE)]
     assert (told.boot, told.supervisor, told.epoch) == ("boot-2", "first", 1)
     assert told.waits and not told.lost_machine and told.final >= CLOSED + 1
     air.tick = CLOSED
@@ -88,7 +88,7 @@ def test_it_tells_where_it_stands_and_waits() -> None:
     air.now_ns += limits.WANT_EVERY_NS_MAX
     air.hub.wake(air.now_ns)
     again = air.take()
-    assert published(again, channels.STANDING) and not published(again, channels.WANT), "it asks whether it may"
+    assert published(again, channels.RESUME_STATE) and not published(again, channels.WANT), "it asks whether it may"
     air.proceed(1)
     said = air.take()
     (last,) = [decode(Deliveries, raw) for raw in published(said, channels.DELIVERIES)]
